@@ -1,0 +1,60 @@
+"""``gelpolight benchmark``: where the time of a frame goes."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.command_line.common import add_model, load_calibration, write_json
+from gelpolight_core.reconstruction.benchmark import benchmark_frame
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_picture
+from gelpolight_core.translation import tr
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser("benchmark", help=tr("show where the time of a frame goes"))
+    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
+    parser.add_argument("image", type=Path, metavar="IMAGE")
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--repeats", type=int, default=25, metavar="N")
+    add_model(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Time the frame and print a table."""
+    calibration = load_calibration(options.calibration, model=options.model)
+    picture = read_picture(options.image)
+    frame = np.round(picture.rgb * (2**picture.bit_depth - 1)).astype(f"u{picture.bit_depth // 8}")
+    result = benchmark_frame(Reconstructor(calibration), frame, repeats=max(options.repeats, 1))
+    rows = [*result.steps, result.total, result.plain]
+    print(f"{tr('step'):<26}{tr('median ms'):>12}{tr('p95 ms'):>10}{tr('MB'):>8}")
+    for row in rows:
+        print(f"{row.name:<26}{row.median_ms:12.2f}{row.p95_ms:10.2f}{row.bytes / 1e6:8.1f}")
+    print(f"{tr('copy of the bytes'):<26}{result.copy_floor_ms:12.2f}")
+    print(
+        tr("{ratio:.1f} times faster than the plain version; {floor:.1f} times the copy").format(
+            ratio=result.plain.median_ms / result.total.median_ms,
+            floor=result.total.median_ms / result.copy_floor_ms,
+        )
+    )
+    if options.json:
+        write_json(
+            {
+                "total_ms": {"median": result.total.median_ms, "p95": result.total.p95_ms},
+                "copy_floor_ms": result.copy_floor_ms,
+                "steps": [row.as_dict() for row in result.steps],
+                "plain": result.plain.as_dict(),
+                "threads": result.threads,
+                "model": calibration.model,
+                "plan": [{"step": row.name, "done": True} for row in result.steps],
+                "versions": result.versions,
+            },
+            options.json,
+        )
+    return 0

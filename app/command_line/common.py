@@ -1,0 +1,100 @@
+"""What several commands share: arguments, progress and tables."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+from tqdm import tqdm
+
+from gelpolight_core.calibration.calibration import MODELS, Calibration
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.translation import tr
+
+
+class StageProgress:
+    """A progress bar on stderr that a stage function can tell its name and share to."""
+
+    def __init__(self) -> None:
+        self._bar = tqdm(total=100, file=sys.stderr, bar_format="{desc:<24}{bar:30}{n:4.0f} %")
+
+    def __enter__(self) -> Callable[[str, float], None]:
+        """Return the function to be told."""
+        return self._tell
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the bar."""
+        self._bar.close()
+
+    def _tell(self, stage: str, share: float) -> None:
+        self._bar.set_description_str(stage)
+        self._bar.n = round(100 * share)
+        self._bar.refresh()
+
+
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """Add ``--model``."""
+    parser.add_argument(
+        "--model",
+        choices=("paper", "full"),
+        default=MODELS[-1],
+        help=tr("paper: lights frozen at the flat membrane, straight integration"),
+    )
+
+
+def check_model(model: str) -> str:
+    """Refuse a model that this version does not have."""
+    if model not in MODELS:
+        raise InputError(
+            tr("this version has no {model} model yet").format(model=model),
+            where="--model",
+            advice=tr("Use --model paper"),
+        )
+    return model
+
+
+def load_calibration(path: Path, *, model: str | None = None) -> Calibration:
+    """Read a calibration, and check that it was made for the wanted model."""
+    if model is not None:
+        check_model(model)
+    return read_calibration(path)
+
+
+def write_json(content: Mapping[str, Any], path: Path) -> None:
+    """Write a JSON file, whole or not at all."""
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+    def write(stream: BinaryIO) -> None:
+        stream.write(text.encode())
+
+    write_atomically(path, write)
+
+
+def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:
+    """Return the quality tables of all stages as lines of text."""
+    lines = []
+    for stage, table in tables.items():
+        lines.append(f"{stage}: {table.verdict.value}")
+        for figure in table.figures:
+            mark = {Verdict.PASS: " ", Verdict.WARN: "!", Verdict.FAIL: "X"}[figure.verdict]
+            limit = (
+                "" if figure.warn_limit is None else tr("limit {x:g}").format(x=figure.warn_limit)
+            )
+            value = f"{figure.value:>10.4g} {figure.unit:<4}"
+            lines.append(f"  {mark} {figure.label:<58} {value} {limit}".rstrip())
+            if figure.verdict is not Verdict.PASS and figure.advice:
+                lines.append(f"      {figure.advice}.")
+    return lines

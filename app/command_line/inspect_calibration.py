@@ -1,0 +1,45 @@
+"""``gelpolight inspect``: what a calibration file holds."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.command_line.common import load_calibration, quality_lines
+from gelpolight_core.translation import tr
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser("inspect", help=tr("show what a calibration holds"))
+    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print provenance, geometry and quality table."""
+    c = load_calibration(options.calibration)
+    grid = c.table.grid
+    rows = [
+        (tr("calibration"), c.identity),
+        (tr("sensor"), c.sensor.serial),
+        (tr("model"), c.model),
+        (tr("verdict"), c.verdict.value),
+        (tr("made"), f"{c.provenance.created} {c.provenance.operator}".strip()),
+        (tr("program"), c.provenance.program_version),
+        (tr("session"), f"{c.provenance.session} ({len(c.provenance.sources)} files)"),
+        (tr("picture"), f"{c.camera.width}x{c.camera.height} px"),
+        (tr("focal length"), f"{c.camera.fx:.2f}, {c.camera.fy:.2f} px"),
+        (tr("principal point"), f"{c.camera.cx:.2f}, {c.camera.cy:.2f} px"),
+        (tr("top surface"), f"{c.plane.distance_mm:.3f} mm"),
+        (tr("tilt"), f"{np.degrees(np.arccos(c.plane.normal_camera[2])):.3f} deg"),
+        (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
+    ]
+    for name, led in zip(("red", "green", "blue"), c.led_positions_mm, strict=True):
+        rows.append((f"{tr(name)} LED", "({:.3f}, {:.3f}, {:.3f}) mm".format(*led)))
+    print("\n".join(f"{label:<18} {value}" for label, value in rows))
+    print("\n".join(quality_lines(c.quality)))
+    return 0

@@ -1,0 +1,67 @@
+"""``gelpolight reconstruct``: pictures become height maps."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from app.command_line.common import add_model, load_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.translation import tr
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser("reconstruct", help=tr("turn pictures into depth maps in mm"))
+    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
+    parser.add_argument("images", type=Path, nargs="+", metavar="IMAGE")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
+    parser.add_argument(
+        "--format",
+        default="npz",
+        metavar="LIST",
+        help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
+    )
+    add_model(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Reconstruct every picture and write its files."""
+    formats = [name.strip() for name in options.format.split(",") if name.strip()]
+    unknown = sorted(set(formats) - set(FORMATS))
+    if unknown or not formats:
+        raise InputError(
+            tr("unknown format {name}").format(name=", ".join(unknown) or '""'),
+            where="--format",
+            advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
+        )
+    twins = [stem for stem, n in Counter(path.stem for path in options.images).items() if n > 1]
+    if twins:
+        raise InputError(
+            tr("two pictures are named {name}").format(name=twins[0]),
+            where=tr("IMAGE"),
+            advice=tr("Reconstruct them into different folders, so that neither is overwritten"),
+        )
+    reconstructor = Reconstructor(load_calibration(options.calibration, model=options.model))
+    make_folder(options.output)
+    for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):
+        picture = read_picture(path)
+        require_colour(picture, where=str(path))
+        heightmap = reconstructor.depth(picture.rgb, name=path.name)
+        write_heightmap(heightmap, options.output, formats=formats)
+    print(
+        tr("{n} depth maps written to {folder}").format(
+            n=len(options.images), folder=options.output
+        )
+    )
+    return 0

@@ -1,0 +1,30 @@
+"""``gelpolight simulate``: a session folder of the virtual sensor, with its truth."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from gelpolight_core.simulation.session import simulate_session
+
+from app.command_line.common import StageProgress
+from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.translation import tr
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser("simulate", help=tr("make a session folder of the virtual sensor"))
+    parser.add_argument("output", type=Path, metavar="OUT")
+    parser.add_argument("--design", type=Path, metavar="FILE", help=tr("sensor design (TOML)"))
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Render the session."""
+    design = read_design(options.design) if options.design else SensorDesign()
+    with StageProgress() as tell:
+        simulate_session(design, options.output, progress=tell)
+    print(tr("Session written to {folder}").format(folder=options.output))
+    return 0

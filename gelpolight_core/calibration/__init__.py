@@ -1,0 +1,1 @@
+"""The complete calibration of one sensor: its making and its file."""

@@ -1,0 +1,144 @@
+"""A complete, immutable calibration of one sensor: all that a reconstruction needs."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.refraction import LayerStack, build_stack
+from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.session.session import SensorData
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+MODELS = ("paper",)
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a calibration comes from.
+
+    Attributes
+    ----------
+    created : str
+        ISO 8601 time with zone.
+    operator : str
+        Who made it.
+    program_version : str
+        Version of the program that made it.
+    session : str
+        Name of the session folder.
+    sources : mapping
+        SHA-256 of every file that it was made from, by stage and name.
+    camera_settings : mapping
+        Exposure and the like, where they are known.
+    """
+
+    created: str
+    operator: str
+    program_version: str
+    session: str
+    sources: Mapping[str, str]
+    camera_settings: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """All that is known of one sensor.
+
+    Attributes
+    ----------
+    sensor : SensorData
+        As its maker states it.
+    model : str
+        The model it was made with: ``paper``.
+    camera, plane
+        Lens and top surface.
+    led_positions_mm : (3, 3)
+        Sensor frame, row k is LED k.
+    led_covariance_mm2 : (3, 3, 3)
+        Covariance of each.
+    crosstalk : (3, 3)
+        ``I_raw = crosstalk @ I_true``, from the mirror spots.
+    radiance, factors : (rows, columns, 3) float32
+        |L| (Eq. 5) and rho (Eq. 9) on the membrane grid; 0 where they are unknown.
+    reflectance : ReflectanceTable
+        G and R (Eq. 6, 7).
+    noise : (3,)
+        Standard deviation of a single picture's pixel at its median brightness, per channel.
+    quality : mapping
+        Quality table of every stage, in their order.
+    provenance : Provenance
+        When, who, from what.
+    """
+
+    sensor: SensorData
+    model: str
+    camera: Camera
+    plane: TopPlane
+    led_positions_mm: Array
+    led_covariance_mm2: Array
+    crosstalk: Array
+    radiance: Map
+    factors: Map
+    reflectance: ReflectanceTable
+    noise: Array
+    quality: Mapping[str, QualityTable]
+    provenance: Provenance
+
+    @cached_property
+    def stack(self) -> LayerStack:
+        """The layers between camera and top surface."""
+        return sensor_stack(self.sensor, self.plane)
+
+    @cached_property
+    def table(self) -> ResamplingTable:
+        """The resampling table, made anew from the optics (it is not stored)."""
+        return build_resampling_table(
+            self.camera,
+            self.plane,
+            self.stack,
+            working_diameter_mm=self.sensor.working_diameter_mm,
+        )
+
+    @cached_property
+    def identity(self) -> str:
+        """A short name that changes with any number of the calibration."""
+        digest = hashlib.sha256(repr((self.sensor, self.model, self.camera, self.plane)).encode())
+        digest.update(self.provenance.created.encode())
+        for array in (
+            self.led_positions_mm,
+            self.crosstalk,
+            self.radiance,
+            self.factors,
+            *self.reflectance.cosines,
+            *self.reflectance.values,
+        ):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of all stages."""
+        figures = tuple(f for table in self.quality.values() for f in table.figures)
+        return QualityTable(figures).verdict
+
+
+def sensor_stack(sensor: SensorData, plane: TopPlane) -> LayerStack:
+    """Return the layers of a sensor below its measured top surface."""
+    return build_stack(
+        plane.distance_mm,
+        elastomer_thickness_mm=sensor.elastomer_thickness_mm,
+        elastomer_index=sensor.elastomer_refractive_index,
+        window_thickness_mm=sensor.window_thickness_mm,
+        window_index=sensor.window_refractive_index,
+    )

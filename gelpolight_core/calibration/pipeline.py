@@ -1,0 +1,240 @@
+"""From a session folder to a calibration: the stages, one after the other."""
+
+from __future__ import annotations
+
+import getpass
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core import __version__
+from gelpolight_core.calibration.calibration import Calibration, Provenance, sensor_stack
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.background import FactorResult, calibrate_factors
+from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
+from gelpolight_core.lights.mirror import find_mirror_spots
+from gelpolight_core.lights.positions import LightResult, locate_leds
+from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.optics.lens import LensResult, calibrate_lens
+from gelpolight_core.optics.pose import TopPoseResult, estimate_top_pose
+from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radiance
+from gelpolight_core.reflectance.press import BallPress, find_ball
+from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
+from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.session import (
+    ONE_IMAGE_STAGES,
+    Board,
+    Session,
+    file_hash,
+    read_picture,
+    require_colour,
+)
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+Progress = Callable[[str, float], None]
+STAGES = ("checkerboard", "top_pose", *ONE_IMAGE_STAGES, "balls")
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationRun:
+    """A calibration with the results of every stage, as the pages and the report show them."""
+
+    calibration: Calibration
+    lens: LensResult
+    top_pose: TopPoseResult
+    lights: LightResult
+    radiance: RadianceResult
+    reflectance: ReflectanceResult
+    factors: FactorResult
+
+
+def calibrate_session(
+    session: Session, *, model: str = "paper", progress: Progress | None = None
+) -> CalibrationRun:
+    """Calibrate a sensor from its session folder.
+
+    Parameters
+    ----------
+    session : Session
+        What was captured.
+    model : str, optional
+        The model to calibrate for.
+    progress : callable, optional
+        Told the stage's name and the share done, 0..1.
+
+    Raises
+    ------
+    InputError
+        If a stage is missing or cannot be used; the message names the file.
+    """
+    tell = progress or (lambda _stage, _share: None)
+    for stage in STAGES:
+        session.files(stage)
+    tell(tr("lens"), 0.0)
+    lens = calibrate_lens(session.pictures("checkerboard"), _spec(session.checkerboard))
+    tell(tr("top surface"), 0.3)
+    pose_pictures = session.pictures("top_pose")
+    _same_size(pose_pictures[0], lens.camera.width, lens.camera.height, "top_pose")
+    pose = estimate_top_pose(pose_pictures, _spec(session.top_pose), lens.camera)
+    table = build_resampling_table(
+        lens.camera,
+        pose.plane,
+        sensor_stack(session.sensor, pose.plane),
+        working_diameter_mm=session.sensor.working_diameter_mm,
+    )
+    tell(tr("lights"), 0.4)
+    lights = locate_leds(
+        find_mirror_spots(_stage_picture(session, "mirror", lens)),
+        lens.camera,
+        pose.plane,
+        led_height_mm=session.sensor.led_height_mm,
+    )
+    tell(tr("light intensity"), 0.45)
+    radiance = calibrate_radiance(
+        _stage_picture(session, "whiteboard", lens), table, lights.led_positions_mm
+    )
+    background = _stage_picture(session, "background", lens)
+    _refuse_unlit(background)
+    bare = table.apply(background.rgb)
+    presses, pictures = _find_balls(session, bare, table, lights, lens, radiance, tell)
+    tell(tr("reflectance"), 0.9)
+    reflectance, factors = _reflectance_and_factors(
+        presses, pictures, bare, table, lights, radiance
+    )
+    calibration = Calibration(
+        sensor=session.sensor,
+        model=model,
+        camera=lens.camera,
+        plane=pose.plane,
+        led_positions_mm=lights.led_positions_mm,
+        led_covariance_mm2=lights.led_covariance_mm2,
+        crosstalk=crosstalk_from_spots(lights.spots),
+        radiance=radiance.radiance,
+        factors=factors.factors,
+        reflectance=reflectance.table,
+        noise=np.mean([p.indentation.noise for p in presses], axis=0),
+        quality={
+            "lens": lens.quality,
+            "top_pose": pose.quality,
+            "lights": lights.quality,
+            "radiance": radiance.quality,
+            "reflectance": reflectance.quality,
+            "factors": factors.quality,
+        },
+        provenance=_provenance(session),
+    )
+    tell(tr("done"), 1.0)
+    return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
+
+
+def _reflectance_and_factors(
+    presses: tuple[BallPress, ...],
+    pictures: tuple[Map, ...],
+    bare: Map,
+    table: ResamplingTable,
+    lights: LightResult,
+    radiance: RadianceResult,
+) -> tuple[ReflectanceResult, FactorResult]:
+    """Fit the table, then the factors, and feed these back once (section V-E)."""
+    leds = lights.led_positions_mm
+    first = calibrate_reflectance(presses, pictures, table, leds, radiance)
+    factors = calibrate_factors(bare, table, leds, radiance, first.table)
+    second = calibrate_reflectance(presses, pictures, table, leds, radiance, factors.factors)
+    return second, calibrate_factors(bare, table, leds, radiance, second.table)
+
+
+def _find_balls(
+    session: Session,
+    bare: Map,
+    table: ResamplingTable,
+    lights: LightResult,
+    lens: LensResult,
+    radiance: RadianceResult,
+    tell: Progress,
+) -> tuple[tuple[BallPress, ...], tuple[Map, ...]]:
+    crosstalk = crosstalk_from_spots(lights.spots)
+    clean = unmix(bare, crosstalk)
+    presses, pictures = [], []
+    files = session.files("balls")
+    for index, path in enumerate(files):
+        tell(tr("ball presses"), 0.5 + 0.4 * index / len(files))
+        picture = read_picture(path)
+        radius = session.ball_radius_mm(path.name)
+        require_colour(picture, where=str(path))
+        _same_size(picture, lens.camera.width, lens.camera.height, "balls")
+        seen = table.apply(picture.rgb)
+        presses.append(
+            find_ball(
+                unmix(seen, crosstalk),
+                clean,
+                table,
+                lights.led_positions_mm,
+                radius_mm=radius,
+                name=f"balls/{path.name}",
+                usable=radiance.usable,
+            )
+        )
+        pictures.append(seen)
+    return tuple(presses), tuple(pictures)
+
+
+def _stage_picture(session: Session, stage: str, lens: LensResult) -> Picture:
+    picture = session.averaged(stage)
+    require_colour(picture, where=f"{stage}/{picture.name}")
+    _same_size(picture, lens.camera.width, lens.camera.height, stage)
+    return picture
+
+
+def _same_size(picture: Picture, width: int, height: int, stage: str) -> None:
+    if picture.size != (width, height):
+        raise InputError(
+            tr("the picture is {w}x{h} pixels, the checkerboard pictures are {cw}x{ch}").format(
+                w=picture.size[0], h=picture.size[1], cw=width, ch=height
+            ),
+            where=f"{stage}/{picture.name}",
+            advice=tr("Capture all stages at one picture size"),
+        )
+
+
+def _refuse_unlit(picture: Picture) -> None:
+    brightest = np.percentile(picture.rgb, 99.5, axis=(0, 1))
+    if brightest.min() < 0.05:
+        raise InputError(
+            tr("the picture is dark (a channel reaches only {v:.1%})").format(v=brightest.min()),
+            where=f"background/{picture.name}",
+            advice=tr("Switch all three LEDs on, or expose longer"),
+        )
+    saturated = float((picture.rgb >= 0.995).any(axis=2).mean())
+    if saturated > 0.2:
+        raise InputError(
+            tr("{share:.0%} of the picture is saturated").format(share=saturated),
+            where=f"background/{picture.name}",
+            advice=tr("Shorten the exposure"),
+        )
+
+
+def _spec(board: Board) -> BoardSpec:
+    return BoardSpec(board.inner_corners, board.square_mm)
+
+
+def _provenance(session: Session) -> Provenance:
+    sources = {
+        f"{stage}/{path.name}": file_hash(path) for stage in STAGES for path in session.files(stage)
+    }
+    sources["session.toml"] = file_hash(session.folder / "session.toml")
+    try:
+        operator = getpass.getuser()
+    except (KeyError, OSError):  # a container without a user database has no name to give
+        operator = ""
+    return Provenance(
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        operator=operator,
+        program_version=__version__,
+        session=session.folder.resolve().name,
+        sources=sources,
+    )

@@ -1,0 +1,287 @@
+"""The design of a sensor: everything that a maker decides, and what the virtual sensor is made of.
+
+A design is written in Python, or read from a TOML file; every unknown key is named, nothing is
+guessed.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gelpolight_core.design.parts import (
+    SHAPES,
+    BallPress,
+    CameraDesign,
+    LayerDesign,
+    LedDesign,
+    LedRing,
+    MembraneDesign,
+    PhotometryDesign,
+    Press,
+)
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+_THREE_LEDS = (
+    LedDesign(x_mm=5.3, y_mm=10.7, height_mm=13.65, power=1.0),
+    LedDesign(x_mm=-12.0, y_mm=-0.6, height_mm=13.78, power=0.9),
+    LedDesign(x_mm=6.4, y_mm=-10.2, height_mm=13.82, power=1.1),
+)
+# Spread over the working circle, so that every light's cosine is seen over its whole range.
+_TEN_BALLS = (
+    BallPress(3.0, 1.05, -4.1, -1.6),
+    BallPress(4.0, 1.15, 0.2, 1.2),
+    BallPress(3.0, 0.85, -2.1, -6.2),
+    BallPress(4.0, 1.35, 2.3, -3.4),
+    BallPress(3.0, 1.10, -1.0, 5.6),
+    BallPress(4.0, 0.90, 5.8, 1.9),
+    BallPress(3.0, 0.95, -6.4, 3.1),
+    BallPress(4.0, 1.20, 4.2, 5.3),
+    BallPress(3.0, 1.00, 6.3, -4.6),
+    BallPress(4.0, 1.10, -5.2, -5.0),
+)
+_EIGHT_PRESSES = (
+    Press("cylinder", 5.0, 0.5, -2.4, 2.0),
+    Press("cylinder", 5.0, 1.0, 3.6, -2.2),
+    Press("cylinder", 4.0, 1.5, 1.2, 4.1),
+    Press("cuboid", 4.0, 1.0, -3.5, -3.0, 17.0),
+    Press("cuboid", 6.0, 1.0, 2.0, 1.5, -32.0),
+    Press("cuboid", 5.0, 1.25, -1.5, -1.0, 41.0),
+    Press("coin", 8.0, 0.6, -1.0, -1.2, 10.0),
+    Press("nut", 5.5, 0.8, 2.5, -1.5, 12.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorDesign:
+    """A whole sensor with the objects of its calibration session.
+
+    Attributes
+    ----------
+    serial : str
+        Name of the sensor.
+    camera, layers, leds, ring, membrane, photometry
+        The parts; `leds` are the red, the green and the blue one.
+    balls, presses
+        What is pressed into it when a session is simulated.
+    """
+
+    serial: str = "virtual-1"
+    camera: CameraDesign = field(default_factory=CameraDesign)
+    layers: LayerDesign = field(default_factory=LayerDesign)
+    leds: tuple[LedDesign, ...] = _THREE_LEDS
+    ring: LedRing = field(default_factory=LedRing)
+    membrane: MembraneDesign = field(default_factory=MembraneDesign)
+    photometry: PhotometryDesign = field(default_factory=PhotometryDesign)
+    balls: tuple[BallPress, ...] = _TEN_BALLS
+    presses: tuple[Press, ...] = _EIGHT_PRESSES
+
+    def scaled(self, scale: float) -> SensorDesign:
+        """Return the same sensor with a camera of `scale` times as many pixels per side."""
+        old = self.camera
+        camera = replace(
+            old,
+            width_px=max(16, round(old.width_px * scale)),
+            height_px=max(16, round(old.height_px * scale)),
+            fx=old.fx * scale,
+            fy=old.fy * scale,
+            # Pixel centres are at whole numbers, so the picture's corner is at -0.5.
+            cx=(old.cx + 0.5) * scale - 0.5,
+            cy=(old.cy + 0.5) * scale - 0.5,
+        )
+        return replace(self, camera=camera)
+
+
+def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDesign:
+    """Check every number of a design against its range, and the parts against each other.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        To be checked.
+    where : str, optional
+        File or origin named in the error.
+
+    Returns
+    -------
+    SensorDesign
+        The same design.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite or out of its range, or the parts do not fit together.
+    """
+    _check_ranges(design, where=where, prefix="")
+    if len(design.leds) != 3:
+        raise InputError(
+            tr("there are {n} LEDs").format(n=len(design.leds)),
+            where=f"{where} [[leds]]",
+            advice=tr("Give three: the red, the green and the blue one"),
+        )
+    if design.layers.air_gap_mm <= 0.0:
+        raise InputError(
+            tr("the layers reach the camera: they are {t} mm thick").format(
+                t=design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
+            ),
+            where=f"{where} [layers]",
+            advice=tr("Increase top_distance_mm or make the layers thinner"),
+        )
+    if design.camera.bit_depth not in (8, 16):
+        raise InputError(
+            tr("bit_depth is {n}").format(n=design.camera.bit_depth),
+            where=f"{where} [camera]",
+            advice=tr("Use 8 or 16"),
+        )
+    for press in design.presses:
+        if press.shape not in SHAPES:
+            raise InputError(
+                tr("there is no shape {shape!r}").format(shape=press.shape),
+                where=f"{where} [[presses]]",
+                advice=tr("Use one of {shapes}").format(shapes=", ".join(SHAPES)),
+            )
+    return design
+
+
+def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
+    for item in fields(part):
+        value = getattr(part, item.name)
+        name = f"{prefix}{item.name}"
+        if "low" in item.metadata:
+            low, high = item.metadata["low"], item.metadata["high"]
+            numbers = np.asarray(value, dtype=np.float64)
+            # A NaN compares as false, so it is refused as well.
+            if not np.all((numbers >= low) & (numbers <= high)):
+                raise InputError(
+                    tr("{name} is {value}").format(name=name, value=value),
+                    where=where,
+                    advice=tr("Use a number from {low} to {high}").format(low=low, high=high),
+                )
+        elif hasattr(value, "__dataclass_fields__"):
+            _check_ranges(value, where=where, prefix=f"{name}.")
+        elif isinstance(value, tuple):
+            for number, entry in enumerate(value):
+                _check_ranges(entry, where=where, prefix=f"{name}[{number}].")
+
+
+_PARTS = {
+    "camera": CameraDesign,
+    "layers": LayerDesign,
+    "ring": LedRing,
+    "membrane": MembraneDesign,
+    "photometry": PhotometryDesign,
+}
+_LISTS = {"leds": LedDesign, "balls": BallPress, "presses": Press}
+
+
+def read_design(path: Path) -> SensorDesign:
+    """Read a design file; what it leaves out keeps the default sensor's value.
+
+    The tables are ``[camera]``, ``[layers]``, ``[ring]``, ``[membrane]``, ``[photometry]``, and the
+    lists ``[[leds]]``, ``[[balls]]``, ``[[presses]]``; their keys are the attributes of the classes
+    in :mod:`gelpolight_core.design.parts`.
+
+    Parameters
+    ----------
+    path : Path
+        TOML file.
+
+    Returns
+    -------
+    SensorDesign
+        Checked.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not TOML, has an unknown key, or a value that is of the wrong
+        kind or out of range.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(
+            tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
+        )
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(
+            tr("the file is not valid TOML ({error})").format(error=error),
+            where=str(path),
+            advice=tr("Correct the line that is named"),
+        ) from error
+    return design_from_table(table, where=str(path))
+
+
+def design_from_table(table: dict[str, Any], *, where: str) -> SensorDesign:
+    """Build a checked design from nested plain values (see :func:`read_design`)."""
+    _refuse_unknown(table, {"serial", *_PARTS, *_LISTS}, where=where)
+    values: dict[str, Any] = {}
+    if "serial" in table:
+        values["serial"] = _converted(table["serial"], "", where=f"{where} serial")
+    for name, kind in _PARTS.items():
+        if name in table:
+            values[name] = _part(kind, table[name], where=f"{where} [{name}]")
+    for name, kind in _LISTS.items():
+        if name in table:
+            place = f"{where} [[{name}]]"
+            if not isinstance(table[name], list):
+                raise InputError(
+                    tr("it is not a list of tables"), where=place, advice=tr("Use double brackets")
+                )
+            values[name] = tuple(_part(kind, entry, where=place) for entry in table[name])
+    return validate_design(SensorDesign(**values), where=where)
+
+
+def _part(kind: type[Any], table: Any, *, where: str) -> Any:
+    if not isinstance(table, dict):
+        raise InputError(tr("it is not a table"), where=where, advice=tr("Write keys and values"))
+    defaults = kind()
+    _refuse_unknown(table, {item.name for item in fields(kind)}, where=where)
+    return kind(
+        **{
+            name: _converted(value, getattr(defaults, name), where=f"{where} {name}")
+            for name, value in table.items()
+        }
+    )
+
+
+def _refuse_unknown(table: dict[str, Any], known: set[str], *, where: str) -> None:
+    unknown = sorted(set(table) - known)
+    if unknown:
+        raise InputError(
+            tr("unknown key {keys}").format(keys=", ".join(unknown)),
+            where=where,
+            advice=tr("Use only {known}").format(known=", ".join(sorted(known))),
+        )
+
+
+def _converted(value: Any, like: Any, *, where: str) -> Any:
+    """Return `value` in the kind and layout of the default `like`."""
+    if isinstance(like, tuple):
+        if isinstance(value, list) and len(value) == len(like):
+            pairs = zip(value, like, strict=True)
+            return tuple(_converted(v, x, where=where) for v, x in pairs)
+        kind = tr("a list of {n}").format(n=len(like))
+    elif isinstance(like, str):
+        if isinstance(value, str):
+            return value
+        kind = tr("a text")
+    elif isinstance(like, int):
+        if isinstance(value, int) and not isinstance(value, bool):
+            return value
+        kind = tr("a whole number")
+    else:
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            return float(value)
+        kind = tr("a number")
+    raise InputError(
+        tr("the value is {value!r}").format(value=value),
+        where=where,
+        advice=tr("Give {kind}").format(kind=kind),
+    )

@@ -1,0 +1,1 @@
+"""Height maps as files that other programs read."""

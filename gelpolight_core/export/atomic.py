@@ -1,0 +1,104 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+
+def write_atomically(path: Path, writer: Callable[[BinaryIO], object]) -> None:
+    """Write a file in such a way that other programs see the old one or the new one whole.
+
+    The bytes go to a temporary file in the same folder, are brought to the disk, and take the
+    place of the old file in one step. When anything goes wrong, Ctrl-C included, the old file
+    stays as it was and the temporary one is removed. A link is followed; the permissions of an
+    older file are kept.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file shall be; its folder must exist.
+    writer : callable
+        Gets the open binary file (which can seek) and writes into it.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written: no such folder, no permission, disk full.
+    """
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{target.name[:200]}.{secrets.token_hex(4)}.part")
+    try:
+        _write_and_replace(target, temporary, writer)
+    except OSError as error:
+        raise _as_input_error(error, path) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, unless it is there.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be made, or a file of that name stands in the way.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _as_input_error(error, folder) from error
+
+
+def _write_and_replace(target: Path, temporary: Path, writer: Callable[[BinaryIO], object]) -> None:
+    # Not tempfile: its files can be read by their owner only, and would stay so.
+    file = temporary.open("x+b")
+    try:
+        with file:
+            writer(file)
+            file.flush()
+            os.fsync(file.fileno())
+        if target.is_file():
+            temporary.chmod(stat.S_IMODE(target.stat().st_mode))
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _as_input_error(error: OSError, path: Path) -> InputError:
+    found, advice = _plain_words(error)
+    return InputError(found, where=str(path), advice=advice)
+
+
+def _plain_words(error: OSError) -> tuple[str, str]:
+    """Return what was found and what to do about it."""
+    match error.errno:
+        case errno.ENOSPC | errno.EDQUOT:
+            return tr("the disk is full"), tr("Free some space or choose another disk")
+        case errno.EACCES | errno.EPERM:
+            return tr("you have no permission to write here"), tr(
+                "Choose a folder of your own, or ask for permission"
+            )
+        case errno.EROFS:
+            return tr("this disk can only be read"), tr("Choose a folder on another disk")
+        case errno.ENOENT:
+            return tr("the folder does not exist"), tr("Make the folder first")
+        case errno.ENOTDIR | errno.EEXIST:
+            return tr("a file stands where a folder should be"), tr("Choose another folder")
+        case errno.EISDIR:
+            return tr("a folder stands where the file should be"), tr("Choose another name")
+        case errno.ENAMETOOLONG:
+            return tr("the name is too long"), tr("Choose a shorter name")
+        case errno.EFBIG:
+            return tr("the file is too large for this disk"), tr("Choose another disk")
+    reason = error.strerror or str(error)
+    return tr("the file cannot be written ({reason})").format(reason=reason), tr(
+        "Check the disk or choose another folder"
+    )

@@ -1,0 +1,191 @@
+"""The surface of a height map as triangles, and the files that hold triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles of the membrane in the sensor frame.
+
+    Attributes
+    ----------
+    points_mm : (N, 3) float32
+        (x, y, -depth).
+    triangles : (M, 3) int32
+        Corners, counter-clockwise seen from the camera: the normals point towards it (z < 0).
+    depth_mm : (N,) float32
+    flags : (N,) uint8
+    normals : (N, 3) float32 or None
+    """
+
+    points_mm: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    depth_mm: NDArray[np.float32]
+    flags: NDArray[np.uint8]
+    normals: NDArray[np.float32] | None
+
+
+def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
+    """Return the surface as triangles, two to each cell of the grid.
+
+    A cell is left out when any pixel in it is flagged as outside or has no finite depth; points
+    that no cell uses are left out too.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The surface.
+    stride : int, optional
+        Take every so many-th row and column only, for smaller files.
+
+    Raises
+    ------
+    ValueError
+        Where `stride` is below 1.
+    InputError
+        Where no cell is left.
+    """
+    if stride < 1:
+        raise ValueError(f"stride = {stride}, expected 1 or more")
+    depth_mm = heightmap.depth_mm[::stride, ::stride].astype(np.float32)
+    used = ~_bad_cells(heightmap, stride)
+    if not used.any():
+        raise InputError(
+            tr("no part of the surface lies in the working area"),
+            where=heightmap.source,
+            advice=tr("Check the working area in the calibration"),
+        )
+    first = np.arange(depth_mm.size, dtype=np.int32).reshape(depth_mm.shape)
+    corner, right, below, across = (
+        part[used] for part in (first[:-1, :-1], first[:-1, 1:], first[1:, :-1], first[1:, 1:])
+    )
+    triangles = np.stack([corner, below, right, right, below, across], axis=-1).reshape(-1, 3)
+    kept = np.zeros(depth_mm.size, dtype=bool)
+    kept[triangles] = True
+    numbers = np.cumsum(kept, dtype=np.int32) - np.int32(1)
+    x_mm, y_mm = np.meshgrid(heightmap.x_mm[::stride], heightmap.y_mm[::stride])
+    points_mm = np.stack([x_mm, y_mm, -depth_mm], axis=-1, dtype=np.float32, casting="same_kind")
+    normals = heightmap.normals
+    if normals is not None:
+        normals = normals[::stride, ::stride].reshape(-1, 3)[kept].astype(np.float32)
+    return Mesh(
+        points_mm=points_mm.reshape(-1, 3)[kept],
+        triangles=numbers[triangles],
+        depth_mm=depth_mm.ravel()[kept],
+        flags=heightmap.flags[::stride, ::stride].ravel()[kept],
+        normals=normals,
+    )
+
+
+def _bad_cells(heightmap: HeightMap, stride: int) -> NDArray[np.bool_]:
+    """Cells of the thinned grid with any pixel, corners included, that has no place in a mesh."""
+    bad = (heightmap.flags & Flag.OUTSIDE.value).astype(bool) | ~np.isfinite(heightmap.depth_mm)
+    for _ in range(2):
+        cells = max((bad.shape[0] - 1) // stride, 0)
+        reach = [bad[k : k + cells * stride : stride] for k in range(stride + 1)]
+        bad = np.logical_or.reduce(reach).T
+    return bad
+
+
+def write_vtp(mesh: Mesh, file: BinaryIO, *, pitch_mm: float, about: dict[str, str]) -> None:
+    """Write VTK's XML PolyData: raw appended data, little-endian, with the flags and normals.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The surface.
+    file : binary file
+        Open for writing.
+    pitch_mm : float
+        Kept as field data.
+    about : dict
+        Names and texts that are kept as field data too.
+    """
+    store = _AppendedArrays()
+    fields = store.add("pitch_mm", np.array([pitch_mm]), "Float64", 'NumberOfTuples="1"')
+    fields += "".join(store.add_text(name, value) for name, value in about.items())
+    point_data = store.add("depth_mm", mesh.depth_mm, "Float32")
+    point_data += store.add("flags", mesh.flags, "UInt8")
+    if mesh.normals is not None:
+        point_data += store.add("normals", mesh.normals, "Float32")
+    attributes = "" if mesh.normals is None else ' Normals="normals"'
+    ends = np.arange(3, mesh.triangles.size + 1, 3, dtype=np.int32)
+    polys = store.add("connectivity", mesh.triangles.ravel(), "Int32")
+    polys += store.add("offsets", ends, "Int32")
+    head = (
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+        f"<PolyData>\n<FieldData>\n{fields}</FieldData>\n"
+        f'<Piece NumberOfPoints="{len(mesh.points_mm)}" NumberOfVerts="0" NumberOfLines="0" '
+        f'NumberOfStrips="0" NumberOfPolys="{len(mesh.triangles)}">\n'
+        f'<PointData Scalars="depth_mm"{attributes}>\n{point_data}</PointData>\n'
+        f"<Points>\n{store.add('points_mm', mesh.points_mm, 'Float32')}</Points>\n"
+        f"<Polys>\n{polys}</Polys>\n</Piece>\n</PolyData>\n"
+        '<AppendedData encoding="raw">\n_'
+    )
+    file.write(head.encode())
+    file.writelines(store.blocks)
+    file.write(b"\n</AppendedData>\n</VTKFile>\n")
+
+
+class _AppendedArrays:
+    """Arrays at the end of a VTK XML file: each a length of 8 bytes, then its data."""
+
+    def __init__(self) -> None:
+        self.blocks: list[bytes] = []
+
+    def add(self, name: str, values: NDArray[Any], kind: str, words: str = "") -> str:
+        """Append an array; return the element that refers to it."""
+        offset = sum(map(len, self.blocks))
+        data = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
+        self.blocks.append(len(data).to_bytes(8, "little") + data)
+        components = f'NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+        return (
+            f"<DataArray Name={quoteattr(name)} type={quoteattr(kind)} {components} {words} "
+            f'format="appended" offset="{offset}"/>\n'
+        )
+
+    def add_text(self, name: str, text: str) -> str:
+        """Append one text: its UTF-8 bytes and a closing NUL."""
+        codes = np.frombuffer(text.encode() + b"\0", dtype=np.uint8)
+        return self.add(name, codes, "String", 'NumberOfTuples="1"')
+
+
+def write_ply(mesh: Mesh, file: BinaryIO) -> None:
+    """Write a binary PLY with normals, depth and flags on each point."""
+    from trimesh.exchange.ply import export_ply  # heavy, and needed for this alone
+
+    surface = _as_trimesh(mesh)
+    surface.vertex_attributes["depth_mm"] = mesh.depth_mm
+    surface.vertex_attributes["flags"] = mesh.flags
+    file.write(export_ply(surface, vertex_normal=mesh.normals is not None))
+
+
+def write_stl(mesh: Mesh, file: BinaryIO) -> None:
+    """Write a binary STL: the bare triangles."""
+    from trimesh.exchange.stl import export_stl
+
+    file.write(export_stl(_as_trimesh(mesh)))
+
+
+def _as_trimesh(mesh: Mesh):  # type: ignore[no-untyped-def]
+    import trimesh
+
+    return trimesh.Trimesh(
+        vertices=mesh.points_mm,
+        faces=mesh.triangles,
+        vertex_normals=mesh.normals,
+        process=False,
+        validate=False,
+    )

@@ -1,0 +1,1 @@
+"""Reflectance factors of the bare membrane (Eq. 9)."""

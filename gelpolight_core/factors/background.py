@@ -1,0 +1,111 @@
+"""Reflectance factors of the bare membrane from the contact-free background (Eq. 9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+SATURATED = 0.995
+LEAST_FACTOR = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class FactorResult:
+    """How bright each membrane node is against the theory for an even membrane.
+
+    Attributes
+    ----------
+    factors : (rows, columns, 3) float32
+        rho = I / I_t of Eq. (9), per channel; 0 where it is unknown.
+    usable : (rows, columns) bool
+        Nodes with light and a membrane that answers it.
+    quality : QualityTable
+        Figures, limits and advice.
+    """
+
+    factors: Map
+    usable: NDArray[np.bool_]
+    quality: QualityTable
+
+
+def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
+    """Return cos(theta_k) (rows, columns, 3) on the undeformed membrane."""
+    points = table.grid.points_mm()
+    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
+    directions, _ = light_directions(led_positions_mm, at_top)
+    return np.asarray(-directions[..., 2])
+
+
+def calibrate_factors(
+    background: Map,
+    table: ResamplingTable,
+    led_positions_mm: Array,
+    radiance: RadianceResult,
+    reflectance: ReflectanceTable,
+) -> FactorResult:
+    """Compare the background with what an even, flat membrane would show.
+
+    Parameters
+    ----------
+    background : (rows, columns, 3) float32
+        The contact-free membrane, resampled onto the grid.
+    table, led_positions_mm, radiance, reflectance
+        Earlier stages.
+    """
+    cosines = flat_cosines(table, led_positions_mm)
+    factors = np.zeros(background.shape, dtype=np.float32)
+    for k in range(3):
+        theory = radiance.radiance[..., k] * reflectance.response(k, cosines[..., k])
+        lit = radiance.usable & (theory > 0.0)
+        factors[..., k][lit] = background[..., k][lit] / theory[lit]
+    usable = (
+        radiance.usable
+        & (factors > LEAST_FACTOR).all(axis=2)
+        & np.isfinite(factors).all(axis=2)
+        & (background < SATURATED).all(axis=2)
+    )
+    factors[~usable] = 0.0
+    return FactorResult(factors, usable, _judge(factors, usable, radiance.usable))
+
+
+def _judge(factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_]) -> QualityTable:
+    inside = factors[usable] if usable.any() else np.full((1, 3), np.nan, np.float32)
+    spread = float((1.4826 * np.median(np.abs(inside - np.median(inside, axis=0)), axis=0)).max())
+    return QualityTable(
+        (
+            judge(
+                "factor_median",
+                tr("Reflectance factor, median over all channels"),
+                float(np.median(inside)),
+            ),
+            judge(
+                "factor_spread_percent",
+                tr("Reflectance factor, spread"),
+                100.0 * spread,
+                "%",
+                warn=15.0,
+                fail=40.0,
+                advice=tr("The membrane is uneven: spray it again, or repeat the whiteboard stage"),
+            ),
+            judge(
+                "membrane_unusable_percent",
+                tr("Dead share of the lit membrane"),
+                100.0 * float(1.0 - usable[lit].mean()) if lit.any() else 100.0,
+                "%",
+                warn=2.0,
+                fail=20.0,
+                advice=tr("Look for holes, dirt or saturation in the background picture"),
+            ),
+        )
+    )

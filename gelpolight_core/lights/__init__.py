@@ -1,0 +1,1 @@
+"""LED positions from their mirror spots, and light directions on the membrane."""

@@ -1,0 +1,286 @@
+"""Find the three mirror spots: one per LED, each in its own channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.session import require_colour
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+CHANNEL_NAMES = ("red", "green", "blue")
+SATURATED = 0.995
+BRIGHT_SHARE_LIMIT = 0.02
+RIVAL_FLUX = 0.5
+MERGED_SHARE = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """One bright spot of the mirror picture.
+
+    Attributes
+    ----------
+    centre_px : (2,)
+        Intensity-weighted centroid (u, v).
+    centre_sd_px : float
+        Standard deviation of the centroid from pixel noise and quantisation.
+    area_px : int
+        Pixels above half of the spot's peak.
+    peak : tuple of 3 floats
+        Brightest value in each channel, 0..1.
+    flux : tuple of 3 floats
+        Light above the local background, summed over the spot, per channel.
+    elongation : float
+        Long over short axis of the spot.
+    touches_border : bool
+        Whether the spot is cut by the picture's border.
+    """
+
+    centre_px: tuple[float, float]
+    centre_sd_px: float
+    area_px: int
+    peak: tuple[float, float, float]
+    flux: tuple[float, float, float]
+    elongation: float
+    touches_border: bool
+
+
+@dataclass(frozen=True, slots=True)
+class MirrorSpots:
+    """The spots of LED 0, 1, 2 (red, green, blue), and those that were rejected.
+
+    Attributes
+    ----------
+    spots : tuple of 3 Spot
+        Spot k belongs to LED k.
+    rejected : tuple of (Spot, str)
+        Glints and reflections of reflections, each with the reason.
+    quality : QualityTable
+        Figures, limits and advice.
+    """
+
+    spots: tuple[Spot, Spot, Spot]
+    rejected: tuple[tuple[Spot, str], ...]
+    quality: QualityTable
+
+    @property
+    def centres_px(self) -> Array:
+        """(3, 2) centroids (u, v)."""
+        return np.array([s.centre_px for s in self.spots])
+
+
+def find_mirror_spots(picture: Picture) -> MirrorSpots:
+    """Find the three LEDs' reflections in the mirror picture.
+
+    Parameters
+    ----------
+    picture : Picture
+        The mirror on the top surface, all three LEDs on, room dark.
+
+    Raises
+    ------
+    InputError
+        If the picture is grey, black or flooded with light, or if a spot is missing, merged with
+        another, cut by the border, or has a rival of like brightness in its own colour.
+    """
+    where = picture.name
+    require_colour(picture, where=where)
+    rgb = picture.rgb.astype(np.float64)
+    brightest = rgb.max(axis=2)
+    _refuse_hopeless(brightest, where)
+    noise = _noise(rgb)
+    candidates = _find_candidates(rgb, noise)
+    _refuse_merged(candidates, where)
+    chosen = []
+    rejected: list[tuple[Spot, str]] = []
+    for channel in range(3):
+        spot, others = _choose(candidates, channel, where)
+        chosen.append(spot)
+        rejected += others
+    spots = (chosen[0], chosen[1], chosen[2])
+    return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected))
+
+
+def _refuse_hopeless(brightest: Array, where: str) -> None:
+    if brightest.max() < 0.05:
+        raise InputError(
+            tr("the picture is black (brightest value {v:.0%})").format(v=brightest.max()),
+            where=where,
+            advice=tr("Switch the LEDs on, or expose longer"),
+        )
+    share = float((brightest > 0.25 * brightest.max()).mean())
+    if share > BRIGHT_SHARE_LIMIT:
+        raise InputError(
+            tr("{share:.0%} of the picture is bright, where three small spots are expected").format(
+                share=share
+            ),
+            where=where,
+            advice=tr(
+                "Put the mirror in place of the membrane, darken the room and shorten the exposure"
+            ),
+        )
+
+
+def _noise(rgb: Array) -> float:
+    """Return the noise of the dark part, never less than an 8-bit step's rounding."""
+    deviation = np.abs(rgb - np.median(rgb, axis=(0, 1)))
+    return max(1.4826 * float(np.median(deviation)), 1.0 / 255.0 / np.sqrt(12.0))
+
+
+def _find_candidates(rgb: Array, noise: float) -> list[Spot]:
+    background = np.median(rgb, axis=(0, 1))
+    excess = rgb - background
+    brightest = excess.max(axis=2)
+    threshold = max(8.0 * noise, 0.04 * float(brightest.max()))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(
+        (brightest > threshold).astype(np.uint8), connectivity=8
+    )
+    return [_describe(excess, rgb, labels, n, stats[n], noise) for n in range(1, len(stats))]
+
+
+def _describe(
+    excess: Array, rgb: Array, labels: NDArray[np.int32], label: int, stat: Array, noise: float
+) -> Spot:
+    left, top, width, height = (int(stat[i]) for i in range(4))
+    rows, columns = labels.shape
+    # Two pixels of margin take in the blurred rim, whose light belongs to the centroid.
+    box = np.s_[max(top - 2, 0) : top + height + 2, max(left - 2, 0) : left + width + 2]
+    near = cv2.dilate((labels[box] == label).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    mine = near & ((labels[box] == label) | (labels[box] == 0))
+    light = np.where(mine[..., None], np.maximum(excess[box], 0.0), 0.0)
+    light[light < 2.0 * noise] = 0.0
+    v, u = np.mgrid[
+        box[0].start : box[0].start + light.shape[0], box[1].start : box[1].start + light.shape[1]
+    ]
+    total = light.sum(axis=2)
+    flux = float(total.sum())
+    cu, cv = float((total * u).sum() / flux), float((total * v).sum() / flux)
+    moments = (
+        np.array(
+            [
+                [(total * (u - cu) ** 2).sum(), (total * (u - cu) * (v - cv)).sum()],
+                [(total * (u - cu) * (v - cv)).sum(), (total * (v - cv) ** 2).sum()],
+            ]
+        )
+        / flux
+    )
+    axes = np.sqrt(np.maximum(np.linalg.eigvalsh(moments), 1.0 / 12.0))
+    spread = (total > 0.0) * ((u - cu) ** 2 + (v - cv) ** 2) / 2.0
+    sd = float(noise * np.sqrt(3.0 * spread.sum()) / flux)
+    inner = mine & (labels[box] == label)
+    return Spot(
+        (cu, cv),
+        sd,
+        int((total > 0.5 * total.max()).sum()),
+        _triple(np.where(inner[..., None], rgb[box], 0.0).max(axis=(0, 1))),
+        _triple(light.sum(axis=(0, 1))),
+        float(axes[1] / axes[0]),
+        left == 0 or top == 0 or left + width >= columns or top + height >= rows,
+    )
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _dominant(spot: Spot) -> int:
+    return int(np.argmax(spot.flux))
+
+
+def _refuse_merged(candidates: list[Spot], where: str) -> None:
+    """Two LEDs in one spot show as two strong channels where a channel has no spot of its own."""
+    missing = {0, 1, 2} - {_dominant(s) for s in candidates}
+    for spot in candidates:
+        flux = np.array(spot.flux) / max(spot.flux)
+        merged = [k for k in missing if flux[k] > MERGED_SHARE]
+        if merged and max(spot.flux) > 0.1 * max(max(s.flux) for s in candidates):
+            raise InputError(
+                tr("the {a} and {b} spots are merged near ({u:.0f}, {v:.0f})").format(
+                    a=tr(CHANNEL_NAMES[_dominant(spot)]),
+                    b=tr(CHANNEL_NAMES[merged[0]]),
+                    u=spot.centre_px[0],
+                    v=spot.centre_px[1],
+                ),
+                where=where,
+                advice=tr("Shorten the exposure; if they stay merged, the LEDs are too close"),
+            )
+
+
+def _choose(
+    candidates: list[Spot], channel: int, where: str
+) -> tuple[Spot, list[tuple[Spot, str]]]:
+    own = sorted((s for s in candidates if _dominant(s) == channel), key=lambda s: -s.flux[channel])
+    name = tr(CHANNEL_NAMES[channel])
+    if not own:
+        raise InputError(
+            tr("the {name} LED has no spot").format(name=name),
+            where=where,
+            advice=tr(
+                "Check that the {name} LED is on and its mirror image in view; expose longer"
+            ).format(name=name),
+        )
+    best, others = own[0], own[1:]
+    if others and others[0].flux[channel] > RIVAL_FLUX * best.flux[channel]:
+        raise InputError(
+            tr("there are {n} {name} spots of like brightness").format(
+                n=1 + sum(s.flux[channel] > RIVAL_FLUX * best.flux[channel] for s in others),
+                name=name,
+            ),
+            where=where,
+            advice=tr("Remove the source of the extra spot: room light, a second reflection, dust"),
+        )
+    if best.touches_border:
+        raise InputError(
+            tr("the {name} spot is cut by the picture's border").format(name=name),
+            where=where,
+            advice=tr("The LED's mirror image must be in view: use a wider lens or lower LEDs"),
+        )
+    reason = tr("fainter than the {name} LED's own spot: a glint or second reflection")
+    return best, [(s, reason.format(name=name)) for s in others]
+
+
+def _judge(spots: tuple[Spot, Spot, Spot], rejected: list[tuple[Spot, str]]) -> QualityTable:
+    saturated = max(s.peak[k] for k, s in enumerate(spots))
+    return QualityTable(
+        (
+            judge(
+                "centroid_sd_px",
+                tr("Spot centroid, standard deviation"),
+                max(s.centre_sd_px for s in spots),
+                "px",
+                warn=0.1,
+                fail=0.5,
+                advice=tr("Average more frames, or expose longer"),
+            ),
+            judge(
+                "spot_peak",
+                tr("Brightest spot"),
+                saturated,
+                warn=SATURATED,
+                advice=tr("The spots are saturated: shorten the exposure until they are not"),
+            ),
+            judge(
+                "spot_elongation",
+                tr("Longest spot, axis ratio"),
+                max(s.elongation for s in spots),
+                warn=1.5,
+                fail=3.0,
+                advice=tr("A spot is drawn out: hold the mirror still and flat, shorten exposure"),
+            ),
+            judge(
+                "spots_rejected",
+                tr("Further spots rejected"),
+                float(len(rejected)),
+                warn=3.0,
+                advice=tr("Many glints: darken the room and clean the mirror"),
+            ),
+        )
+    )

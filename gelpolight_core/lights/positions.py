@@ -1,0 +1,228 @@
+"""LED positions from their mirror spots, and light directions on the membrane (section V-A)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.lights.mirror import MirrorSpots
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class LightResult:
+    """Where the three light-emitting points are.
+
+    Attributes
+    ----------
+    led_positions_mm : (3, 3)
+        Sensor frame; row k is LED k; z = -led_height_mm.
+    led_covariance_mm2 : (3, 3, 3)
+        Covariance of each position, propagated.
+    bright_points_mm : (3, 2)
+        Where on the mirror each LED is reflected, sensor frame.
+    spots : MirrorSpots
+        What was found in the mirror picture.
+    condition_number : float
+        Of the three light directions at the sensor frame's origin.
+    quality : QualityTable
+        Figures, limits and advice.
+    """
+
+    led_positions_mm: Array
+    led_covariance_mm2: Array
+    bright_points_mm: Array
+    spots: MirrorSpots
+    condition_number: float
+    quality: QualityTable
+
+
+def locate_led(
+    spot_px: Array, camera: Camera, plane: TopPlane, *, led_height_mm: float
+) -> tuple[Array, Array]:
+    """Return an LED's position and its bright point, both (3,) in the sensor frame.
+
+    The mirror lies on the top surface, in air: the camera's ray meets it at the bright point and
+    leaves it mirrored; the LED is where that line reaches `led_height_mm` below the surface.
+    """
+    ray = plane.rotation @ camera.directions(np.asarray(spot_px))
+    bright = ray * (plane.distance_mm / ray[2]) - np.array([0.0, 0.0, plane.distance_mm])
+    mirrored = ray * np.array([1.0, 1.0, -1.0])
+    led = bright + mirrored * (led_height_mm / ray[2])
+    return led, bright
+
+
+def locate_leds(
+    spots: MirrorSpots,
+    camera: Camera,
+    plane: TopPlane,
+    *,
+    led_height_mm: float,
+    led_height_sd_mm: float = 0.2,
+    plane_distance_sd_mm: float = 0.02,
+    plane_normal_sd_rad: float = 1e-3,
+) -> LightResult:
+    """Locate the three LEDs from their mirror spots.
+
+    Parameters
+    ----------
+    spots : MirrorSpots
+        Centroids, one per LED.
+    camera, plane
+        Lens and top surface.
+    led_height_mm : float
+        Z1: light-emitting points to the top surface, from the housing.
+    led_height_sd_mm, plane_distance_sd_mm, plane_normal_sd_rad : float, optional
+        Standard deviations that are propagated into the positions, beside the centroids' own.
+
+    Raises
+    ------
+    InputError
+        If the LEDs lie so close together in angle that normals cannot be solved.
+    """
+    leds, brights, covariances = [], [], []
+    for spot in spots.spots:
+        led, bright = locate_led(
+            np.array(spot.centre_px), camera, plane, led_height_mm=led_height_mm
+        )
+        sds = np.array(
+            [max(spot.centre_sd_px, 0.02)] * 2
+            + [led_height_sd_mm, plane_distance_sd_mm, plane_normal_sd_rad, plane_normal_sd_rad]
+        )
+        jacobian = _jacobian(_disturbed(spot.centre_px, camera, plane, led_height_mm), 6)
+        leds.append(led)
+        brights.append(bright[:2])
+        covariances.append((jacobian * sds**2) @ jacobian.T)
+    positions = np.array(leds)
+    condition = direction_condition(positions, np.zeros(2))
+    if condition > 100.0:
+        raise InputError(
+            tr("the three light directions are nearly in one plane (condition {c:.0f})").format(
+                c=condition
+            ),
+            where=tr("mirror"),
+            advice=tr("Place the LEDs wider apart around the sensor's axis"),
+        )
+    return LightResult(
+        positions,
+        np.array(covariances),
+        np.array(brights),
+        spots,
+        condition,
+        _judge(np.array(covariances), condition, positions, spots),
+    )
+
+
+def _disturbed(
+    spot_px: tuple[float, float], camera: Camera, plane: TopPlane, height_mm: float
+) -> Callable[[Array], Array]:
+    """Return the LED position as a function of small disturbances of all that it rests on."""
+
+    def led(delta: Array) -> Array:
+        normal = plane.rotation.T @ np.array([delta[4], delta[5], 1.0])
+        normal /= np.linalg.norm(normal)
+        tilted = TopPlane(
+            (float(normal[0]), float(normal[1]), float(normal[2])),
+            plane.distance_mm + float(delta[3]),
+        )
+        position, _ = locate_led(
+            np.array(spot_px) + delta[:2], camera, tilted, led_height_mm=height_mm + delta[2]
+        )
+        # Expressed in the undisturbed frame, so that a tilt counts as what it moves.
+        return plane.to_sensor(tilted.to_camera(position))
+
+    return led
+
+
+def _jacobian(function: Callable[[Array], Array], count: int, step: float = 1e-5) -> Array:
+    columns = []
+    for i in range(count):
+        delta = np.zeros(count)
+        delta[i] = step
+        columns.append((function(delta) - function(-delta)) / (2 * step))
+    return np.stack(columns, axis=1)
+
+
+def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, Array]:
+    """Return unit directions to the LEDs and distances.
+
+    Parameters
+    ----------
+    led_positions_mm : (3, 3)
+        Sensor frame.
+    points_mm : (..., 3)
+        Surface points, sensor frame.
+
+    Returns
+    -------
+    directions : (..., 3, 3)
+        ``directions[..., k, :]`` points to LED k.
+    distances_mm : (..., 3)
+        To each LED.
+    """
+    towards = led_positions_mm - np.asarray(points_mm)[..., None, :]
+    distances = np.linalg.norm(towards, axis=-1)
+    return towards / distances[..., None], distances
+
+
+def direction_condition(led_positions_mm: Array, points_mm: Array) -> float:
+    """Return the largest condition number of [l1; l2; l3] over membrane points (..., 2)."""
+    points = np.asarray(points_mm, dtype=np.float64)
+    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
+    directions, _ = light_directions(led_positions_mm, at_top)
+    return float(np.max(np.linalg.cond(directions)))
+
+
+def _judge(
+    covariances: Array, condition: float, positions: Array, spots: MirrorSpots
+) -> QualityTable:
+    lateral = float(np.sqrt(np.trace(covariances[:, :2, :2], axis1=1, axis2=2)).max())
+    total = float(np.sqrt(np.trace(covariances, axis1=1, axis2=2)).max())
+    radii = np.hypot(positions[:, 0], positions[:, 1])
+    return QualityTable(
+        (
+            *spots.quality.figures,
+            judge(
+                "led_lateral_sd_mm",
+                tr("LED position, sideways, standard deviation"),
+                lateral,
+                "mm",
+                warn=0.3,
+                fail=1.0,
+                advice=tr("Repeat the top pose and the mirror picture"),
+            ),
+            judge(
+                "led_sd_mm",
+                tr("LED position, standard deviation"),
+                total,
+                "mm",
+                warn=0.5,
+                fail=1.5,
+                advice=tr("Measure the LEDs' height below the top surface again"),
+            ),
+            judge(
+                "direction_condition",
+                tr("Light directions, condition number at the centre"),
+                condition,
+                warn=8.0,
+                fail=50.0,
+                advice=tr("Place the LEDs wider apart around the sensor's axis"),
+            ),
+            judge(
+                "led_radius_ratio",
+                tr("LED distances from the axis, largest over smallest"),
+                float(radii.max() / max(radii.min(), 1e-9)),
+                warn=2.0,
+                advice=tr("Check that each spot belongs to its LED"),
+            ),
+        )
+    )

@@ -1,0 +1,1 @@
+"""Sizes of pressed objects, and the paper's evaluation."""

@@ -1,0 +1,120 @@
+"""The drape around one corner of an indenter: a quarter-plane pressed into the membrane."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, spline_filter
+from scipy.special import kv
+
+Array = NDArray[np.float64]
+
+_WEDGE = 1.5 * np.pi
+"""Angle that the free membrane takes up around a corner of 90 degrees."""
+_REACH = 16.0
+"""Decay lengths that the table covers; the drape is below 1e-6 of the height beyond."""
+_RADII, _ANGLES = 161, 99
+"""Table size; the angles step over the ray at pi / 4, on which the integrand is singular."""
+_MARGIN = 8
+"""Nodes past the corner and past the face, so that the spline meets no kink where they lie."""
+_ROUNDING = 0.055
+"""Strength of the rounding of a corner whose three edges carry one fillet, from the numerical
+solution of the obstacle problem (the tests solve it again)."""
+
+
+def corner_drape(x: Array, y: Array) -> Array:
+    """Return the membrane's depth outside the quarter plane x <= 0, y <= 0 that is pressed to 1.
+
+    The solution of laplacian(w) = w with w = 1 on the two faces; lengths in decay lengths.
+    Inside the quarter plane the answer is 1.
+
+    Parameters
+    ----------
+    x, y : arrays of one shape
+        Distances beyond the two faces, in decay lengths.
+
+    Notes
+    -----
+    Kontorovich-Lebedev integral of a wedge of angle alpha = 3 pi / 2::
+
+        w(r, t) = 2/pi int_0^inf K_i tau(r) cosh(pi tau / 2) cosh(t tau) / cosh(alpha tau / 2) d tau
+
+    with t the angle from the wedge's bisector. It is tabulated once over r**(2/3), the power with
+    which w leaves the corner, so that the table is smooth there.
+    """
+    radius = np.hypot(x, y)
+    # Angle from the bisector of the free membrane, which points along (1, 1).
+    angle = np.abs(np.arctan2(y - x, x + y))
+    row = _MARGIN + np.minimum(radius / _REACH, 1.0) ** (2.0 / 3.0) * (_RADII - 1)
+    column = np.minimum(angle / (_WEDGE / 2.0), 1.0) * (_ANGLES - 1)
+    depth = map_coordinates(_table(), [row, column], order=3, prefilter=False, mode="mirror")
+    straight = np.exp(-np.clip(np.maximum(x, y), 0.0, _REACH))
+    far = np.where((x > 0.0) & (y > 0.0), 0.0, straight)
+    return np.clip(np.where(radius < _REACH, depth, far), 0.0, 1.0)
+
+
+def corner_rounding(x: Array, y: Array, edge: float) -> Array:
+    """Return how much lower the drape is where the corner carries a fillet of radius `edge`.
+
+    A small rounding of the corner adds the one solution that is zero on both faces and falls off
+    outwards, K_2/3(r) cos(2 t / 3); it scales with edge ** (4/3), as the slope of the corner does.
+    Lengths in decay lengths; see :func:`corner_drape` for the axes.
+
+    Parameters
+    ----------
+    x, y : arrays of one shape
+        Distances beyond the two faces.
+    edge : float
+        Radius of the fillet.
+    """
+    radius = np.hypot(x, y)
+    angle = np.abs(np.arctan2(y - x, x + y))
+    nodes, bessel = _bessel_table()
+    fall = np.interp(np.maximum(radius, edge), nodes, bessel, right=0.0)
+    return np.asarray(_ROUNDING * edge ** (4.0 / 3.0) * fall * np.cos(2.0 * angle / 3.0))
+
+
+@lru_cache(maxsize=1)
+def _bessel_table() -> tuple[Array, Array]:
+    """Return nodes and K_2/3 there, dense where it is steep."""
+    nodes = np.geomspace(1e-3, _REACH, 4000)
+    return nodes, np.asarray(kv(2.0 / 3.0, nodes))
+
+
+@lru_cache(maxsize=1)
+def _table() -> Array:
+    """Return the spline coefficients of the drape over (r ** (2/3), angle from the bisector)."""
+    radii = _REACH * np.linspace(0.0, 1.0, _RADII) ** 1.5
+    angles = _WEDGE / 2.0 / (_ANGLES - 1) * np.arange(_ANGLES + _MARGIN)
+    values = np.stack([_wedge_drape(radii, float(angle)) for angle in angles], axis=1)
+    values[0] = 1.0
+    values = np.concatenate([2.0 - values[_MARGIN:0:-1], values])
+    return np.asarray(spline_filter(values, order=3, mode="mirror"))
+
+
+def _wedge_drape(radii: Array, angle: float) -> Array:
+    """Return the drape on one ray from the corner.
+
+    With K_i tau(r) written as the integral of exp(-r cosh t) cos(tau t), the integral over tau
+    is closed; what remains decays doubly exponentially in t. Where the ray lies in front of a
+    face, the pole that is crossed leaves exp(-distance to the face), the drape of a straight edge.
+    """
+    # The kernel narrows to a spike at t = 0 where the ray passes a face's end; sinh packs nodes.
+    t = 12.0 * np.sinh(np.linspace(0.0, 9.0, 400)) / np.sinh(9.0)
+    kernel = _kernel(t, np.pi / 2.0 + angle) + _kernel(t, np.pi / 2.0 - angle)
+    drape = np.trapezoid(np.exp(-radii[:, None] * np.cosh(t)) * kernel, t, axis=1)
+    if angle > np.pi / 4.0:
+        drape = drape + np.exp(-radii * np.sin(_WEDGE / 2.0 - angle))
+    return np.asarray(drape)
+
+
+def _kernel(t: Array, b: float) -> Array:
+    """Return 1/pi of the integral of cos(tau t) cosh(b tau) / cosh(alpha tau / 2) over tau."""
+    c = _WEDGE / 2.0
+    return np.asarray(
+        np.cos(np.pi * b / (2.0 * c))
+        * np.cosh(np.pi * t / (2.0 * c))
+        / (c * (np.cos(np.pi * b / c) + np.cosh(np.pi * t / c)))
+    )

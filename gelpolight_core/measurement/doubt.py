@@ -1,0 +1,113 @@
+"""When a measurement is not to be trusted, and why."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gelpolight_core.measurement.fit import EdgePrior, FitResult, WindowData, fit_indenter
+from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.measurement.segmentation import PressedRegion
+from gelpolight_core.translation import tr
+
+GOOD_RESIDUAL = 0.02
+"""Residual, as a share of the height, up to which no other shape is tried."""
+POOR_RESIDUAL = 0.06
+"""Residual, as a share of the height, beyond which the map is not this object: a wall that is
+moved by a tenth of the decay length over its whole length leaves as much."""
+BETTER_SHAPE = 0.75
+"""Another shape is named when it leaves less than this share of the residual."""
+LARGEST_SD = 0.05
+"""Relative standard deviation beyond which a size is not measured."""
+SMALLEST_GROUND = 0.8
+"""Share of the object's surroundings that must be usable for the drape to be seen."""
+
+
+def find_doubt(
+    shape: str,
+    fit: FitResult,
+    window: WindowData,
+    region: PressedRegion,
+    edge: EdgePrior,
+) -> str:
+    """Return why a fit is doubtful; an empty text when it is not.
+
+    Parameters
+    ----------
+    shape : str
+        The shape that was fitted.
+    fit : FitResult
+        The fit.
+    window : WindowData
+        What it was fitted to.
+    region : PressedRegion
+        The segmented bump, from which rival shapes start.
+    edge : EdgePrior
+        As for the fit.
+    """
+    reasons = [
+        _no_end(fit),
+        _wrong_shape(shape, fit, window, region, edge),
+        _wide(shape, fit),
+        _odd_drape(fit),
+        _cut_drape(window),
+    ]
+    return "; ".join(reason for reason in reasons if reason)
+
+
+def _no_end(fit: FitResult) -> str:
+    return "" if fit.converged else tr("the fit did not come to an end")
+
+
+def _wrong_shape(
+    shape: str,
+    fit: FitResult,
+    window: WindowData,
+    region: PressedRegion,
+    edge: EdgePrior,
+) -> str:
+    share = fit.residual_rms_mm / fit.values["height_mm"]
+    if share <= GOOD_RESIDUAL:
+        return ""
+    rivals = {
+        name: fit_indenter(model, window, model.start(region), edge=edge).residual_rms_mm
+        for name, model in MODELS.items()
+        if name != shape
+    }
+    best = min(rivals, key=lambda name: rivals[name])
+    if rivals[best] < BETTER_SHAPE * fit.residual_rms_mm:
+        return tr(
+            "a {best} fits better (residual {rival:.0f} um) than a {shape} ({own:.0f} um)"
+        ).format(
+            best=best,
+            rival=1e3 * rivals[best],
+            shape=shape,
+            own=1e3 * fit.residual_rms_mm,
+        )
+    if share > POOR_RESIDUAL:
+        return tr(
+            "the map departs from a {shape} by {own:.0f} um, {share:.0f} % of its height"
+        ).format(shape=shape, own=1e3 * fit.residual_rms_mm, share=100.0 * share)
+    return ""
+
+
+def _wide(shape: str, fit: FitResult) -> str:
+    sizes = ("side_a_mm", "side_b_mm") if shape == "cuboid" else ("diameter_mm",)
+    widest = max(fit.sd[key] / fit.values[key] for key in (*sizes, "height_mm"))
+    if np.isfinite(widest) and widest <= LARGEST_SD:
+        return ""
+    return tr("the sizes are uncertain by {percent:.0f} %").format(percent=100.0 * widest)
+
+
+def _odd_drape(fit: FitResult) -> str:
+    decay = fit.values["drape_decay_mm"]
+    if 0.1 <= decay <= 3.0:
+        return ""
+    return tr("the drape's decay length comes out as {decay:.2f} mm").format(decay=decay)
+
+
+def _cut_drape(window: WindowData) -> str:
+    if window.seen_share >= SMALLEST_GROUND:
+        return ""
+    return tr("only {percent:.0f} % of the drape around the object is on the map").format(
+        percent=100.0 * window.seen_share
+    )

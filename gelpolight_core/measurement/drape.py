@@ -1,0 +1,252 @@
+"""The membrane around an indenter: in contact it follows it, outside it decays.
+
+Outside the contact the membrane is a tense sheet on an elastic foundation,
+``decay**2 * laplacian(w) = w``, and it leaves the indenter tangentially.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import brentq
+from scipy.special import k0e, k1e
+
+from gelpolight_core.measurement.corner import corner_drape, corner_rounding
+
+Array = NDArray[np.float64]
+
+SMALL_BLUR_MM = 0.005
+"""Blur below which its effect is taken as its square times that of this blur: it is linear in the
+variance there, and a finer filter would cost time for nothing."""
+
+
+def cylinder_depth(
+    radius_mm: Array,
+    *,
+    cylinder_radius_mm: float,
+    height_mm: float,
+    decay_mm: float,
+    edge_radius_mm: float = 0.0,
+    blur_mm: float = 0.0,
+) -> Array:
+    """Return the membrane's depth around a flat cylinder.
+
+    Parameters
+    ----------
+    radius_mm : array
+        Distances from the cylinder's axis.
+    cylinder_radius_mm, height_mm : float
+        The cylinder's radius and its indentation depth.
+    decay_mm : float
+        The drape's decay length: outside, w = h K0(r / decay) / K0(a / decay).
+    edge_radius_mm : float, optional
+        Fillet between the cylinder's face and its wall.
+    blur_mm : float, optional
+        Sigma with which the map smooths the edge.
+    """
+    edge = min(edge_radius_mm, cylinder_radius_mm)
+    contact_mm, contact_depth = _edge_contact(
+        cylinder_radius_mm, height_mm, edge, lambda r: _radial_steepness(r, decay_mm)
+    )
+
+    def sharp(r: Array) -> Array:
+        free = np.maximum(r, contact_mm)
+        outside = contact_depth * _radial_drape(free, contact_mm, decay_mm)
+        return np.where(r > contact_mm, outside, _filleted(r - cylinder_radius_mm, height_mm, edge))
+
+    depth = sharp(radius_mm)
+    if blur_mm > 0.0:
+        depth = depth + _blur_change(
+            radius_mm - cylinder_radius_mm,
+            lambda d: sharp(np.maximum(d + cylinder_radius_mm, 0.0)),
+            blur_mm,
+            edge,
+        )
+    return depth
+
+
+def cuboid_depth(
+    x_mm: Array,
+    y_mm: Array,
+    *,
+    side_mm: tuple[float, float],
+    height_mm: float,
+    decay_mm: float,
+    edge_radius_mm: float = 0.0,
+    blur_mm: float = 0.0,
+) -> Array:
+    """Return the membrane's depth around a flat cuboid whose sides lie along the axes.
+
+    Parameters
+    ----------
+    x_mm, y_mm : arrays of one shape
+        Position relative to the cuboid's centre, along its two sides.
+    side_mm : (float, float)
+        Sides along x and y.
+    height_mm, decay_mm, edge_radius_mm, blur_mm : float
+        As in :func:`cylinder_depth`.
+
+    Notes
+    -----
+    Outside, each edge alone gives exp(-distance / decay) and each corner takes away from it what
+    :func:`~gelpolight_core.measurement.corner.corner_drape` says. The corners are added up as if
+    they did not see each other, which is wrong by about exp(-2 side / decay) of the height.
+    """
+    half = (side_mm[0] / 2.0, side_mm[1] / 2.0)
+    edge = min(edge_radius_mm, *half)
+    inset, contact_depth = _edge_contact(0.0, height_mm, edge, lambda _: 1.0 / decay_mm)
+    ax, ay = np.abs(x_mm), np.abs(y_mm)
+    # Distance to the wall of a box whose edges all carry the fillet; < 0 inside.
+    qx, qy = ax - half[0] + edge, ay - half[1] + edge
+    beyond = np.hypot(np.maximum(qx, 0.0), np.maximum(qy, 0.0)) - edge
+    beyond = np.where((qx <= 0.0) & (qy <= 0.0), np.maximum(qx, qy) - edge, beyond)
+    free = contact_depth * _rectangle_drape(
+        ax / decay_mm,
+        ay / decay_mm,
+        ((half[0] + inset) / decay_mm, (half[1] + inset) / decay_mm),
+        edge / decay_mm,
+    )
+    depth = np.where(beyond > inset, free, _filleted(beyond, height_mm, edge))
+    if blur_mm > 0.0:
+
+        def straight(d: Array) -> Array:
+            outside = contact_depth * np.exp(-np.maximum(d - inset, 0.0) / decay_mm)
+            return np.where(d > inset, outside, _filleted(d, height_mm, edge))
+
+        depth = depth + _blur_change(
+            beyond,
+            straight,
+            blur_mm,
+            edge,
+        )
+    return depth
+
+
+def ball_depth(
+    radius_mm: Array, *, ball_radius_mm: float, height_mm: float, decay_mm: float
+) -> Array:
+    """Return the membrane's depth around a ball of radius R pressed to `height_mm`.
+
+    Inside the contact radius the sphere, h - R + sqrt(R**2 - r**2); outside the drape
+    K0(r / decay), which meets the sphere without a kink.
+
+    Parameters
+    ----------
+    radius_mm : array
+        Distances from the ball's axis.
+    ball_radius_mm, height_mm, decay_mm : float
+        The ball's radius, its indentation depth and the drape's decay length.
+    """
+    contact_mm = ball_contact_radius_mm(
+        ball_radius_mm=ball_radius_mm, height_mm=height_mm, decay_mm=decay_mm
+    )
+    inside = height_mm - _sphere_drop(np.minimum(radius_mm, contact_mm), ball_radius_mm)
+    free = np.maximum(radius_mm, contact_mm)
+    edge_depth = height_mm - _sphere_drop(np.array(contact_mm), ball_radius_mm)
+    outside = edge_depth * _radial_drape(free, contact_mm, decay_mm)
+    return np.where(radius_mm > contact_mm, outside, inside)
+
+
+def ball_contact_radius_mm(*, ball_radius_mm: float, height_mm: float, decay_mm: float) -> float:
+    """Return the radius at which the membrane leaves a ball: where the two slopes are equal.
+
+    Parameters
+    ----------
+    ball_radius_mm, height_mm, decay_mm : float
+        As in :func:`ball_depth`.
+    """
+
+    def excess(angle: float) -> float:
+        radius = ball_radius_mm * math.sin(angle)
+        depth = height_mm - ball_radius_mm * (1.0 - math.cos(angle))
+        return math.sin(angle) - math.cos(angle) * depth * _radial_steepness(radius, decay_mm)
+
+    angle = brentq(excess, 1e-9, math.pi / 2.0, xtol=1e-12)
+    return ball_radius_mm * math.sin(float(angle))
+
+
+def _sphere_drop(radius_mm: Array, ball_radius_mm: float) -> Array:
+    """Return how far a sphere lies above its lowest point at a distance from its axis."""
+    # This form keeps its digits for small radii, where R - sqrt(R**2 - r**2) cancels.
+    square = radius_mm**2
+    root = np.sqrt(np.maximum(ball_radius_mm**2 - square, 0.0))
+    return np.asarray(square / (ball_radius_mm + root))
+
+
+def _radial_steepness(radius_mm: float, decay_mm: float) -> float:
+    """Return -w'/w of the round drape, K1 / K0 / decay, in 1/mm."""
+    q = max(radius_mm / decay_mm, 1e-12)
+    return float(k1e(q) / k0e(q)) / decay_mm
+
+
+def _radial_drape(radius_mm: Array, contact_mm: float, decay_mm: float) -> Array:
+    """Return K0(r / decay) / K0(a / decay) without underflow."""
+    contact = max(contact_mm / decay_mm, 1e-12)
+    q = np.maximum(radius_mm / decay_mm, contact)
+    return np.asarray(k0e(q) / k0e(contact) * np.exp(contact - q))
+
+
+def _edge_contact(
+    face_mm: float, height_mm: float, edge_mm: float, steepness: Callable[[float], float]
+) -> tuple[float, float]:
+    """Return where on the fillet the membrane leaves (position, depth there).
+
+    `steepness` is -w'/w of the free membrane (1/mm) as a function of the position.
+    """
+    if edge_mm <= 0.0 or height_mm <= 0.0:
+        return face_mm, height_mm
+
+    def excess(angle: float) -> float:
+        position = face_mm - edge_mm * (1.0 - math.sin(angle))
+        depth = height_mm - edge_mm * (1.0 - math.cos(angle))
+        return math.sin(angle) - math.cos(angle) * depth * steepness(position)
+
+    angle = float(brentq(excess, 0.0, math.pi / 2.0, xtol=1e-12))
+    return (
+        face_mm - edge_mm * (1.0 - math.sin(angle)),
+        height_mm - edge_mm * (1.0 - math.cos(angle)),
+    )
+
+
+def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:
+    """Return the indenter's own surface `beyond_mm` (< 0: inside) its wall."""
+    if edge_mm <= 0.0:
+        return np.full(beyond_mm.shape, height_mm)
+    into = np.clip(beyond_mm + edge_mm, 0.0, edge_mm)
+    return np.asarray(height_mm - edge_mm + np.sqrt(np.maximum(edge_mm**2 - into**2, 0.0)))
+
+
+def _rectangle_drape(x: Array, y: Array, half: tuple[float, float], edge: float) -> Array:
+    """Return the drape outside a rectangle for x, y >= 0; lengths in decay lengths."""
+    dx, dy = x - half[0], y - half[1]
+    drape = corner_drape(dx, dy)
+    if edge > 0.0:
+        drape = drape - corner_rounding(dx, dy, edge)
+    # What the corners at the far ends of the two edges take away; nothing beside the edge itself.
+    above, beside = dy > 0.0, dx > 0.0
+    far_x = corner_drape(-x[above] - half[0], dy[above]) - np.exp(-dy[above])
+    far_y = corner_drape(dx[beside], -y[beside] - half[1]) - np.exp(-dx[beside])
+    drape[above] += far_x
+    drape[beside] += far_y
+    return np.maximum(drape, 0.0)
+
+
+def _blur_change(
+    beyond_mm: Array, profile: Callable[[Array], Array], blur_mm: float, edge_mm: float
+) -> Array:
+    """Return what smoothing changes across a wall, from the wall's one-dimensional profile.
+
+    The wall is straight on the scale of the blur, so its profile says it all.
+    """
+    sigma = max(blur_mm, SMALL_BLUR_MM)
+    reach = edge_mm + 5.0 * sigma
+    step = sigma / 4.0
+    nodes = np.arange(-2.0 * reach, 2.0 * reach + step / 2.0, step)
+    values = profile(nodes)
+    change = gaussian_filter1d(values, sigma / step, mode="nearest", truncate=5.0) - values
+    change *= (blur_mm / sigma) ** 2
+    return np.asarray(np.interp(beyond_mm, nodes, change, left=0.0, right=0.0))

@@ -1,0 +1,327 @@
+"""Fitting an indenter with its drape to a depth map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.fft import irfft2, next_fast_len, rfft2
+from scipy.optimize import least_squares
+
+from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+EDGE_POINTS, OTHER_POINTS = 5000, 3000
+"""Points of the fit near the wall and elsewhere: more cost time and teach nothing, since the
+errors of a depth map are alike over many pixels."""
+BASELINE = ("offset_mm", "tilt_x", "tilt_y")
+"""Ground level around the object: integration leaves it off by tens of micrometres and tilted."""
+HUBER = 2.5
+"""Residuals beyond this many sigma lose weight."""
+MODEL_ERROR = 0.0005
+"""Share of the height by which the closed forms of the drape may be wrong (near corners); finer
+scales for the residual would only throw out the edges that carry the size."""
+MOST_ROUNDS = 6
+"""Rounds of reweighting before a fit counts as not coming to an end."""
+SETTLED = 0.3
+"""Rounds stop when no parameter moves by more than this share of its sd."""
+
+
+@dataclass(frozen=True, slots=True)
+class EdgePrior:
+    """What is known of an edge's roundness before the map is seen.
+
+    The fillet of the object and the blur of the map both round the wall's upper end, but only the
+    fillet moves the wall inwards. A map that resolves it decides; where it does not, this does.
+
+    Attributes
+    ----------
+    edge_radius_mm, edge_radius_sd_mm : float
+        Fillet of the object.
+    blur_mm : float
+        Scale of the map's blur (sigma of a Gaussian). The fit takes its square, in which the map
+        is linear; it is known to within itself.
+    """
+
+    edge_radius_mm: float
+    edge_radius_sd_mm: float
+    blur_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class WindowData:
+    """The part of a depth map that one object is fitted to.
+
+    Attributes
+    ----------
+    x_mm, y_mm, depth_mm, weight : (rows, columns)
+        Position, depth, and weight (1: an ordinary pixel, 0: not to be used).
+    near_wall : (rows, columns) bool
+        Where the wall is expected.
+    pitch_mm : float
+        Distance of pixels.
+    seen_share : float
+        Share of the drape's first millimetre and a half that the map holds.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    depth_mm: Array
+    weight: Array
+    near_wall: Mask
+    pitch_mm: float
+    seen_share: float
+
+
+@dataclass(frozen=True, slots=True)
+class FitResult:
+    """A fitted indenter.
+
+    Attributes
+    ----------
+    values, sd : dict
+        Parameters and their standard deviations (mm, radians), baseline included.
+    residual_mm : (rows, columns)
+        Map minus model over the window; NaN where not used.
+    residual_rms_mm : float
+        Root of the weighted mean square.
+    correlated_pixels : float
+        How many neighbouring pixels err together.
+    converged : bool
+        Whether the solver stopped by itself.
+    """
+
+    values: Mapping[str, float]
+    sd: Mapping[str, float]
+    residual_mm: Array
+    residual_rms_mm: float
+    correlated_pixels: float
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Problem:
+    """Points of the fit, its parameters and what is known of them beforehand."""
+
+    model: IndenterModel
+    names: tuple[str, ...]
+    x_mm: Array
+    y_mm: Array
+    depth_mm: Array
+    prior: Mapping[str, tuple[float, float]]
+    centre_mm: tuple[float, float]
+
+    def depth(self, vector: Array, x_mm: Array, y_mm: Array) -> Array:
+        values = dict(zip(self.names, vector, strict=True))
+        ground = (
+            values["offset_mm"]
+            + values["tilt_x"] * (x_mm - self.centre_mm[0])
+            + values["tilt_y"] * (y_mm - self.centre_mm[1])
+        )
+        return np.asarray(self.model.depth(values, x_mm, y_mm) + ground)
+
+
+def fit_indenter(
+    model: IndenterModel,
+    window: WindowData,
+    start: Mapping[str, float],
+    *,
+    edge: EdgePrior,
+) -> FitResult:
+    """Fit position, size, yaw, depth and drape of an indenter together.
+
+    Weighted least squares with Huber weights; the edge's fillet and the map's blur enter with
+    `edge` as prior, set against the data by the number of independent errors in them.
+
+    Parameters
+    ----------
+    model : IndenterModel
+        The shape.
+    window : WindowData
+        The object and the ground around it.
+    start : mapping
+        First guess of the model's parameters except the edge's.
+    edge : EdgePrior
+        What is known of the object's edge.
+    """
+    chosen, density = _chosen_points(window)
+    names = (*model.names, *BASELINE)
+    prior = _priors(model, edge)
+    problem = _Problem(
+        model,
+        names,
+        window.x_mm[chosen],
+        window.y_mm[chosen],
+        window.depth_mm[chosen],
+        prior,
+        (start["x_mm"], start["y_mm"]),
+    )
+    first = dict.fromkeys(BASELINE, 0.0) | {k: m for k, (m, _) in prior.items()} | dict(start)
+    vector = np.array([first[name] for name in names])
+    weight = window.weight[chosen]
+    # Until the residuals are known, a twentieth of the height stands for their scale.
+    sigma, together, robust = 0.05 * start["height_mm"], 30.0, np.ones(weight.shape)
+    for _ in range(MOST_ROUNDS):
+        before = vector
+        inflation = 1.0 + (together - 1.0) * density
+        vector, jacobian, converged = _solve(problem, vector, weight * robust, sigma, inflation)
+        left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
+        sigma = max(_robust_scale(left * np.sqrt(weight)), MODEL_ERROR * start["height_mm"])
+        # The wall is the small part of the map that carries the size: what it leaves must count.
+        sigma = max(sigma, 0.5 * float(np.sqrt(np.mean(weight * left**2))))
+        ratio = np.abs(left) * np.sqrt(weight) / (HUBER * sigma)
+        robust = 1.0 / np.maximum(ratio, 1.0)
+        residual = window.depth_mm - problem.depth(vector, window.x_mm, window.y_mm)
+        residual = np.where(window.weight > 0.0, residual, np.nan)
+        together = correlated_pixels(residual)
+        actual = 1.0 + (together - 1.0) * density
+        covariance = _covariance(jacobian, inflation, actual, len(prior))
+        sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        settled = bool(np.all(np.abs(vector - before) <= SETTLED * sd + 1e-5))
+        if settled:
+            break
+    return FitResult(
+        values=dict(zip(names, map(float, vector), strict=True)),
+        sd=dict(zip(names, map(float, sd), strict=True)),
+        residual_mm=residual,
+        residual_rms_mm=_weighted_rms(residual, window.weight),
+        correlated_pixels=together,
+        converged=converged and settled,
+    )
+
+
+def correlated_pixels(residual_mm: Array) -> float:
+    """Return how many pixels share one error: the sum of the residual's autocorrelation.
+
+    The sum runs over lags up to where the correlation is first lost; 1 for white noise.
+
+    Parameters
+    ----------
+    residual_mm : (rows, columns)
+        Residuals; NaN where there are none.
+    """
+    there = np.isfinite(residual_mm)
+    values = np.where(there, residual_mm, 0.0)
+    values = np.where(there, values - values.sum() / max(there.sum(), 1), 0.0)
+    rows, columns = (next_fast_len(2 * n, real=True) for n in values.shape)
+
+    def correlate(a: Array) -> Array:
+        spectrum = rfft2(a, (rows, columns))
+        return np.asarray(irfft2(np.abs(spectrum) ** 2, (rows, columns)))
+
+    pairs = correlate(there.astype(float))
+    rho = correlate(values) / np.maximum(pairs, 0.5)
+    if rho[0, 0] <= 0.0:
+        return 1.0
+    rho /= rho[0, 0]
+    lag_y = np.minimum(np.arange(rows), rows - np.arange(rows))
+    lag_x = np.minimum(np.arange(columns), columns - np.arange(columns))
+    lag = np.round(np.hypot(lag_y[:, None], lag_x[None, :])).astype(int)
+    # Beyond half the window pairs are few and the estimate is noise.
+    reach = min(values.shape) // 2
+    near = lag < reach
+    sums = np.bincount(lag[near], rho[near], minlength=reach)
+    counts = np.bincount(lag[near], minlength=reach)
+    lost = np.flatnonzero(sums / np.maximum(counts, 1) < 0.05)
+    end = int(lost[0]) if lost.size else reach
+    return float(max(sums[:end].sum(), 1.0))
+
+
+def _chosen_points(window: WindowData) -> tuple[Mask, float]:
+    """Return the pixels of the fit and which share of the usable ones they are.
+
+    A regular decimation would beat against walls that lie along the grid; this one is random, with
+    a fixed seed so that a map has one answer.
+    """
+    usable = window.weight > 0.0
+    draw = np.random.default_rng(0).random(usable.shape)
+    chosen = np.zeros(usable.shape, dtype=bool)
+    for part, wanted in ((window.near_wall, EDGE_POINTS), (~window.near_wall, OTHER_POINTS)):
+        area = usable & part
+        chosen |= area & (draw * max(int(area.sum()), 1) < wanted)
+    return chosen, float(chosen.sum() / max(int(usable.sum()), 1))
+
+
+def _priors(model: IndenterModel, edge: EdgePrior) -> dict[str, tuple[float, float]]:
+    if "edge_radius_mm" not in model.names:
+        return {}
+    return {
+        "edge_radius_mm": (edge.edge_radius_mm, edge.edge_radius_sd_mm),
+        "blur_mm2": (edge.blur_mm**2, edge.blur_mm**2),
+    }
+
+
+def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
+    low = np.full(len(names), -np.inf)
+    high = np.full(len(names), np.inf)
+    for k, name in enumerate(names):
+        if name in ("diameter_mm", "side_a_mm", "side_b_mm"):
+            low[k], high[k] = SMALLEST_SIZE_MM, 20.0 * max(start[k], SMALLEST_SIZE_MM)
+        elif name == "height_mm":
+            low[k], high[k] = 0.2 * start[k], 3.0 * start[k]
+        elif name == "drape_decay_mm":
+            low[k], high[k] = 0.05, 5.0
+        elif name == "edge_radius_mm":
+            low[k], high[k] = 1e-3, 0.5
+        elif name == "blur_mm2":
+            low[k], high[k] = 0.0, 0.25
+    return low, high
+
+
+def _solve(
+    problem: _Problem, vector: Array, weight: Array, sigma: float, inflation: float
+) -> tuple[Array, Array, bool]:
+    """Return the parameters, the Jacobian of the normalised residuals, and whether it converged."""
+    scale = np.sqrt(weight / inflation) / sigma
+    keys = list(problem.prior)
+    places = [problem.names.index(key) for key in keys]
+    means = np.array([problem.prior[key][0] for key in keys])
+    widths = np.array([problem.prior[key][1] for key in keys])
+
+    def residuals(p: Array) -> Array:
+        data = (problem.depth(p, problem.x_mm, problem.y_mm) - problem.depth_mm) * scale
+        return np.concatenate([data, (p[places] - means) / widths])
+
+    low, high = _bounds(problem.names, vector)
+    inside = np.clip(vector, low + 1e-9, high - 1e-9)
+    solution = least_squares(
+        residuals, inside, bounds=(low, high), x_scale="jac", ftol=1e-4, xtol=1e-7, max_nfev=15
+    )
+    return solution.x, solution.jac, bool(solution.status > 0)
+
+
+def _covariance(jacobian: Array, used: float, actual: float, priors: int) -> Array:
+    """Return the covariance, the data's part rescaled to the residual's actual correlation."""
+    data = jacobian[: len(jacobian) - priors]
+    known = jacobian[len(jacobian) - priors :]
+    return np.asarray(np.linalg.pinv(data.T @ data * (used / actual) + known.T @ known))
+
+
+def _robust_scale(values: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def _weighted_rms(residual: Array, weight: Array) -> float:
+    there = np.isfinite(residual)
+    total = float(weight[there].sum())
+    return float(np.sqrt((weight[there] * residual[there] ** 2).sum() / max(total, 1e-12)))
+
+
+def near_wall(core: Mask, pitch_mm: float) -> Mask:
+    """Return the band around a bump's half-height outline in which its wall must lie.
+
+    Parameters
+    ----------
+    core : (rows, columns) bool
+        Half-height area.
+    pitch_mm : float
+        Distance of pixels.
+    """
+    inside = ndimage.distance_transform_edt(core) * pitch_mm
+    outside = ndimage.distance_transform_edt(~core) * pitch_mm
+    return np.asarray((inside < 1.2) & (outside < 0.4))

@@ -1,0 +1,174 @@
+"""The three indenters as models with parameters, for the fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.measurement.drape import (
+    ball_contact_radius_mm,
+    ball_depth,
+    cuboid_depth,
+    cylinder_depth,
+)
+from gelpolight_core.measurement.segmentation import PressedRegion
+
+Array = NDArray[np.float64]
+Values = Mapping[str, float]
+
+TYPICAL_DECAY_MM = 0.7
+"""Where the fit of the decay length starts; the fit is free to leave it."""
+SMALLEST_SIZE_MM = 0.1
+"""No fitted diameter or side is smaller."""
+
+
+@dataclass(frozen=True, slots=True)
+class IndenterModel:
+    """One shape: its parameters and the depth map that they give.
+
+    Attributes
+    ----------
+    shape : str
+        ``cylinder``, ``cuboid`` or ``ball``.
+    names : tuple of str
+        The parameters beside the baseline.
+    depth : callable (values, x_mm, y_mm) -> depth_mm
+        The membrane's depth at points of the sensor frame, above the baseline.
+    start : callable (region) -> values
+        First guess from the segmented bump.
+    outline : callable (values) -> (N, 2)
+        The contact region's outline, (x, y) in mm.
+    """
+
+    shape: str
+    names: tuple[str, ...]
+    depth: Callable[[Values, Array, Array], Array]
+    start: Callable[[PressedRegion], dict[str, float]]
+    outline: Callable[[Values], Array]
+
+
+def _cylinder(values: Values, x_mm: Array, y_mm: Array) -> Array:
+    return cylinder_depth(
+        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
+        cylinder_radius_mm=values["diameter_mm"] / 2.0,
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+        edge_radius_mm=values["edge_radius_mm"],
+        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+    )
+
+
+def _cuboid(values: Values, x_mm: Array, y_mm: Array) -> Array:
+    along, across = _turned(x_mm - values["x_mm"], y_mm - values["y_mm"], values["yaw"])
+    return cuboid_depth(
+        along,
+        across,
+        side_mm=(values["side_a_mm"], values["side_b_mm"]),
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+        edge_radius_mm=values["edge_radius_mm"],
+        blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+    )
+
+
+def _ball(values: Values, x_mm: Array, y_mm: Array) -> Array:
+    return ball_depth(
+        np.hypot(x_mm - values["x_mm"], y_mm - values["y_mm"]),
+        ball_radius_mm=values["diameter_mm"] / 2.0,
+        height_mm=values["height_mm"],
+        decay_mm=values["drape_decay_mm"],
+    )
+
+
+def _turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+    """Return coordinates along axes turned by `angle`."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return cos * x + sin * y, cos * y - sin * x
+
+
+def _shared_start(region: PressedRegion) -> dict[str, float]:
+    return {
+        "x_mm": region.centre_mm[0],
+        "y_mm": region.centre_mm[1],
+        "height_mm": region.height_mm,
+        "drape_decay_mm": TYPICAL_DECAY_MM,
+    }
+
+
+def _sharp(size_mm: float) -> float:
+    """Return the indenter's size from the half-height size: the drape falls by half in ln 2."""
+    return max(size_mm - 2.0 * TYPICAL_DECAY_MM * float(np.log(2.0)), 0.3 * size_mm)
+
+
+def _start_cylinder(region: PressedRegion) -> dict[str, float]:
+    return _shared_start(region) | {
+        "diameter_mm": _sharp(2.0 * float(np.sqrt(region.area_mm2 / np.pi)))
+    }
+
+
+def _start_cuboid(region: PressedRegion) -> dict[str, float]:
+    return _shared_start(region) | {
+        "side_a_mm": _sharp(region.side_mm[0]),
+        "side_b_mm": _sharp(region.side_mm[1]),
+        "yaw": region.yaw,
+    }
+
+
+def _start_ball(region: PressedRegion) -> dict[str, float]:
+    start = _shared_start(region)
+    half_radius = _sharp(2.0 * float(np.sqrt(region.area_mm2 / np.pi))) / 2.0
+    # The sphere is down by half its depth about where the drape takes over.
+    drop = start["height_mm"] / 2.0
+    return start | {"diameter_mm": (half_radius**2 + drop**2) / drop}
+
+
+def _circle(values: Values, radius_mm: float) -> Array:
+    angle = np.linspace(0.0, 2.0 * np.pi, 121)
+    return np.stack(
+        [values["x_mm"] + radius_mm * np.cos(angle), values["y_mm"] + radius_mm * np.sin(angle)],
+        axis=1,
+    )
+
+
+def _rectangle(values: Values) -> Array:
+    a, b = values["side_a_mm"] / 2.0, values["side_b_mm"] / 2.0
+    x, y = np.array([[-a, a, a, -a, -a], [-b, -b, b, b, -b]])
+    along, across = _turned(x, y, -values["yaw"])
+    return np.stack([values["x_mm"] + along, values["y_mm"] + across], axis=1)
+
+
+def _ball_outline(values: Values) -> Array:
+    return _circle(
+        values,
+        ball_contact_radius_mm(
+            ball_radius_mm=values["diameter_mm"] / 2.0,
+            height_mm=values["height_mm"],
+            decay_mm=values["drape_decay_mm"],
+        ),
+    )
+
+
+_PLACE = ("x_mm", "y_mm", "height_mm", "drape_decay_mm")
+_EDGE = ("edge_radius_mm", "blur_mm2")
+
+MODELS: Mapping[str, IndenterModel] = {
+    "cylinder": IndenterModel(
+        "cylinder",
+        (*_PLACE, "diameter_mm", *_EDGE),
+        _cylinder,
+        _start_cylinder,
+        lambda values: _circle(values, values["diameter_mm"] / 2.0),
+    ),
+    "cuboid": IndenterModel(
+        "cuboid",
+        (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE),
+        _cuboid,
+        _start_cuboid,
+        _rectangle,
+    ),
+    "ball": IndenterModel("ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline),
+}

@@ -1,0 +1,275 @@
+"""Measuring a pressed cylinder, cuboid or ball in a depth map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.doubt import find_doubt
+from gelpolight_core.measurement.fit import (
+    EdgePrior,
+    FitResult,
+    WindowData,
+    fit_indenter,
+    near_wall,
+)
+from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.segmentation import (
+    SECONDARY_SHARE,
+    PressedRegion,
+    find_pressed_regions,
+)
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SHAPES = tuple(MODELS)
+OUTSIDE_FLAG = 1
+"""Bit of the flags for pixels outside the working area."""
+DOUBTFUL_WEIGHT = 0.1
+"""Weight of a flagged pixel: an error about three times that of its neighbours."""
+MARGIN_MM = 3.0
+"""Ground around the half-height outline that the fit sees: four decay lengths of 0.7 mm."""
+OTHER_REACH_MM = 2.5
+"""How far the drape of another object reaches into the ground around this one."""
+DRAPE_MM = 1.5
+"""Where the drape falls to a tenth of the height, about two decay lengths."""
+SEED_REACH_MM = 1.0
+"""How far beside an object's half-height outline a seed point may lie."""
+
+
+def measure_object(
+    depth_mm: NDArray[np.floating],
+    x_mm: NDArray[np.floating],
+    y_mm: NDArray[np.floating],
+    *,
+    shape: str,
+    seed_mm: tuple[float, float] | None = None,
+    flags: NDArray[np.uint8] | None = None,
+    depth_sd_mm: NDArray[np.floating] | float | None = None,
+    edge_radius_mm: float = 0.08,
+) -> Measurement:
+    """Measure the object that is pressed into the membrane, its drape fitted with it.
+
+    Parameters
+    ----------
+    depth_mm : (rows, columns)
+        Depth map, positive towards the camera; NaN is left out.
+    x_mm, y_mm : (columns,), (rows,)
+        Regular grid in the sensor frame.
+    shape : {"cylinder", "cuboid", "ball"}
+        What was pressed.
+    seed_mm : (float, float), optional
+        A point on the object (x, y); needed where several objects are pressed.
+    flags : (rows, columns) uint8, optional
+        Bit 1: outside the working area, left out; any other bit: doubtful, weighted down.
+    depth_sd_mm : float or (rows, columns), optional
+        Uncertainty of the map; a map of them weights the pixels against each other.
+    edge_radius_mm : float, optional
+        Fillet of the object's edge where the map does not show it, known to about half of
+        itself. Edges of printed and machined indenters are broken by 0.05 to 0.1 mm.
+
+    Raises
+    ------
+    InputError
+        Unknown shape, arrays that do not fit together, nothing pressed, several objects and no
+        seed, no object at the seed, an object cut by the border.
+    """
+    if shape not in MODELS:
+        raise InputError(
+            tr("unknown shape '{shape}'").format(shape=shape),
+            where=tr("shape"),
+            advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
+        )
+    depth, x, y, weight = _checked(depth_mm, x_mm, y_mm, flags, depth_sd_mm)
+    regions = find_pressed_regions(depth, x, y, weight > 0.0)
+    region = _chosen_region(regions, x, y, seed_mm)
+    if region.cut:
+        raise InputError(
+            tr("the object at ({x:.1f}, {y:.1f}) mm is cut by the border of the map").format(
+                x=region.centre_mm[0], y=region.centre_mm[1]
+            ),
+            where=tr("depth map"),
+            advice=tr("Press it nearer to the middle of the sensor"),
+        )
+    window = _window(depth, x, y, weight, region, regions)
+    prior = EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, window.pitch_mm)
+    fit = _fit(shape, window, region, prior)
+    return _measurement(shape, fit, find_doubt(shape, fit, window, region, prior))
+
+
+def _checked(
+    depth_mm: NDArray[np.floating],
+    x_mm: NDArray[np.floating],
+    y_mm: NDArray[np.floating],
+    flags: NDArray[np.uint8] | None,
+    depth_sd_mm: NDArray[np.floating] | float | None,
+) -> tuple[Array, Array, Array, Array]:
+    """Return depth (finite), x, y and weights in [0, 1]."""
+    depth = np.asarray(depth_mm, dtype=np.float64)
+    x, y = np.asarray(x_mm, dtype=np.float64), np.asarray(y_mm, dtype=np.float64)
+    fits = depth.ndim == 2 and depth.shape == (y.size, x.size) and min(depth.shape) >= 8
+    if not fits or (flags is not None and flags.shape != depth.shape):
+        raise InputError(
+            tr("a depth map of shape {shape} with {x} columns and {y} rows named").format(
+                shape=depth.shape, x=x.size, y=y.size
+            ),
+            where=tr("depth map"),
+            advice=tr("Give arrays of one grid, at least 8 x 8"),
+        )
+    weight = np.isfinite(depth).astype(np.float64)
+    if flags is not None:
+        weight[(flags & OUTSIDE_FLAG) != 0] = 0.0
+        weight[(flags & ~np.uint8(OUTSIDE_FLAG)) != 0] *= DOUBTFUL_WEIGHT
+    if isinstance(depth_sd_mm, np.ndarray) and depth_sd_mm.ndim == 2:
+        usable = (weight > 0.0) & np.isfinite(depth_sd_mm) & (depth_sd_mm > 0.0)
+        typical = float(np.median(depth_sd_mm[usable])) if usable.any() else 1.0
+        # A pixel that claims to be far better than its neighbours must not decide alone.
+        share = np.divide(typical, depth_sd_mm, out=np.zeros_like(depth), where=usable)
+        weight *= np.minimum(share, 2.0) ** 2
+    return np.where(weight > 0.0, depth, 0.0), x, y, weight
+
+
+def _chosen_region(
+    regions: list[PressedRegion], x_mm: Array, y_mm: Array, seed_mm: tuple[float, float] | None
+) -> PressedRegion:
+    """Return the object at the seed, or the only one."""
+    if not regions:
+        raise InputError(
+            tr("no object is pressed"),
+            where=tr("depth map"),
+            advice=tr("Press the object into the membrane and take the picture again"),
+        )
+    if seed_mm is not None:
+        return _region_at(regions, x_mm, y_mm, seed_mm)
+    tall = [r for r in regions if r.height_mm > SECONDARY_SHARE * regions[0].height_mm]
+    if len(tall) > 1:
+        places = ", ".join(f"({r.centre_mm[0]:.1f}, {r.centre_mm[1]:.1f})" for r in tall)
+        raise InputError(
+            tr("{count} objects are pressed, at {places} mm").format(
+                count=len(tall), places=places
+            ),
+            where=tr("depth map"),
+            advice=tr("Choose one: give --seed X,Y with a point on it"),
+        )
+    return tall[0]
+
+
+def _region_at(
+    regions: list[PressedRegion], x_mm: Array, y_mm: Array, seed_mm: tuple[float, float]
+) -> PressedRegion:
+    def distance(region: PressedRegion) -> float:
+        rows, columns = np.nonzero(region.core)
+        return float(np.hypot(x_mm[columns] - seed_mm[0], y_mm[rows] - seed_mm[1]).min())
+
+    nearest = min(regions, key=distance)
+    if not distance(nearest) <= SEED_REACH_MM:
+        raise InputError(
+            tr("no object lies at the seed point ({x:g}, {y:g}) mm").format(
+                x=seed_mm[0], y=seed_mm[1]
+            ),
+            where=tr("seed"),
+            advice=tr("The nearest is at ({x:.1f}, {y:.1f}) mm").format(
+                x=nearest.centre_mm[0], y=nearest.centre_mm[1]
+            ),
+        )
+    return nearest
+
+
+def _window(
+    depth: Array,
+    x: Array,
+    y: Array,
+    weight: Array,
+    region: PressedRegion,
+    regions: list[PressedRegion],
+) -> WindowData:
+    """Return the object with the ground around it, other objects left out."""
+    pitch = float(np.sqrt(abs(x[1] - x[0]) * abs(y[1] - y[0])))
+    margin = int(np.ceil(MARGIN_MM / pitch))
+    rows, columns = np.nonzero(region.core)
+    here = (
+        slice(max(rows.min() - margin, 0), rows.max() + margin + 1),
+        slice(max(columns.min() - margin, 0), columns.max() + margin + 1),
+    )
+    core, weight = region.core[here], weight[here]
+    own = ndimage.distance_transform_edt(~core) * pitch
+    seen = _seen_share(region.core, weight, own, pitch)
+    weight = np.where(own <= MARGIN_MM, weight, 0.0)
+    others = np.zeros(core.shape, dtype=bool)
+    for other in regions:
+        if other is not region:
+            others |= other.core[here]
+    if others.any():
+        reach = ndimage.distance_transform_edt(~others) * pitch
+        weight = np.where((reach < OTHER_REACH_MM) & (reach < own), 0.0, weight)
+    grid_x, grid_y = np.meshgrid(x[here[1]], y[here[0]])
+    return WindowData(grid_x, grid_y, depth[here], weight, near_wall(core, pitch), pitch, seen)
+
+
+def _seen_share(core: Mask, weight: Array, own_mm: Array, pitch: float) -> float:
+    """Return which share of the ground within 1.5 mm of the half-height outline is usable."""
+    wide = int(np.ceil(DRAPE_MM / pitch)) + 1
+    # On padding, so that ground beyond the map's edge counts as missing.
+    rows, columns = np.nonzero(core)
+    part = core[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    padded = ndimage.distance_transform_edt(~np.pad(part, wide)) * pitch
+    there = (own_mm > 0.0) & (own_mm < DRAPE_MM) & (weight > 0.0)
+    return float(there.sum() / max(int(((padded > 0.0) & (padded < DRAPE_MM)).sum()), 1))
+
+
+def _fit(shape: str, window: WindowData, region: PressedRegion, prior: EdgePrior) -> FitResult:
+    model = MODELS[shape]
+    return fit_indenter(model, window, model.start(region), edge=prior)
+
+
+def _measurement(shape: str, fit: FitResult, reason: str) -> Measurement:
+    values, sd = fit.values, fit.sd
+    spread: dict[str, float | tuple[float, float] | None] = {
+        "height_mm": sd["height_mm"],
+        "centre_mm": (sd["x_mm"], sd["y_mm"]),
+        "yaw_deg": None,
+        "drape_decay_mm": sd["drape_decay_mm"],
+    }
+    diameter, side, yaw = None, None, None
+    if shape == "cuboid":
+        side, side_sd, yaw = _sides(values, sd)
+        spread |= {"side_mm": side_sd, "yaw_deg": float(np.degrees(sd["yaw"]))}
+    else:
+        diameter = values["diameter_mm"]
+        spread["diameter_mm"] = sd["diameter_mm"]
+    return Measurement(
+        shape=shape,
+        diameter_mm=diameter,
+        side_mm=side,
+        height_mm=values["height_mm"],
+        centre_mm=(values["x_mm"], values["y_mm"]),
+        yaw_deg=yaw,
+        drape_decay_mm=values["drape_decay_mm"],
+        sd=spread,
+        edge_radius_mm=values.get("edge_radius_mm"),
+        blur_mm=math.sqrt(values["blur_mm2"]) if "blur_mm2" in values else None,
+        baseline_mm=values["offset_mm"],
+        residual_rms_mm=fit.residual_rms_mm,
+        correlated_pixels=fit.correlated_pixels,
+        outline_mm=MODELS[shape].outline(values),
+        verdict="doubtful" if reason else "ok",
+        reason=reason,
+    )
+
+
+def _sides(
+    values: Mapping[str, float], sd: Mapping[str, float]
+) -> tuple[tuple[float, float], tuple[float, float], float]:
+    """Return the sides, their sd and the yaw brought to -45..45 degrees."""
+    turns = round(values["yaw"] / (np.pi / 2.0))
+    keys = ("side_a_mm", "side_b_mm") if turns % 2 == 0 else ("side_b_mm", "side_a_mm")
+    yaw = float(np.degrees(values["yaw"] - turns * np.pi / 2.0))
+    return (values[keys[0]], values[keys[1]]), (sd[keys[0]], sd[keys[1]]), yaw

@@ -1,0 +1,199 @@
+"""What a measurement says, and how it compares with the truth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """One measured object.
+
+    Attributes
+    ----------
+    shape : str
+        ``cylinder``, ``cuboid`` or ``ball``.
+    diameter_mm : float or None
+        Of the cylinder or the ball; None for a cuboid.
+    side_mm : (float, float) or None
+        Sides of the cuboid, the first along `yaw_deg`; None for the round shapes.
+    height_mm : float
+        Indentation depth above the ground around the object.
+    centre_mm : (float, float)
+        (x, y) in the sensor frame.
+    yaw_deg : float or None
+        Angle from the x axis (towards y) to the cuboid's first side, -45 to 45.
+    drape_decay_mm : float
+        Decay length of the membrane around the object.
+    sd : dict
+        Standard deviation under the same names, of the same form.
+    edge_radius_mm, blur_mm : float or None
+        Fillet of the object and blur of the map as fitted; None for a ball.
+    baseline_mm : float
+        Level of the ground under the object, already taken off `height_mm`.
+    residual_rms_mm : float
+        Map minus fit around the object.
+    correlated_pixels : float
+        How many pixels err together; the sd count each such group once.
+    outline_mm : (N, 2)
+        Contact region, (x, y), closed, for an overlay.
+    verdict : str
+        ``ok`` or ``doubtful``.
+    reason : str
+        Why doubtful; empty when ok.
+    """
+
+    shape: str
+    diameter_mm: float | None
+    side_mm: tuple[float, float] | None
+    height_mm: float
+    centre_mm: tuple[float, float]
+    yaw_deg: float | None
+    drape_decay_mm: float
+    sd: dict[str, Any]
+    edge_radius_mm: float | None
+    blur_mm: float | None
+    baseline_mm: float
+    residual_rms_mm: float
+    correlated_pixels: float
+    outline_mm: Array
+    verdict: str
+    reason: str
+
+    @property
+    def size_mm(self) -> float:
+        """The diameter, or the mean side of a cuboid."""
+        if self.side_mm is not None:
+            return (self.side_mm[0] + self.side_mm[1]) / 2.0
+        assert self.diameter_mm is not None
+        return self.diameter_mm
+
+    def as_json(self, comparison: Comparison | None = None) -> dict[str, Any]:
+        """Return the measurement as plain values; `comparison` adds truth and errors in percent.
+
+        Parameters
+        ----------
+        comparison : Comparison, optional
+            From :func:`compare`.
+        """
+        size = (
+            ("diameter_mm", self.diameter_mm)
+            if self.side_mm is None
+            else ("side_mm", list(self.side_mm))
+        )
+        return {
+            "shape": self.shape,
+            size[0]: size[1],
+            "height_mm": self.height_mm,
+            "centre_mm": list(self.centre_mm),
+            "yaw_deg": self.yaw_deg,
+            "drape_decay_mm": self.drape_decay_mm,
+            "sd": {k: list(v) if isinstance(v, tuple) else v for k, v in self.sd.items()},
+            "truth": None if comparison is None else comparison.truth.as_json(),
+            "error_percent": None if comparison is None else dict(comparison.error_percent),
+            "verdict": self.verdict,
+            "reason": self.reason,
+            "edge_radius_mm": self.edge_radius_mm,
+            "baseline_mm": self.baseline_mm,
+            "residual_rms_mm": self.residual_rms_mm,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Nominal sizes of a pressed object.
+
+    Attributes
+    ----------
+    shape : str
+        ``cylinder``, ``cuboid`` or ``ball``.
+    size_mm : float
+        Diameter, or mean side of a cuboid.
+    height_mm : float
+        Indentation depth.
+    """
+
+    shape: str
+    size_mm: float
+    height_mm: float
+
+    @property
+    def size_key(self) -> str:
+        """The name under which the size is written: ``side_mm`` or ``diameter_mm``."""
+        return "side_mm" if self.shape == "cuboid" else "diameter_mm"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the truth as plain values."""
+        return {"shape": self.shape, self.size_key: self.size_mm, "height_mm": self.height_mm}
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A measurement beside the truth.
+
+    Attributes
+    ----------
+    truth : Truth
+        What was pressed.
+    size_error_percent, height_error_percent : float
+        Planar and depth direction, signed, of the true value.
+    """
+
+    truth: Truth
+    size_error_percent: float
+    height_error_percent: float
+
+    @property
+    def error_percent(self) -> dict[str, float]:
+        """The errors under the names of the measured values."""
+        return {
+            self.truth.size_key: self.size_error_percent,
+            "height_mm": self.height_error_percent,
+        }
+
+
+def compare(measurement: Measurement, truth: Truth) -> Comparison:
+    """Return the percent errors of a measurement; of a cuboid, of its mean side.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        From :func:`~gelpolight_core.measurement.measure.measure_object`.
+    truth : Truth
+        Nominal sizes, greater than zero.
+
+    Raises
+    ------
+    InputError
+        Another shape was measured than the truth speaks of, or a true size is not positive.
+    """
+    if truth.shape != measurement.shape:
+        raise InputError(
+            tr("the truth is a {truth}, measured was a {shape}").format(
+                truth=truth.shape, shape=measurement.shape
+            ),
+            where=tr("truth"),
+            advice=tr("Measure with the shape that was pressed"),
+        )
+    for value in (truth.size_mm, truth.height_mm):
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(
+                tr("a true size of {value} mm").format(value=value),
+                where=tr("truth"),
+                advice=tr("Give sizes greater than zero"),
+            )
+    return Comparison(
+        truth,
+        100.0 * (measurement.size_mm / truth.size_mm - 1.0),
+        100.0 * (measurement.height_mm / truth.height_mm - 1.0),
+    )

@@ -1,0 +1,470 @@
+"""Where the sensor's top surface is: the pose of a checkerboard that lies on it, in air.
+
+A flat board seen by a camera has two poses that explain it almost equally well, mirrored about
+the viewing direction. Both are found (IPPE), both are refined, and the mirrored one is rejected
+by its larger reprojection error and by the agreement of the views, or, where neither tells,
+because it tilts more; which of the three it was is part of the answer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.checkerboard import BoardSpec, BoardView, find_board
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.quality import Figure, QualityTable, judge
+from gelpolight_core.session.picture import Picture
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+# Differences of chi-square: five standard deviations decide between a pose and its mirrored twin.
+SURE_MARGIN = 25.0
+# Boards pressed onto one surface agree better than this; the floor of what "agree" means.
+_FLATNESS_DEG = 0.05
+
+
+class Decision(StrEnum):
+    """How the mirrored pose was rejected."""
+
+    SINGLE = "single"  # there was only one pose: the board faces the camera
+    EVIDENCE = "evidence"  # reprojection error, and agreement where there are several views
+    TILT = "tilt"  # the two explain the views equally well; the one that tilts less was taken
+
+
+@dataclass(frozen=True, slots=True)
+class PlanePose:
+    """One pose of the board in one view.
+
+    Attributes
+    ----------
+    plane : TopPlane
+        The board's plane in the camera frame.
+    rms_px : float
+        Reprojection error.
+    tilt_deg : float
+        Angle of the plane's normal to the optical axis.
+    normal_sd_deg, distance_sd_mm : float
+        Standard deviations from the corners' residuals, for the given camera.
+    residuals_px : (N, 2)
+        Projected minus seen corner.
+    """
+
+    plane: TopPlane
+    rms_px: float
+    tilt_deg: float
+    normal_sd_deg: float
+    distance_sd_mm: float
+    residuals_px: Array
+
+
+@dataclass(frozen=True, slots=True)
+class TopPoseView:
+    """What one picture says about the top surface.
+
+    Attributes
+    ----------
+    name : str
+        The picture's name.
+    used : bool
+        Whether it took part.
+    reason : str
+        Why not; empty when it did.
+    board : BoardView or None
+        The corners, where they were found.
+    pose, mirrored : PlanePose or None
+        The accepted pose, and the rejected one where there is a second.
+    """
+
+    name: str
+    used: bool
+    reason: str
+    board: BoardView | None = None
+    pose: PlanePose | None = None
+    mirrored: PlanePose | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TopPoseResult:
+    """The undeformed top surface.
+
+    Attributes
+    ----------
+    plane : TopPlane
+        Average over the used views; normal pointing away from the camera.
+    normal_sd_deg, distance_sd_mm : float
+        Standard deviations of the average: the larger of the corners' and of the views' scatter.
+    tilt_deg : float
+        Angle of the normal to the optical axis.
+    rms_px : float
+        Reprojection error over all corners of the used views.
+    mirrored : PlanePose or None
+        The rejected mirrored pose of the first used view.
+    decision : Decision
+        How it was rejected.
+    margin_sd : float
+        By how many standard deviations it was (infinite where there was none).
+    views : tuple of TopPoseView
+        All pictures in the given order.
+    quality : QualityTable
+        The judged figures.
+    """
+
+    plane: TopPlane
+    normal_sd_deg: float
+    distance_sd_mm: float
+    tilt_deg: float
+    rms_px: float
+    mirrored: PlanePose | None
+    decision: Decision
+    margin_sd: float
+    views: tuple[TopPoseView, ...]
+    quality: QualityTable
+
+
+def estimate_top_pose(
+    pictures: Sequence[Picture], board: BoardSpec, camera: Camera, *, focal_sd_px: float = 0.0
+) -> TopPoseResult:
+    """Find the top surface from views of a checkerboard that lies flat on it, without elastomer.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+        One or more views; the board may lie differently in each.
+    board : BoardSpec
+        The board on the surface.
+    camera : Camera
+        From :func:`gelpolight_core.optics.lens.calibrate_lens`.
+    focal_sd_px : float, optional
+        How well the focal length is known; it limits how well the distance is.
+
+    Returns
+    -------
+    TopPoseResult
+        The plane, its uncertainty, and the views.
+
+    Raises
+    ------
+    InputError
+        If there is no picture, one has not the camera's size, or none shows the board.
+    """
+    _check_pictures(pictures, camera)
+    looked = [_look(picture, board) for picture in pictures]
+    boards = [board_view for board_view, _ in looked if board_view is not None]
+    if not boards:
+        raise next(refusal for _, refusal in looked if refusal is not None)
+    candidates = [_find_poses(seen, camera) for seen in boards]
+    reference, margin = _choose_side(candidates)
+    views = _describe(pictures, looked, candidates, reference)
+    views = _leave_out_strays(views)
+    return _assemble(views, camera, margin, focal_sd_px)
+
+
+def _check_pictures(pictures: Sequence[Picture], camera: Camera) -> None:
+    if not pictures:
+        raise InputError(
+            tr("there is no picture of the board on the top surface"),
+            where=tr("top_pose"),
+            advice=tr("Lay the board onto the top surface and capture it"),
+        )
+    for picture in pictures:
+        if picture.size != (camera.width, camera.height):
+            raise InputError(
+                tr("the picture is {a} x {b} pixels, the calibrated camera's are {c} x {d}").format(
+                    a=picture.size[0], b=picture.size[1], c=camera.width, d=camera.height
+                ),
+                where=picture.name,
+                advice=tr("Capture all pictures of a session at one size"),
+            )
+
+
+def _look(picture: Picture, board: BoardSpec) -> tuple[BoardView | None, InputError | None]:
+    try:
+        return find_board(picture, board), None
+    except InputError as refusal:
+        return None, refusal
+
+
+def _find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
+    """Return the one or two poses of a board, refined, the one with the smaller error first."""
+    points, distortion = seen.board.points_mm, np.array(camera.distortion)
+    _, turns, shifts, _ = cv2.solvePnPGeneric(
+        points, seen.corners_px, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE
+    )
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+    poses = []
+    starts = []
+    for turn, shift in zip(turns, shifts, strict=True):
+        refined = cv2.solvePnPRefineLM(
+            points, seen.corners_px, camera.matrix, distortion, turn, shift, criteria
+        )
+        poses.append(_describe_pose(seen, camera, refined[0], refined[1]))
+        starts.append(_describe_pose(seen, camera, turn, shift))
+    poses.sort(key=lambda pose: pose.rms_px)
+    best = poses[0]
+    if len(poses) == 1:
+        return [best]
+    # Refinement may lead out of the mirrored pose into the true one, which rejects it; shown is
+    # then the pose that it left.
+    twin = poses[1]
+    if _are_one(twin, best):
+        twin = max(starts, key=lambda pose: pose.rms_px)
+    return [best] if _are_one(twin, best) else [best, twin]
+
+
+def _are_one(pose: PlanePose, other: PlanePose) -> bool:
+    """Whether two poses are apart by less than the corners can tell."""
+    return _angle_deg(pose.plane, other.plane) < max(5.0 * other.normal_sd_deg, 1e-4)
+
+
+def _describe_pose(
+    seen: BoardView, camera: Camera, turn: NDArray[Any], shift: NDArray[Any]
+) -> PlanePose:
+    rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)
+    shift_mm = np.asarray(shift, dtype=np.float64).ravel()
+    turned = seen.board.points_mm @ rotation.T
+    residuals = camera.project(turned + shift_mm) - seen.corners_px
+    normal = rotation[:, 2] if rotation[:, 2] @ shift_mm > 0.0 else -rotation[:, 2]
+    slopes = _pose_slopes(camera, turned, shift_mm)
+    freedom = max(residuals.size - 6, 1)
+    variance = float(np.sum(residuals**2)) / freedom
+    covariance = variance * np.linalg.inv(slopes.T @ slopes)
+    # n turns by w x n, and the distance n . t changes by (w x n) . t + n . dt.
+    normal_by_turn = -_cross_matrix(normal)
+    distance_by_pose = np.concatenate([np.cross(normal, shift_mm), normal])
+    normal_variance = np.trace(normal_by_turn @ covariance[:3, :3] @ normal_by_turn.T)
+    return PlanePose(
+        plane=_plane(normal, float(normal @ shift_mm)),
+        rms_px=float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))),
+        tilt_deg=math.degrees(math.acos(min(1.0, float(normal[2])))),
+        normal_sd_deg=math.degrees(math.sqrt(max(float(normal_variance), 0.0))),
+        distance_sd_mm=math.sqrt(max(float(distance_by_pose @ covariance @ distance_by_pose), 0.0)),
+        residuals_px=residuals,
+    )
+
+
+def _pose_slopes(camera: Camera, turned: Array, shift_mm: Array) -> Array:
+    """Return d(corners)/d(small turn about the board's origin, shift), (2N, 6)."""
+    columns = []
+    for k in range(3):
+        axis = np.eye(3)[k]
+        moves = (np.cross(axis, turned), np.broadcast_to(axis, turned.shape))
+        columns.append([_slope_along(camera, turned + shift_mm, move) for move in moves])
+    turns, shifts = zip(*columns, strict=True)
+    return np.stack([*turns, *shifts], axis=1)
+
+
+def _slope_along(camera: Camera, points_mm: Array, move: Array) -> Array:
+    step = 1e-5
+    ahead, behind = camera.project(points_mm + step * move), camera.project(points_mm - step * move)
+    return np.asarray((ahead - behind).ravel() / (2.0 * step))
+
+
+def _cross_matrix(v: Array) -> Array:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def _plane(normal: Array, distance_mm: float) -> TopPlane:
+    return TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), distance_mm)
+
+
+def _angle_deg(plane: TopPlane, other: TopPlane) -> float:
+    a, b = np.array(plane.normal_camera), np.array(other.normal_camera)
+    return math.degrees(math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b)))
+
+
+def _choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, float]:
+    """Return a pose on the true side, and the chi-square by which the other side is worse.
+
+    Every candidate is tried as the truth: each view adds by how much worse its nearest candidate
+    fits its corners than its best one does, and how far that lies from the one tried. Where the
+    margin is too small to decide, the side that tilts less is taken: sensors are built to look at
+    their top surface squarely.
+    """
+    tried = [(_cost(candidates, pose), pose) for view in candidates for pose in view]
+    cost, best = min(tried, key=lambda item: item[0])
+    others = [item for item in tried if _is_other_side(candidates, item[1], best)]
+    if not others:
+        return best, math.inf
+    other_cost, other = min(others, key=lambda item: item[0])
+    margin = other_cost - cost
+    if margin < SURE_MARGIN and other.tilt_deg < best.tilt_deg:
+        return other, margin
+    return best, margin
+
+
+def _cost(candidates: Sequence[Sequence[PlanePose]], truth: PlanePose) -> float:
+    return sum(min(_pose_cost(view, pose, truth) for pose in view) for view in candidates)
+
+
+def _pose_cost(view: Sequence[PlanePose], pose: PlanePose, truth: PlanePose) -> float:
+    freedom = max(pose.residuals_px.size - 6, 1)
+    worse = freedom * (pose.rms_px**2 / max(view[0].rms_px ** 2, 1e-12) - 1.0)
+    sd_deg = math.hypot(_FLATNESS_DEG, pose.normal_sd_deg, truth.normal_sd_deg)
+    return worse + (_angle_deg(pose.plane, truth.plane) / sd_deg) ** 2
+
+
+def _is_other_side(
+    candidates: Sequence[Sequence[PlanePose]], pose: PlanePose, best: PlanePose
+) -> bool:
+    """Whether trying `pose` would pick another pose of some view than trying `best` does."""
+    return any(_pick(view, pose) is not _pick(view, best) for view in candidates)
+
+
+def _pick(view: Sequence[PlanePose], truth: PlanePose) -> PlanePose:
+    return min(view, key=lambda pose: _pose_cost(view, pose, truth))
+
+
+def _describe(
+    pictures: Sequence[Picture],
+    looked: Sequence[tuple[BoardView | None, InputError | None]],
+    candidates: Sequence[Sequence[PlanePose]],
+    reference: PlanePose,
+) -> list[TopPoseView]:
+    views = []
+    found = iter(candidates)
+    for picture, (seen, refusal) in zip(pictures, looked, strict=True):
+        if seen is None:
+            reason = refusal.found if refusal is not None else ""
+            views.append(TopPoseView(picture.name, False, reason))
+            continue
+        poses = next(found)
+        pose = min(poses, key=lambda p: _angle_deg(p.plane, reference.plane))
+        mirrored = next((p for p in poses if p is not pose), None)
+        views.append(TopPoseView(picture.name, True, "", seen, pose, mirrored))
+    return views
+
+
+def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
+    """Leave out views whose plane is not the others': needs three, to know which one is wrong."""
+    poses = [view.pose for view in views if view.used and view.pose is not None]
+    if len(poses) < 3:
+        return views
+    normal = np.median([pose.plane.normal_camera for pose in poses], axis=0)
+    middle = _plane(
+        normal / np.linalg.norm(normal), float(np.median([p.plane.distance_mm for p in poses]))
+    )
+    kept = []
+    for view in views:
+        if view.pose is not None:
+            angle_deg = _angle_deg(view.pose.plane, middle)
+            off_mm = abs(view.pose.plane.distance_mm - middle.distance_mm)
+            # Half a degree, 0.1 mm under one end of a board: it does not lie on the surface.
+            if angle_deg > max(0.5, 5.0 * view.pose.normal_sd_deg) or off_mm > max(
+                0.005 * middle.distance_mm, 5.0 * view.pose.distance_sd_mm
+            ):
+                reason = tr("its board lies {a:.2f} degrees and {d:.2f} mm off the others'")
+                view = TopPoseView(
+                    view.name,
+                    False,
+                    reason.format(a=angle_deg, d=off_mm),
+                    view.board,
+                    view.pose,
+                    view.mirrored,
+                )
+        kept.append(view)
+    return kept
+
+
+def _average(poses: Sequence[PlanePose]) -> tuple[TopPlane, float, float]:
+    """Return the average plane and the standard deviations of its normal (deg) and distance."""
+    normals = np.array([pose.plane.normal_camera for pose in poses])
+    distances = np.array([pose.plane.distance_mm for pose in poses])
+    # Equal weights below the flatness of real boards, which the residuals do not know of.
+    normal_weights = np.array([1.0 / math.hypot(p.normal_sd_deg, 1e-3) ** 2 for p in poses])
+    distance_weights = np.array([1.0 / math.hypot(p.distance_sd_mm, 1e-4) ** 2 for p in poses])
+    normal = normal_weights @ normals
+    normal /= np.linalg.norm(normal)
+    distance = float(distance_weights @ distances / distance_weights.sum())
+    normal_sd_deg = 1.0 / math.sqrt(float(normal_weights.sum()))
+    distance_sd_mm = 1.0 / math.sqrt(float(distance_weights.sum()))
+    count = len(poses)
+    if count > 1:
+        share = count * (count - 1.0)
+        scatter = math.sqrt(float(np.sum((normals - normal) ** 2)) / share)
+        normal_sd_deg = max(normal_sd_deg, math.degrees(scatter))
+        distance_sd_mm = max(
+            distance_sd_mm, math.sqrt(float(np.sum((distances - distance) ** 2)) / share)
+        )
+    return _plane(normal, distance), normal_sd_deg, distance_sd_mm
+
+
+def _assemble(
+    views: Sequence[TopPoseView], camera: Camera, margin: float, focal_sd_px: float
+) -> TopPoseResult:
+    used = [view for view in views if view.used]
+    poses = [view.pose for view in used if view.pose is not None]
+    plane, normal_sd_deg, distance_sd_mm = _average(poses)
+    by_focal = plane.distance_mm * focal_sd_px / math.sqrt(camera.fx * camera.fy)
+    distance_sd_mm = math.hypot(distance_sd_mm, by_focal)
+    tilt_deg = math.degrees(math.acos(min(1.0, plane.normal_camera[2])))
+    rms = float(np.sqrt(np.mean([pose.rms_px**2 for pose in poses])))
+    decision = Decision.EVIDENCE if margin >= SURE_MARGIN else Decision.TILT
+    if not math.isfinite(margin):
+        decision = Decision.SINGLE
+    spread_deg = max(_angle_deg(pose.plane, plane) for pose in poses)
+    figures = (
+        *_plane_figures(plane, normal_sd_deg, distance_sd_mm, tilt_deg),
+        *_view_figures(views, rms, spread_deg, decision, margin),
+    )
+    return TopPoseResult(
+        plane=plane,
+        normal_sd_deg=normal_sd_deg,
+        distance_sd_mm=distance_sd_mm,
+        tilt_deg=tilt_deg,
+        rms_px=rms,
+        mirrored=used[0].mirrored,
+        decision=decision,
+        margin_sd=math.sqrt(max(margin, 0.0)),
+        views=tuple(views),
+        quality=QualityTable(figures),
+    )
+
+
+def _plane_figures(
+    plane: TopPlane, normal_sd_deg: float, distance_sd_mm: float, tilt_deg: float
+) -> tuple[Figure, ...]:
+    more = tr("Capture several sharp views of a flat board that fills the top surface")
+    return (
+        judge("distance", tr("Distance of the top surface"), plane.distance_mm, "mm"),
+        judge("distance_sd", tr("Uncertainty of the distance"),
+              100.0 * distance_sd_mm / plane.distance_mm, "%", warn=0.1, fail=1.0, advice=more),
+        # A degree of tilt moves a mirrored light by 1 mm (PHYSICS: lights from mirror spots).
+        judge("normal_sd", tr("Uncertainty of the normal"), normal_sd_deg, "deg",
+              warn=0.1, fail=1.0, advice=more),
+        judge("tilt", tr("Tilt of the top surface"), tilt_deg, "deg", warn=5.0, fail=20.0,
+              advice=tr("Press the board flat onto the surface; check how the camera is mounted")),
+    )  # fmt: skip
+
+
+def _view_figures(
+    views: Sequence[TopPoseView], rms: float, spread_deg: float, decision: Decision, margin: float
+) -> tuple[Figure, ...]:
+    refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
+    figures = [
+        judge("reprojection_rms", tr("Reprojection error"), rms, "px", warn=0.3, fail=1.0,
+              advice=tr("Use a flat board and check its squares' size; calibrate the lens again")),
+        judge("view_spread", tr("Largest angle between a view and the average"), spread_deg, "deg",
+              warn=0.25, fail=1.0, advice=tr("Press the board flat onto the surface in each view")),
+        judge("views_left_out", tr("Views left out"), len(refused), warn=0,
+              advice=tr("Left out: {names}").format(names="; ".join(refused))),
+    ]  # fmt: skip
+    if decision is not Decision.SINGLE:
+        figures.append(
+            judge("mirrored_margin", tr("Certainty against the mirrored pose"),
+                  math.sqrt(max(margin, 0.0)), "sd", warn=math.sqrt(SURE_MARGIN),
+                  higher_is_better=True,
+                  advice=tr("Two mirrored poses explain the views equally well, and the one that "
+                            "tilts less was taken. Use a larger or sharper board to be sure"))
+        )  # fmt: skip
+    return tuple(figures)

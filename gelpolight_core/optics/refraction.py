@@ -1,0 +1,207 @@
+"""Refraction at flat parallel layers between the camera and the membrane.
+
+The stack is air, an optional window, and the elastomer, all parallel to the top surface, whose
+normal need not be the optical axis. Pixel to membrane is closed form (Snell's law in vector
+form); membrane to pixel is one root in the plane of incidence, found by Newton's method.
+The paper's Eq. (3) is the special case of one face and a normal along the optical axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class LayerStack:
+    """Flat layers under the top surface, from the camera outward.
+
+    Attributes
+    ----------
+    thicknesses_mm : tuple of floats
+        Air gap, [window,] elastomer; their sum is the top plane's distance.
+    indices : tuple of floats
+        Refractive indices of the same layers; the first is air's 1.
+    """
+
+    thicknesses_mm: tuple[float, ...]
+    indices: tuple[float, ...]
+
+    @property
+    def distance_mm(self) -> float:
+        """Distance of the top surface from the optical centre."""
+        return sum(self.thicknesses_mm)
+
+
+def build_stack(
+    distance_mm: float,
+    *,
+    elastomer_thickness_mm: float,
+    elastomer_index: float,
+    window_thickness_mm: float = 0.0,
+    window_index: float = 1.49,
+) -> LayerStack:
+    """Return the stack below a top surface at `distance_mm`; layers of no thickness are left out.
+
+    Raises
+    ------
+    InputError
+        If the layers are thicker than the distance to the camera.
+    """
+    air_mm = distance_mm - elastomer_thickness_mm - window_thickness_mm
+    if air_mm < 0.0:
+        raise InputError(
+            tr(
+                "elastomer and window are {t:.1f} mm thick, the top surface is {d:.1f} mm away"
+            ).format(t=elastomer_thickness_mm + window_thickness_mm, d=distance_mm),
+            where="session.toml [sensor]",
+            advice=tr("Correct the thicknesses, or the squares' size in [top_pose]"),
+        )
+    layers = [
+        (air_mm, 1.0),
+        (window_thickness_mm, window_index),
+        (elastomer_thickness_mm, elastomer_index),
+    ]
+    kept = [layer for layer in layers if layer[0] > 0.0]
+    return LayerStack(tuple(t for t, _ in kept), tuple(n for _, n in kept))
+
+
+def radius_on_membrane(tangent_in_air: Array, stack: LayerStack) -> tuple[Array, Array]:
+    """Return how far from the foot a ray meets the top surface, and its slope inside the gel.
+
+    Parameters
+    ----------
+    tangent_in_air : (...)
+        Tangent of the ray's angle to the stack's normal, in air.
+    stack : LayerStack
+        The layers.
+
+    Returns
+    -------
+    radius_mm : (...)
+        Distance from the foot of the perpendicular (the bracket of Eq. 3 times d / f).
+    tangent_in_gel : (...)
+        Tangent of the angle in the last layer.
+    """
+    sine = tangent_in_air / np.sqrt(1.0 + tangent_in_air**2)
+    radius = np.zeros_like(sine)
+    tangent = np.asarray(tangent_in_air, dtype=np.float64)
+    for thickness, index in zip(stack.thicknesses_mm, stack.indices, strict=True):
+        inside = sine / index
+        tangent = inside / np.sqrt(1.0 - inside**2)
+        radius = radius + thickness * tangent
+    return radius, tangent
+
+
+def tangent_in_air(radius_mm: Array, stack: LayerStack, *, tolerance_mm: float = 1e-12) -> Array:
+    """Return the tangent in air of the ray that meets the top surface at `radius_mm`.
+
+    Newton's method on the concave, monotone :func:`radius_on_membrane`: started below the root it
+    converges from that side, without overshoot.
+
+    Parameters
+    ----------
+    radius_mm : (...)
+        Distance from the foot of the perpendicular.
+    stack : LayerStack
+        The layers.
+    tolerance_mm : float, optional
+        Largest error of the radius that is accepted.
+    """
+    radius = np.asarray(radius_mm, dtype=np.float64)
+    # The paraxial slope is the steepest, so its estimate lies below the root.
+    paraxial = sum(t / n for t, n in zip(stack.thicknesses_mm, stack.indices, strict=True))
+    tangent = radius / paraxial
+    for _ in range(60):
+        value, _ = radius_on_membrane(tangent, stack)
+        error = value - radius
+        if not np.any(np.abs(error) > tolerance_mm):
+            break
+        tangent = np.maximum(tangent - error / _radius_slope(tangent, stack), 0.0)
+    return tangent
+
+
+def _radius_slope(tangent: Array, stack: LayerStack) -> Array:
+    """Return the derivative of the radius with respect to the tangent in air."""
+    sine = tangent / np.sqrt(1.0 + tangent**2)
+    sine_slope = (1.0 + tangent**2) ** -1.5
+    slope = np.zeros_like(tangent)
+    for thickness, index in zip(stack.thicknesses_mm, stack.indices, strict=True):
+        inside = sine / index
+        slope = slope + thickness / index * (1.0 - inside**2) ** -1.5 * sine_slope
+    return slope
+
+
+def camera_to_membrane(
+    directions: Array, plane: TopPlane, stack: LayerStack
+) -> tuple[Array, Array]:
+    """Follow camera rays to the undeformed top surface.
+
+    Parameters
+    ----------
+    directions : (..., 3)
+        Ray directions in the camera frame, any length.
+    plane, stack
+        Top surface and layers.
+
+    Returns
+    -------
+    points_mm : (..., 2)
+        Where the rays meet the top surface, sensor frame (x, y); NaN for rays that never do.
+    drift : (..., 2)
+        Sideways move (x, y) of the seen surface point per mm of indentation depth: the ray
+        direction w of PHYSICS, scaled to unit depth; it points back to the foot.
+    """
+    in_sensor = np.asarray(directions) @ plane.rotation.T
+    sideways = np.hypot(in_sensor[..., 0], in_sensor[..., 1])
+    forward = np.where(in_sensor[..., 2] > 0.0, in_sensor[..., 2], np.nan)
+    radius, tangent_gel = radius_on_membrane(sideways / forward, stack)
+    unit = in_sensor[..., :2] / np.maximum(sideways, 1e-300)[..., None]
+    return unit * radius[..., None], -unit * tangent_gel[..., None]
+
+
+def membrane_to_camera(points_mm: Array, plane: TopPlane, stack: LayerStack) -> Array:
+    """Return the camera-frame directions (..., 3) under which top-surface points are seen.
+
+    Parameters
+    ----------
+    points_mm : (..., 2)
+        Points (x, y) of the undeformed top surface, sensor frame.
+    """
+    radius = np.hypot(points_mm[..., 0], points_mm[..., 1])
+    tangent = tangent_in_air(radius, stack)
+    unit = points_mm / np.maximum(radius, 1e-300)[..., None]
+    in_sensor = np.concatenate(
+        [unit * tangent[..., None], np.ones_like(tangent)[..., None]], axis=-1
+    )
+    return np.asarray(in_sensor @ plane.rotation)
+
+
+def corrected_radius_paper(
+    radius_px: Array, focal_px: float, *, index: float, gel_mm: float, air_mm: float
+) -> Array:
+    """Return the corrected image radius d' of the paper's Eq. (3).
+
+    Parameters
+    ----------
+    radius_px : (...)
+        Distance d of a pixel from the principal point.
+    focal_px : float
+        Focal length f.
+    index : float
+        Refractive index n of the elastomer.
+    gel_mm, air_mm : float
+        Z1 (elastomer) and Z2 (air).
+    """
+    tan_alpha = np.asarray(radius_px) / focal_px
+    sin_beta = np.sin(np.arctan(tan_alpha)) / index
+    tan_beta = np.tan(np.arcsin(sin_beta))
+    return np.asarray(focal_px * (air_mm * tan_alpha + gel_mm * tan_beta) / (gel_mm + air_mm))

@@ -1,0 +1,127 @@
+"""Quality figures: a measured value, its limits, a verdict, and what to do about it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+
+class Verdict(StrEnum):
+    """How a figure, a stage or a calibration is judged."""
+
+    PASS = "pass"
+    WARN = "warn"
+    FAIL = "fail"
+
+
+_ORDER = (Verdict.PASS, Verdict.WARN, Verdict.FAIL)
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One judged number of a stage.
+
+    Attributes
+    ----------
+    key : str
+        Name for scripts, such as ``reprojection_rms``.
+    label : str
+        Name for people.
+    value : float
+        In `unit`.
+    unit : str
+        Such as ``px``, ``mm``, ``deg``, ``%`` or an empty text for a count.
+    warn_limit, fail_limit : float or None
+        Where the verdict turns; None where the figure is only reported.
+    verdict : Verdict
+        The judgement.
+    advice : str
+        What to do when the verdict is not "pass".
+    """
+
+    key: str
+    label: str
+    value: float
+    unit: str
+    warn_limit: float | None
+    fail_limit: float | None
+    verdict: Verdict
+    advice: str
+
+
+def judge(
+    key: str,
+    label: str,
+    value: float,
+    unit: str = "",
+    *,
+    warn: float | None = None,
+    fail: float | None = None,
+    advice: str = "",
+    higher_is_better: bool = False,
+) -> Figure:
+    """Judge a value against its limits; a value that is not finite fails.
+
+    Parameters
+    ----------
+    key, label, unit, advice : str
+        As in :class:`Figure`.
+    value : float
+        The measured value.
+    warn, fail : float, optional
+        The verdict turns to warn or fail beyond these (below them when `higher_is_better`).
+    higher_is_better : bool, optional
+        Whether small values are the bad ones.
+    """
+    sign = -1.0 if higher_is_better else 1.0
+
+    def beyond(limit: float | None) -> bool:
+        return limit is not None and sign * value > sign * limit
+
+    if not math.isfinite(value) or beyond(fail):
+        verdict = Verdict.FAIL
+    else:
+        verdict = Verdict.WARN if beyond(warn) else Verdict.PASS
+    return Figure(key, label, float(value), unit, warn, fail, verdict, advice)
+
+
+@dataclass(frozen=True, slots=True)
+class QualityTable:
+    """The quality figures of one stage, in the order in which a person reads them."""
+
+    figures: tuple[Figure, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of all figures; "pass" when there are none."""
+        return max((f.verdict for f in self.figures), key=_ORDER.index, default=Verdict.PASS)
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What to do, for every figure that did not pass."""
+        return tuple(f.advice for f in self.figures if f.verdict is not Verdict.PASS and f.advice)
+
+    def __getitem__(self, key: str) -> Figure:
+        """Return the figure named `key`."""
+        for figure in self.figures:
+            if figure.key == key:
+                return figure
+        raise KeyError(key)
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """Return the table as plain values for JSON."""
+        return [
+            {
+                "key": f.key,
+                "label": f.label,
+                "value": f.value,
+                "unit": f.unit,
+                "warn_limit": f.warn_limit,
+                "fail_limit": f.fail_limit,
+                "verdict": f.verdict.value,
+                "advice": f.advice,
+            }
+            for f in self.figures
+        ]

@@ -1,0 +1,1 @@
+"""Light intensity on the membrane from the whiteboard (Eq. 5)."""

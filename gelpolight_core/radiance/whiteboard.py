@@ -1,0 +1,252 @@
+"""Light intensity on the membrane from the whiteboard picture (Eq. 5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.session import require_colour
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+SATURATED = 0.99
+SMOOTHING_MM = 0.5
+DUST_SIGMAS = 5.0
+LEAST_DUST = 0.01
+LEAST_LIGHT = 0.02
+TREND_POINTS = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class RadianceResult:
+    """The light intensity of each LED at every membrane node.
+
+    Attributes
+    ----------
+    radiance : (rows, columns, 3) float32
+        |L_k| of Eq. (5), in pixel values 0..1; 0 where there is no light.
+    usable : (rows, columns) bool
+        Nodes where all three channels have light.
+    saturated, dust : (rows, columns) bool
+        What was left out and filled from around, for an overlay.
+    quality : QualityTable
+        Figures, limits and advice.
+    """
+
+    radiance: Map
+    usable: NDArray[np.bool_]
+    saturated: NDArray[np.bool_]
+    dust: NDArray[np.bool_]
+    quality: QualityTable
+
+
+def calibrate_radiance(
+    whiteboard: Picture, table: ResamplingTable, led_positions_mm: Array
+) -> RadianceResult:
+    """Measure the light intensity from a white diffuse board pressed on the top surface.
+
+    The board is Lambertian and faces down, so ``|L_k| = I_k / cos(theta_k)`` (Eq. 5). The ratio of
+    this to the inverse-square law of a Lambertian LED is nearly constant; it is the ratio that is
+    smoothed (about a polynomial trend), so that saturated and dusty places are filled with what
+    the law says there.
+
+    Parameters
+    ----------
+    whiteboard : Picture
+        Raw picture, elastomer mounted, no membrane.
+    table : ResamplingTable
+        Raw pixel for every membrane node.
+    led_positions_mm : (3, 3)
+        Sensor frame.
+
+    Raises
+    ------
+    InputError
+        If the picture is grey, too dark in a channel, or saturated over most of the field.
+    """
+    require_colour(whiteboard, where=whiteboard.name)
+    image = table.apply(whiteboard.rgb)
+    points = table.grid.points_mm()
+    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
+    directions, distances = light_directions(led_positions_mm, at_top)
+    cosines = -directions[..., 2]
+    # A Lambertian LED facing the membrane: lobe = cosine of the same angle, as faces are parallel.
+    law = cosines / distances**2
+    saturated = (image >= SATURATED).any(axis=2) & table.valid
+    _refuse_hopeless(image, saturated, table.valid, whiteboard.name)
+    sigma_px = SMOOTHING_MM / table.grid.pitch_mm
+    board = _board_area(image, table.valid)
+    radiance = np.zeros(image.shape, dtype=np.float32)
+    dust = np.zeros(saturated.shape, dtype=bool)
+    for k in range(3):
+        ratio = (image[..., k] / (cosines[..., k] * law[..., k])).astype(np.float32)
+        good = board & (image[..., k] < SATURATED) & (image[..., k] > 0.0)
+        trend = _trend(ratio, good, points)
+        smooth, outliers = _smooth_robustly(ratio / trend, good, law[..., k], sigma_px)
+        smooth *= trend
+        dust |= outliers
+        radiance[..., k] = np.where(board, smooth * law[..., k], 0.0)
+    usable = board & (radiance * cosines > LEAST_LIGHT).all(axis=2)
+    return RadianceResult(
+        radiance, usable, saturated, dust, _judge(radiance, table.valid, usable, saturated, dust)
+    )
+
+
+def _refuse_hopeless(
+    image: Map, saturated: NDArray[np.bool_], valid: NDArray[np.bool_], where: str
+) -> None:
+    brightest = [float(np.percentile(image[..., k][valid], 99)) for k in range(3)]
+    if min(brightest) < 2 * LEAST_LIGHT:
+        name = (tr("red"), tr("green"), tr("blue"))[int(np.argmin(brightest))]
+        raise InputError(
+            tr("the {name} channel is dark (brightest {v:.1%})").format(
+                name=name, v=min(brightest)
+            ),
+            where=where,
+            advice=tr("Switch the {name} LED on, or expose longer").format(name=name),
+        )
+    share = float(saturated[valid].mean())
+    if share > 0.3:
+        raise InputError(
+            tr("{share:.0%} of the working area is saturated").format(share=share),
+            where=where,
+            advice=tr("Shorten the exposure until the brightest place is below 95 %"),
+        )
+
+
+def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return where the whiteboard is seen: the slab's rim may lie inside the working circle.
+
+    Dark specks on the board belong to it; a few pixels along its rim, which are mixed, do not.
+    """
+    lit = (valid & (image.max(axis=2) > LEAST_LIGHT)).astype(np.uint8)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15))
+    whole = cv2.morphologyEx(lit, cv2.MORPH_CLOSE, disc)
+    core = cv2.erode(whole, np.ones((7, 7), np.uint8), borderType=cv2.BORDER_REPLICATE)
+    return (core > 0) & valid
+
+
+def _trend(ratio: Map, good: NDArray[np.bool_], points_mm: Array) -> Map:
+    """Return a polynomial of fourth degree through the good pixels, robust to specks.
+
+    Near the border a blur sees one side only; about the trend, that side is level.
+    """
+    scale = float(np.abs(points_mm).max())
+    x, y = (points_mm[..., i] / scale for i in range(2))
+    terms = np.stack([x**i * y**j for i in range(5) for j in range(5 - i)], axis=-1)
+    rows, columns = np.nonzero(good)
+    stride = max(rows.size // TREND_POINTS, 1)
+    basis = terms[rows[::stride], columns[::stride]]
+    value = ratio[rows[::stride], columns[::stride]].astype(np.float64)
+    keep = np.ones(value.size, dtype=bool)
+    for _ in range(3):
+        weights, *_ = np.linalg.lstsq(basis[keep], value[keep], rcond=None)
+        error = np.abs(basis @ weights - value)
+        keep = error <= 3.0 * 1.4826 * np.median(error[keep]) + 1e-9
+    # Where the polynomial is not led by data it may stray; it never leaves the data's own range.
+    low, high = value[keep].min(), value[keep].max()
+    return np.clip(terms @ weights, low, high).astype(np.float32)
+
+
+def _smooth_robustly(
+    ratio: Map, good: NDArray[np.bool_], law: Array, sigma_px: float
+) -> tuple[Map, NDArray[np.bool_]]:
+    """Return the ratio smoothed over good pixels, and the pixels rejected as dust.
+
+    Noise grows where the law says there is little light, so weights follow the law.
+    """
+    weight = np.where(good, law / law[good].max() if good.any() else 0.0, 0.0).astype(np.float32)
+    smooth = _weighted_blur(ratio, weight, sigma_px)
+    deviation = np.where(good, (ratio / smooth - 1.0) * np.sqrt(weight), 0.0)
+    spread = 1.4826 * float(np.median(np.abs(deviation[good])))
+    outliers = good & (np.abs(deviation) > max(DUST_SIGMAS * spread, LEAST_DUST))
+    # The rim of a speck is soft: what lies next to an outlier goes with it.
+    outliers = cv2.dilate(outliers.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    weight[outliers] = 0.0
+    return _weighted_blur(ratio, weight, sigma_px), outliers & good
+
+
+def _weighted_blur(values: Map, weight: Map, sigma_px: float) -> Map:
+    """Normalised Gaussian blur; places without weight take the nearest wider average."""
+    known_weight = float((weight).sum())
+    mean = float((values * weight).sum()) / max(known_weight, 1e-12)
+    result = np.full_like(values, mean)
+    floor = 1e-3 * float(weight.max())
+    for widen in (9.0, 3.0, 1.0):
+        blurred, total = _blur_reduced(values * weight, weight, sigma_px * widen)
+        fresh = total > floor
+        result[fresh] = blurred[fresh] / total[fresh]
+    return result
+
+
+def _blur_reduced(values: Map, weight: Map, sigma_px: float) -> tuple[Map, Map]:
+    """Blur two maps on a grid reduced so far that the Gaussian still spans several nodes."""
+    factor = max(int(sigma_px / 4.0), 1)
+    rows, columns = values.shape
+    size = (max(columns // factor, 1), max(rows // factor, 1))
+    blurred = []
+    for plane in (values, weight):
+        small = cv2.resize(plane, size, interpolation=cv2.INTER_AREA)
+        small = cv2.GaussianBlur(small, (0, 0), sigma_px / factor, borderType=cv2.BORDER_REFLECT)
+        blurred.append(cv2.resize(small, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    return np.asarray(blurred[0], np.float32), np.asarray(blurred[1], np.float32)
+
+
+def _judge(
+    radiance: Map,
+    valid: NDArray[np.bool_],
+    usable: NDArray[np.bool_],
+    saturated: NDArray[np.bool_],
+    dust: NDArray[np.bool_],
+) -> QualityTable:
+    inside = radiance[usable] if usable.any() else radiance[valid]
+    evenness = float(
+        (inside.max(axis=0) / np.maximum(np.percentile(inside, 1, axis=0), 1e-6)).max()
+    )
+    return QualityTable(
+        (
+            judge(
+                "whiteboard_saturated_percent",
+                tr("Saturated share of the working area"),
+                100.0 * float(saturated[valid].mean()),
+                "%",
+                warn=0.1,
+                fail=10.0,
+                advice=tr("Shorten the exposure until nothing is saturated"),
+            ),
+            judge(
+                "whiteboard_dust_percent",
+                tr("Dust and scratches, share of the working area"),
+                100.0 * float(dust[valid].mean()),
+                "%",
+                warn=3.0,
+                fail=20.0,
+                advice=tr("Clean the whiteboard and the elastomer and repeat"),
+            ),
+            judge(
+                "whiteboard_unlit_percent",
+                tr("Unlit share of the working area"),
+                100.0 * float(1.0 - usable[valid].mean()),
+                "%",
+                warn=10.0,
+                fail=40.0,
+                advice=tr("Expose longer, or move the LEDs outward or lower"),
+            ),
+            judge(
+                "light_range",
+                tr("Light, brightest over darkest place of a channel"),
+                evenness,
+                warn=40.0,
+                advice=tr("Lower or move the LEDs for a more even light"),
+            ),
+        )
+    )

@@ -1,0 +1,1 @@
+"""From a picture to normals and depth (Eq. 10, Poisson)."""

@@ -1,0 +1,84 @@
+"""The depth map of one picture, with all that is needed to use it elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Flag(IntFlag):
+    """Why the depth of a pixel is to be trusted less; several may hold at once."""
+
+    OUTSIDE = 1
+    """Outside the working area or the picture."""
+    SATURATED = 2
+    """A channel at its upper end: it says nothing."""
+    DARK = 4
+    """A channel without signal: in shadow."""
+    EXTRAPOLATED = 8
+    """Reflectance table used beyond its data."""
+    NOT_OBSERVABLE = 16
+    """Wall turned away from the camera."""
+    INVALID = 32
+    """Not finite, or no light or reflectance factor there."""
+
+
+FLAG_NAMES = MappingProxyType({str(flag.name).lower(): flag.value for flag in Flag})
+"""Name of each flag in files, and its value in `HeightMap.flags`."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeightMap:
+    """Depth of the membrane on a regular metric grid in the sensor frame.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float32
+        Indentation towards the camera; the surface is at z = -depth.
+    x_mm : (columns,)
+        Places of the columns, at `pitch_mm` from each other, rising.
+    y_mm : (rows,)
+        Places of the rows, at `pitch_mm` from each other, rising.
+    pitch_mm : float
+        Distance between neighbouring grid points.
+    normals : (rows, columns, 3) float32 or None
+        Unit normals of the membrane in the sensor frame, towards the camera (z < 0).
+    flags : (rows, columns) uint8
+        Sums of :class:`Flag`.
+    calibration_id : str
+        Of the calibration that the depth was made with.
+    model : str
+        ``paper`` or ``full``.
+    source : str
+        Name of the picture, such as ``press_03.png``.
+
+    Raises
+    ------
+    ValueError
+        Where the shapes do not fit each other.
+    """
+
+    depth_mm: NDArray[np.float32]
+    x_mm: NDArray[np.floating]
+    y_mm: NDArray[np.floating]
+    pitch_mm: float
+    normals: NDArray[np.float32] | None
+    flags: NDArray[np.uint8]
+    calibration_id: str
+    model: str
+    source: str
+
+    def __post_init__(self) -> None:
+        """Check that the shapes fit each other."""
+        rows, columns = self.depth_mm.shape
+        expected = {"x_mm": (columns,), "y_mm": (rows,), "flags": (rows, columns)}
+        if self.normals is not None:
+            expected["normals"] = (rows, columns, 3)
+        for name, shape in expected.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise ValueError(f"{name} of shape {found} beside a depth map of {rows, columns}")

@@ -1,0 +1,125 @@
+"""From one picture to a height map, with nothing but a calibration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.normals import (
+    ShadingMaps,
+    SlopeField,
+    normals_from_slopes,
+    solve_slopes,
+)
+from gelpolight_core.reconstruction.poisson import PoissonSolver
+from gelpolight_core.translation import tr
+
+LOOKUP_SIZE = 2048
+
+
+class Reconstructor:
+    """Reconstructs height maps by the paper's model; what does not change is made ready once.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Of the sensor that the pictures come from.
+    workers : int, optional
+        Threads of the solve and the transforms.
+
+    Examples
+    --------
+    >>> Reconstructor(read_calibration(path)).depth(frame).depth_mm  # doctest: +SKIP
+    """
+
+    def __init__(self, calibration: Calibration, *, workers: int = 2) -> None:
+        self.calibration = calibration
+        self.maps = shading_maps(calibration)
+        self.workers = workers
+        rows, columns = calibration.table.grid.shape
+        self.solver = PoissonSolver(
+            rows, columns, pitch_mm=calibration.table.grid.pitch_mm, workers=workers
+        )
+
+    def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
+        """Return the depth's slopes of a raw frame (height, width, 3), RGB.
+
+        Raises
+        ------
+        InputError
+            If the frame is not of the calibration's size, or not in colour.
+        """
+        camera = self.calibration.camera
+        if frame.shape != (camera.height, camera.width, 3):
+            shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
+            raise InputError(
+                tr("the picture is {shape}, the calibration is for {w}x{h}x3").format(
+                    shape=shape, w=camera.width, h=camera.height
+                ),
+                where=name or tr("picture"),
+                advice=tr("Use the calibration of this sensor at this picture size"),
+            )
+        return solve_slopes(frame, self.maps, workers=self.workers)
+
+    def depth(self, frame: NDArray[Any], *, name: str = "", normals: bool = True) -> HeightMap:
+        """Reconstruct a raw frame.
+
+        Parameters
+        ----------
+        frame : (height, width, 3) uint8, uint16 or float32
+            RGB; float frames are linear light 0..1.
+        name : str, optional
+            The picture's name, kept in the result.
+        normals : bool, optional
+            Whether the result holds normals.
+
+        Raises
+        ------
+        InputError
+            If the frame is not of the calibration's size.
+        """
+        field = self.slopes(frame, name=name)
+        depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
+        depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
+        grid = self.calibration.table.grid
+        return HeightMap(
+            depth_mm=np.asarray(depth_mm, np.float32),
+            x_mm=grid.x_mm,
+            y_mm=grid.y_mm,
+            pitch_mm=grid.pitch_mm,
+            normals=normals_from_slopes(field.slope_x, field.slope_y) if normals else None,
+            flags=field.flags,
+            calibration_id=self.calibration.identity,
+            model=self.calibration.model,
+            source=name,
+        )
+
+
+def shading_maps(calibration: Calibration) -> ShadingMaps:
+    """Gather a calibration's maps as the fused pass wants them."""
+    table = calibration.table
+    strength = calibration.radiance * calibration.factors
+    usable = table.valid & (strength > 0.0).all(axis=2)
+    gain = np.zeros_like(strength)
+    gain[usable] = 1.0 / strength[usable]
+    lookup, scale = calibration.reflectance.lookup(LOOKUP_SIZE)
+
+    def single(array: NDArray[Any]) -> NDArray[np.float32]:
+        return np.ascontiguousarray(array, dtype=np.float32)
+
+    return ShadingMaps(
+        table.u_px,
+        table.v_px,
+        single(gain),
+        lookup,
+        scale,
+        single(calibration.reflectance.coverage),
+        single(calibration.led_positions_mm),
+        single(table.grid.x_mm),
+        single(table.grid.y_mm),
+    )

@@ -1,0 +1,204 @@
+"""The ball: where each camera ray meets it, its normals there, and its centre from the shading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, least_squares
+from scipy.special import k0e, k1e
+
+from gelpolight_core.lights.positions import light_directions
+
+Array = NDArray[np.float64]
+TYPICAL_DECAY_MM = 0.7
+
+
+@dataclass(frozen=True, slots=True)
+class BallPose:
+    """Where a ball of known radius is pressed in.
+
+    Attributes
+    ----------
+    centre_mm : (x, y)
+        Sensor frame.
+    radius_mm : float
+        Of the ball.
+    depth_mm : float
+        Indentation of the ball's lowest point.
+    """
+
+    centre_mm: tuple[float, float]
+    radius_mm: float
+    depth_mm: float
+
+
+def ball_depth_from_contact(
+    contact_radius_mm: float, radius_mm: float, *, decay_mm: float = TYPICAL_DECAY_MM
+) -> float:
+    """Return a ball's indentation depth from its contact radius.
+
+    Eq. (8) gives the height of the contact ring above the ball's lowest point. The ring itself
+    lies deep, as the membrane leaves the ball tangentially and decays as on an elastic foundation:
+    ``slope = w K1(a / decay) / (decay K0(a / decay))``.
+
+    Parameters
+    ----------
+    contact_radius_mm, radius_mm : float
+        Of the contact and of the ball.
+    decay_mm : float, optional
+        Decay length of the membrane.
+    """
+    a = min(contact_radius_mm, 0.98 * radius_mm)
+    to_centre = np.sqrt(radius_mm**2 - a**2)
+    ring_mm = (a / to_centre) * decay_mm * k0e(a / decay_mm) / k1e(a / decay_mm)
+    return float(radius_mm - to_centre + ring_mm)
+
+
+def contact_radius_from_depth(
+    depth_mm: float, radius_mm: float, *, decay_mm: float = TYPICAL_DECAY_MM
+) -> float:
+    """Return the contact radius at an indentation depth; inverse of ball_depth_from_contact."""
+    limit = 0.98 * radius_mm
+
+    def excess(a: float) -> float:
+        return ball_depth_from_contact(a, radius_mm, decay_mm=decay_mm) - depth_mm
+
+    if excess(limit) <= 0.0:
+        return limit
+    return float(brentq(excess, 1e-6 * radius_mm, limit))
+
+
+def ball_surface(points_mm: Array, drift: Array, pose: BallPose) -> tuple[Array, Array]:
+    """Intersect the camera's rays with the ball.
+
+    Parameters
+    ----------
+    points_mm : (..., 2)
+        Where the rays meet the undeformed top surface.
+    drift : (..., 2)
+        Sideways move of the ray per mm of depth.
+    pose : BallPose
+        The ball.
+
+    Returns
+    -------
+    surface_mm : (..., 3)
+        Seen points of the ball, sensor frame (z = -depth); NaN where a ray misses it.
+    normals : (..., 3)
+        Unit normals there, towards the camera (z < 0).
+    """
+    centre = np.array([*pose.centre_mm, pose.radius_mm - pose.depth_mm])
+    start = np.concatenate([points_mm, np.zeros_like(points_mm[..., :1])], axis=-1) - centre
+    along = np.concatenate([drift, np.full_like(drift[..., :1], -1.0)], axis=-1)
+    a = (along**2).sum(-1)
+    b = (start * along).sum(-1)
+    c = (start**2).sum(-1) - pose.radius_mm**2
+    root = np.sqrt(np.where(b * b - a * c > 0.0, b * b - a * c, np.nan))
+    # The camera looks along growing z: the seen side is the root nearest to it, the larger depth.
+    depth = (-b + root) / a
+    seen = start + depth[..., None] * along
+    return seen + centre, seen / pose.radius_mm
+
+
+@dataclass(frozen=True, slots=True)
+class ShadedPixels:
+    """Pixels of a ball press, for the refinement of its centre on the shading.
+
+    Attributes
+    ----------
+    points_mm, drift : (N, 2)
+        Rays, as for :func:`ball_surface`.
+    ratio : (N, 3)
+        Press over background: radiance and reflectance factor cancel.
+    weight : (N, 3)
+        1 / standard deviation of the ratio; 0 for pixels that do not count.
+    """
+
+    points_mm: Array
+    drift: Array
+    ratio: Array
+    weight: Array
+
+
+def refine_centre(
+    pixels: ShadedPixels, start: BallPose, led_positions_mm: Array
+) -> tuple[BallPose, float, float]:
+    """Move the ball so that its shading explains the picture.
+
+    The light's direction, inverse square and lobe are those at the ball's surface. The membrane is
+    taken as a blend of ``cos^m`` and a glossy lobe about the half vector between light and view:
+    leaving the glossy share out pushes the centre outward, as the picture's shading then leans
+    towards the viewer.
+
+    Parameters
+    ----------
+    pixels : ShadedPixels
+        Inside of the contact.
+    start : BallPose
+        First estimate; radius and depth are kept.
+    led_positions_mm : (3, 3)
+        Sensor frame.
+
+    Returns
+    -------
+    pose : BallPose
+        With the refined centre.
+    residual : float
+        Robust relative misfit of the shading.
+    sd_mm : float
+        Standard deviation of the centre from the misfit, larger axis.
+    """
+    flat = np.concatenate([pixels.points_mm, np.zeros_like(pixels.points_mm[..., :1])], axis=-1)
+    flat_light, flat_distance = light_directions(led_positions_mm, flat)
+    view = np.concatenate([pixels.drift, np.full_like(pixels.drift[..., :1], -1.0)], axis=-1)
+    view /= np.linalg.norm(view, axis=-1, keepdims=True)
+    up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
+    weight = pixels.weight
+
+    def model(parameters: Array) -> Array:
+        pose = BallPose(
+            (float(parameters[0]), float(parameters[1])), start.radius_mm, start.depth_mm
+        )
+        surface, normals = ball_surface(pixels.points_mm, pixels.drift, pose)
+        light, distance = light_directions(led_positions_mm, surface)
+        gain = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
+        lit = _blend(light, normals, view, parameters[2:])
+        return np.asarray(gain * lit / _blend(flat_light, up, view, parameters[2:]))
+
+    def residual(parameters: Array) -> Array:
+        error = np.nan_to_num((model(parameters) - pixels.ratio) * weight, nan=10.0)
+        return np.asarray(error.ravel())
+
+    first = np.array([*start.centre_mm, 1.0, 0.1, 10.0])
+    spread = max(1.4826 * float(np.median(np.abs(residual(first)[weight.ravel() > 0.0]))), 1e-6)
+    span = 0.5 * start.radius_mm
+    low = np.array([first[0] - span, first[1] - span, 0.3, 0.0, 1.0])
+    high = np.array([first[0] + span, first[1] + span, 3.0, 0.9, 60.0])
+    fit = least_squares(
+        residual,
+        first,
+        bounds=(low, high),
+        x_scale=[0.1, 0.1, 0.3, 0.1, 5.0],
+        loss="soft_l1",
+        f_scale=spread,
+    )
+    left = residual(fit.x)[weight.ravel() > 0.0]
+    misfit = 1.4826 * float(np.median(np.abs(left)))
+    covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * misfit**2
+    relative = misfit / float(np.median(weight[weight > 0.0]))
+    pose = BallPose((float(fit.x[0]), float(fit.x[1])), start.radius_mm, start.depth_mm)
+    return pose, relative, float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2]).max()))
+
+
+def _blend(light: Array, normals: Array, view: Array, shape: Array) -> Array:
+    """Return the brightness (N, 3) of a diffuse and glossy membrane.
+
+    `shape` is (exponent of cos, glossy share, exponent of the half-vector cosine).
+    """
+    cosine = np.clip(np.einsum("nkc,nc->nk", light, normals), 1e-3, 1.0)
+    half = light + view[:, None, :]
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    glossy = np.clip(np.einsum("nkc,nc->nk", half, normals), 0.0, 1.0) ** shape[2]
+    return np.asarray((1.0 - shape[1]) * cosine ** shape[0] + shape[1] * glossy)

@@ -1,0 +1,377 @@
+"""The edge of a ball's contact, found where the shading has its kink.
+
+The membrane leaves the ball along a tangent: the slope is continuous at the contact's edge and
+largest there, and its derivative along the radius jumps. Whatever the light and the reflectance,
+brightness is a smooth function of slope, so every colour channel has a kink at the same radius.
+A filter that answers to a kink and to no parabola finds it without a threshold on brightness.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+_RAYS = 180
+_STEPS_PER_RADIUS = 80
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circle in the picture.
+
+    Attributes
+    ----------
+    x, y : float
+        Centre in pixels.
+    radius : float
+        In pixels.
+    """
+
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class KinkTable:
+    """How strongly the shading kinks, along rays from a centre.
+
+    Attributes
+    ----------
+    angles_rad : (rays,)
+        Directions of the rays, from x towards y.
+    radii_px : (steps,)
+        Distances from the centre.
+    answer : (rays, steps, 3) float32
+        Answer of the filter per channel, positive where darkness ends in a cusp.
+    strength : (rays, steps)
+        Root of the summed squares of `answer`; NaN where the filter would look beyond the working
+        area.
+    wedge_deg : float
+        Standard deviation of the average over neighbouring directions.
+    """
+
+    angles_rad: Array
+    radii_px: Array
+    answer: Array32
+    strength: Array
+    wedge_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contour:
+    """The contact's edge in the picture.
+
+    Attributes
+    ----------
+    circle : Circle
+        Robust fit to the points.
+    points : (N, 2)
+        (x, y) of the kink in each direction where it is seen, pixels.
+    residual_px : float
+        Robust standard deviation of the points about the circle.
+    axis_ratio : float
+        Shorter over longer axis of the ellipse through the points.
+    coverage : float
+        Share of the directions in which the edge is seen.
+    centre_sd_px : float
+        Standard deviation of the circle's centre, per axis, that follows from the residual.
+    """
+
+    circle: Circle
+    points: Array
+    residual_px: float
+    axis_ratio: float
+    coverage: float
+    centre_sd_px: float
+
+
+def kink_table(
+    scaled: Array32,
+    valid: Mask,
+    around: Circle,
+    *,
+    half_width: float,
+    reach: float = 1.9,
+    wedge_deg: float = 4.0,
+) -> KinkTable:
+    """Return the strength of the kink along rays.
+
+    Parameters
+    ----------
+    scaled : (rows, columns, 3)
+        Difference to the background in units of noise.
+    valid : (rows, columns) bool
+        The working area.
+    around : Circle
+        Where the rays start and which radius to expect.
+    half_width : float
+        Half the filter's length, as a share of the radius.
+    reach : float, optional
+        How far the rays go, as a multiple of the radius.
+    wedge_deg : float, optional
+        Standard deviation of the average over neighbouring directions.
+    """
+    step = around.radius / _STEPS_PER_RADIUS
+    half = max(2, round(half_width * _STEPS_PER_RADIUS))
+    index = np.arange(
+        round(0.3 * _STEPS_PER_RADIUS) - half, round(reach * _STEPS_PER_RADIUS) + half
+    )
+    radii = np.asarray(index * step, dtype=np.float64)
+    angles = np.linspace(0.0, 2.0 * np.pi, _RAYS, endpoint=False)
+    x = (around.x + np.outer(np.cos(angles), radii)).astype(np.float32)
+    y = (around.y + np.outer(np.sin(angles), radii)).astype(np.float32)
+    polar = np.asarray(cv2.remap(scaled, x, y, cv2.INTER_LINEAR), np.float32)
+    inside = cv2.remap(valid.astype(np.uint8), x, y, cv2.INTER_NEAREST, borderValue=0)
+    polar = _smooth_over_angle(polar, wedge_deg)
+    answer = cv2.filter2D(polar, -1, _kink_filter(half)[None])
+    strength = np.sqrt((answer.astype(np.float64) ** 2).sum(axis=2))
+    whole = cv2.erode(inside, np.ones((1, 2 * half + 1), np.uint8), borderValue=1) > 0
+    keep = slice(half, len(radii) - half)
+    seen = np.where(whole, strength, np.nan)[:, keep]
+    return KinkTable(angles, radii[keep], np.asarray(answer[:, keep], np.float32), seen, wedge_deg)
+
+
+def _kink_filter(half: int) -> Array32:
+    """Return unit-norm |x| with its mean and parabola taken out."""
+    x = np.arange(-half, half + 1) / half
+    smooth = np.stack([np.ones_like(x), x * x], axis=1)
+    bend = np.abs(x)
+    bend = bend - smooth @ np.linalg.lstsq(smooth, bend, rcond=None)[0]
+    return np.asarray(bend / np.linalg.norm(bend), dtype=np.float32)
+
+
+def _smooth_over_angle(polar: Array32, wedge_deg: float) -> Array32:
+    reach = int(np.ceil(3.0 * wedge_deg / (360.0 / _RAYS)))
+    wrapped = np.concatenate([polar[-reach:], polar, polar[:reach]])
+    smooth = cv2.GaussianBlur(
+        wrapped, (1, 2 * reach + 1), sigmaX=1e-6, sigmaY=wedge_deg / (360.0 / _RAYS)
+    )
+    return np.asarray(smooth[reach:-reach])
+
+
+def search_circle(
+    table: KinkTable,
+    around: Circle,
+    *,
+    shift: float = 0.4,
+    shrink: float = 0.3,
+    grow: float = 1.6,
+    step: float = 0.05,
+) -> Circle:
+    """Return the circle along which the kink is strongest, of a grid of circles.
+
+    Along a contact's edge the kink changes with direction as the light does, smoothly; noise,
+    specks and texture do not. So each channel's answers along a circle are reduced to their mean
+    and first two harmonics, and the energy of these is compared.
+
+    Parameters
+    ----------
+    table : KinkTable
+        Rays from the centre of `around`.
+    around : Circle
+        First guess.
+    shift : float, optional
+        Largest move of the centre, as a share of the radius.
+    shrink, grow : float, optional
+        Range of radii, as multiples of the guess.
+    step : float, optional
+        Grid's step, as a share of the radius.
+    """
+    moves = np.arange(-shift, shift + 0.5 * step, step) * around.radius
+    sizes = np.arange(shrink, grow + 0.5 * step, step) * around.radius
+    dx, dy, size = (a.ravel() for a in np.meshgrid(moves, moves, sizes, indexing="ij"))
+    rays = slice(None, None, 2 if len(dx) > 2000 else 1)
+    angles, answer = table.angles_rad[rays], table.answer[rays]
+    seen = np.isfinite(table.strength[rays])
+    # One very dark flank or speck must not outvote the rest of the circle.
+    cap = 2.0 * float(np.median(np.where(seen, np.nan_to_num(table.strength[rays]), 0.0).max(1)))
+    answer = np.where(seen[..., None], np.clip(answer, -cap, cap), np.float32(0.0))
+    along = np.outer(dx, np.cos(angles)) + np.outer(dy, np.sin(angles))
+    across2 = (dx**2 + dy**2)[:, None] - along**2
+    radius = along + np.sqrt(np.maximum(size[:, None] ** 2 - across2, 0.0))
+    column = (radius - table.radii_px[0]) / (table.radii_px[1] - table.radii_px[0])
+    best = int(_coherent_energy(answer, column, angles).argmax())
+    return Circle(float(around.x + dx[best]), float(around.y + dy[best]), float(size[best]))
+
+
+def kink_along(table: KinkTable, radius_px: float) -> float:
+    """Return the energy of the kink along a circle about the table's own centre."""
+    answer = np.where(np.isfinite(table.strength)[..., None], table.answer, np.float32(0.0))
+    step = table.radii_px[1] - table.radii_px[0]
+    column = np.full((1, len(table.angles_rad)), (radius_px - table.radii_px[0]) / step)
+    return float(_coherent_energy(answer, column, table.angles_rad)[0])
+
+
+def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
+    """Walk from a rough circle to the contact's edge.
+
+    First the circle with the strongest kink. Then, where the kink is clear, its place in every
+    direction and the circle through these: the narrower the filter, the less is it drawn by the
+    curvature of the drape. Where noise scatters the places, the strongest circle itself stays.
+
+    Parameters
+    ----------
+    scaled : (rows, columns, 3)
+        Difference to the background in units of noise.
+    valid : (rows, columns) bool
+        The working area.
+    start : Circle
+        Rough circle, too large by up to three times.
+    """
+
+    def table(around: Circle, half_width: float, wedge_deg: float = 4.0) -> KinkTable:
+        return kink_table(scaled, valid, around, half_width=half_width, wedge_deg=wedge_deg)
+
+    circle = start
+    for shift, shrink, grow in ((0.4, 0.3, 1.6), (0.2, 0.7, 1.4)):
+        wide = table(circle, 0.35, 2.0)
+        circle = search_circle(wide, circle, shift=shift, shrink=shrink, grow=grow)
+    for step in (0.02, 0.005):
+        reach = 4.0 * step
+        limits = {"shift": reach, "shrink": 1.0 - reach, "grow": 1.0 + reach, "step": step}
+        circle = search_circle(table(circle, 0.25, 2.0), circle, **limits)
+    contour = trace_contour(table(circle, 0.25), circle)
+    contour = trace_contour(table(contour.circle, 0.25), contour.circle)
+    if contour.residual_px > 0.03 * contour.circle.radius:
+        smooth = trace_contour(table(circle, 0.35, 12.0), circle, margin=0.25)
+        return replace(smooth, circle=circle, centre_sd_px=contour.centre_sd_px)
+    if contour.residual_px < 0.01 * contour.circle.radius:
+        return trace_contour(table(contour.circle, 0.15), contour.circle, margin=0.1)
+    return contour
+
+
+def inner_shading(scaled: Array32, circle: Circle, *, noise_variance: float) -> float:
+    """Return the variation of the shading in the inner half over that in the rim.
+
+    Parameters
+    ----------
+    scaled : (rows, columns, 3)
+        Difference to the background.
+    circle : Circle
+        The contact's edge.
+    noise_variance : float
+        Variance of `scaled` without any shading, summed over channels.
+    """
+    distance = distance_in_radii(scaled.shape[:2], circle)
+    inner, rim = scaled[distance < 0.5], scaled[(distance > 0.7) & (distance < 1.0)]
+    if len(inner) < 16 or len(rim) < 16:
+        return 1.0
+    inside = max(float(inner.var(axis=0).sum()) - noise_variance, 0.0)
+    return float(np.sqrt(inside / max(float(rim.var(axis=0).sum()) - noise_variance, 1e-12)))
+
+
+def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Array32:
+    """Return the distance (rows, columns) of each pixel from the centre over the radius."""
+    dx = (np.arange(shape[1], dtype=np.float32) - circle.x) / circle.radius
+    dy = (np.arange(shape[0], dtype=np.float32) - circle.y) / circle.radius
+    return np.asarray(np.hypot(dx[None, :], dy[:, None]), dtype=np.float32)
+
+
+def _coherent_energy(answer: Array32, column: Array, angles: Array) -> Array:
+    """Return, per row of `column`, the energy of the smooth part of the answers along it.
+
+    Parameters
+    ----------
+    answer : (rays, steps, 3)
+        Filter's answers.
+    column : (circles, rays)
+        Where each circle crosses each ray, in steps.
+    angles : (rays,)
+        Directions of the rays.
+    """
+    turns = np.outer(angles, [1.0, 2.0])
+    waves = [np.full((len(angles), 1), np.sqrt(0.5)), np.cos(turns), np.sin(turns)]
+    smooth = np.concatenate(waves, axis=1).astype(np.float32)
+    low = np.clip(np.floor(column), 0, answer.shape[1] - 2).astype(np.intp)
+    part = np.clip(column - low, 0.0, 1.0).astype(np.float32)[..., None]
+    inside = ((column >= 0.0) & (column <= answer.shape[1] - 1))[..., None]
+    ray = np.arange(len(angles))
+    along = (answer[ray, low] * (1.0 - part) + answer[ray, low + 1] * part) * inside
+    projected = np.einsum("crk,rw->ckw", along, smooth, optimize=True)
+    return np.asarray((projected.astype(np.float64) ** 2).sum(axis=(1, 2)))
+
+
+def trace_contour(table: KinkTable, around: Circle, *, margin: float = 0.2) -> Contour:
+    """Return the kink in every direction and the circle through it.
+
+    Parameters
+    ----------
+    table : KinkTable
+        Rays from the centre of `around`.
+    around : Circle
+        Circle near the edge.
+    margin : float, optional
+        The edge is looked for within this share of the radius.
+    """
+    near = np.abs(table.radii_px - around.radius) <= margin * around.radius
+    radii, strength = table.radii_px[near], table.strength[:, near]
+    usable = np.asarray(np.isfinite(strength).all(axis=1))
+    position, peak = _peaks(radii, np.nan_to_num(strength), usable)
+    at_peak = usable & np.isfinite(position)
+    if np.count_nonzero(at_peak) < 8:
+        return Contour(around, np.empty((0, 2)), np.inf, 0.0, 0.0, np.inf)
+    seen = at_peak & (peak > 0.25 * np.median(peak[at_peak]))
+    (mean, cx, cy), weight, spread = _fit_harmonics(table.angles_rad, position, seen, order=1)
+    ellipse, _, _ = _fit_harmonics(table.angles_rad, position, seen, order=2)
+    second = float(np.hypot(ellipse[3], ellipse[4]))
+    circle = Circle(float(around.x + cx), float(around.y + cy), float(mean))
+    on = seen & (weight > 0.0)
+    direction = np.stack([np.cos(table.angles_rad), np.sin(table.angles_rad)], axis=1)
+    points = np.array([around.x, around.y]) + position[on, None] * direction[on]
+    # Neighbouring directions share their average; a Gaussian is as wide as 2 sqrt(pi) of its sigma.
+    independent = float(on.mean()) * 360.0 / (2.0 * np.sqrt(np.pi) * table.wedge_deg)
+    return Contour(
+        circle,
+        points,
+        spread,
+        float((mean - second) / (mean + second)),
+        float(on.mean()),
+        spread * float(np.sqrt(2.0 / max(independent, 1.0))),
+    )
+
+
+def _peaks(radii: Array, strength: Array, usable: Mask) -> tuple[Array, Array]:
+    """Return where each ray has its largest kink (NaN at the window's ends), and its size."""
+    rays = np.arange(len(strength))
+    top = strength.argmax(axis=1)
+    inner = np.clip(top, 1, len(radii) - 2)
+    left, middle, right = (strength[rays, inner + i] for i in (-1, 0, 1))
+    bend = np.minimum(left - 2.0 * middle + right, -1e-12)
+    offset = np.clip(0.5 * (left - right) / bend, -0.5, 0.5)
+    position = radii[inner] + offset * (radii[1] - radii[0])
+    return np.where(usable & (top == inner), position, np.nan), middle
+
+
+def _fit_harmonics(
+    angles: Array, position: Array, seen: Mask, *, order: int
+) -> tuple[Array, Array, float]:
+    """Fit radius over angle by harmonics with Tukey's weights.
+
+    The first harmonic is a shift of the centre, the second an ellipse. On an arc the two are hard
+    to tell apart, so the circle is fitted with the first alone.
+    """
+    turns = np.outer(angles, np.arange(1, order + 1))
+    waves = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(len(angles), -1)
+    design = np.column_stack([np.ones_like(angles), waves])[seen]
+    value = position[seen]
+    # The median keeps the first round from being drawn by the far outliers.
+    away = value - np.median(value)
+    weight, spread = np.ones(len(value)), 0.0
+    coefficients = np.zeros(1 + 2 * order)
+    for _ in range(8):
+        spread = max(1.4826 * float(np.median(np.abs(away))), 1e-3)
+        weight = np.clip(1.0 - (away / (5.0 * spread)) ** 2, 0.0, None) ** 2
+        root = np.sqrt(weight)
+        coefficients, *_ = np.linalg.lstsq(design * root[:, None], value * root, rcond=None)
+        away = value - design @ coefficients
+    full = np.zeros(len(seen))
+    full[seen] = weight
+    return coefficients, full, spread

@@ -1,0 +1,206 @@
+"""One ball press: found in the picture, its centre refined on the shading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.reflectance.ball import (
+    BallPose,
+    ShadedPixels,
+    ball_depth_from_contact,
+    refine_centre,
+)
+from gelpolight_core.reflectance.indentation import Indentation, find_indentation
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+INSIDE = 0.9
+LEAST_VALUE = 0.02
+SATURATED = 0.99
+MAX_SHADED_PIXELS = 8_000
+GAIN_NOISE = 0.02
+VALUE_NOISE = 0.003
+
+
+@dataclass(frozen=True, slots=True)
+class BallPress:
+    """A ball of known radius, pressed in and found.
+
+    Attributes
+    ----------
+    name : str
+        The picture's file.
+    pose : BallPose
+        Centre, radius and depth, sensor frame.
+    contact_radius_mm : float
+        Radius of the contact.
+    centre_sd_mm : float
+        Standard deviation of the centre from the shading's misfit.
+    shading_misfit : float
+        Robust relative misfit of the shading inside the contact.
+    indentation : Indentation
+        What was found in the picture before the refinement, in grid nodes, for an overlay.
+    quality : QualityTable
+        Figures, limits and advice.
+    """
+
+    name: str
+    pose: BallPose
+    contact_radius_mm: float
+    centre_sd_mm: float
+    shading_misfit: float
+    indentation: Indentation
+    quality: QualityTable
+
+    def seen_centre_mm(self, drift: Array) -> Array:
+        """Return where the contact's centre is seen on the undeformed top surface, (2,).
+
+        The rays meet the contact ring below the surface and further in, by `drift` per mm.
+        """
+        sagitta = self.pose.radius_mm - np.sqrt(self.pose.radius_mm**2 - self.contact_radius_mm**2)
+        return np.asarray(self.pose.centre_mm) - (self.pose.depth_mm - sagitta) * drift
+
+
+def find_ball(
+    picture: Map,
+    background: Map,
+    table: ResamplingTable,
+    led_positions_mm: Array,
+    *,
+    radius_mm: float,
+    name: str,
+    usable: NDArray[np.bool_] | None = None,
+) -> BallPress:
+    """Find a pressed ball and place it.
+
+    Parameters
+    ----------
+    picture, background : (rows, columns, 3) float32
+        With and without the ball, resampled onto the grid, crosstalk removed.
+    table : ResamplingTable
+        The grid and its rays.
+    led_positions_mm : (3, 3)
+        Sensor frame.
+    radius_mm : float
+        Of the ball.
+    name : str
+        The picture's file, for messages.
+    usable : (rows, columns) bool, optional
+        Nodes with light; by default all that the camera sees.
+
+    Raises
+    ------
+    InputError
+        If no single round indentation is found, or its contact is larger than the ball.
+    """
+    usable = table.valid if usable is None else usable & table.valid
+    found = find_indentation(picture, background, valid=table.valid, name=name)
+    pitch = table.grid.pitch_mm
+    origin = np.array([table.grid.x_mm[0], table.grid.y_mm[0]])
+    seen = origin + pitch * np.asarray(found.centre)
+    contact = pitch * found.contact_radius_px
+    if contact >= radius_mm:
+        raise InputError(
+            tr("the contact's radius is {c:.2f} mm, the ball's is stated as {r:.2f} mm").format(
+                c=contact, r=radius_mm
+            ),
+            where=name,
+            advice=tr("Correct the ball's radius (not its diameter) in [balls] of session.toml"),
+        )
+    depth = ball_depth_from_contact(contact, radius_mm)
+    drift = _drift_at(table, seen)
+    ring = depth - (radius_mm - np.sqrt(radius_mm**2 - contact**2))
+    centre = seen + ring * drift
+    start = BallPose((float(centre[0]), float(centre[1])), radius_mm, depth)
+    inside = usable & _within(table, seen, INSIDE * contact)
+    pixels = _shaded_pixels(picture, background, table, inside)
+    pose, misfit, sd = refine_centre(pixels, start, led_positions_mm)
+    moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
+    return BallPress(
+        name, pose, contact, sd, misfit, found, _judge(found, contact, radius_mm, moved, misfit)
+    )
+
+
+def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> NDArray[np.bool_]:
+    x = table.grid.x_mm[None, :] - centre_mm[0]
+    y = table.grid.y_mm[:, None] - centre_mm[1]
+    return np.asarray(x**2 + y**2 < radius_mm**2)
+
+
+def contact_mask(press: BallPress, table: ResamplingTable) -> NDArray[np.bool_]:
+    """Return the nodes (rows, columns) well inside the contact, where the ball's shape is known."""
+    rough = np.asarray(press.pose.centre_mm)
+    seen = press.seen_centre_mm(_drift_at(table, rough))
+    return table.valid & _within(table, seen, INSIDE * press.contact_radius_mm)
+
+
+def _drift_at(table: ResamplingTable, point_mm: Array) -> Array:
+    column, row = np.round(table.grid.to_index(point_mm)).astype(int)
+    rows, columns = table.grid.shape
+    return np.asarray(
+        table.drift[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)], np.float64
+    )
+
+
+def _shaded_pixels(
+    picture: Map, background: Map, table: ResamplingTable, inside: NDArray[np.bool_]
+) -> ShadedPixels:
+    """Gather press over background inside the contact, evenly thinned, with weights."""
+    rows, columns = np.nonzero(inside)
+    stride = max(rows.size // MAX_SHADED_PIXELS, 1)
+    rows, columns = rows[::stride], columns[::stride]
+    value = picture[rows, columns].astype(np.float64)
+    base = background[rows, columns].astype(np.float64)
+    known = (value > LEAST_VALUE) & (value < SATURATED) & (base > LEAST_VALUE)
+    # The ratio's noise: the model's own few per cent, and the picture's over the base.
+    weight = np.where(known, 1.0 / (GAIN_NOISE + VALUE_NOISE / np.maximum(base, LEAST_VALUE)), 0.0)
+    points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
+    return ShadedPixels(
+        points,
+        table.drift[rows, columns].astype(np.float64),
+        value / np.maximum(base, LEAST_VALUE),
+        weight,
+    )
+
+
+def _judge(
+    found: Indentation, contact_mm: float, radius_mm: float, moved_mm: float, misfit: float
+) -> QualityTable:
+    return QualityTable(
+        (
+            *found.quality.figures,
+            judge(
+                "contact_radius_mm",
+                tr("Contact radius"),
+                contact_mm,
+                "mm",
+                warn=0.9 * radius_mm,
+                advice=tr("The ball is pressed in very deep: press less, or use a larger ball"),
+            ),
+            judge(
+                "centre_moved_mm",
+                tr("Centre moved by the shading"),
+                moved_mm,
+                "mm",
+                warn=0.15 * contact_mm,
+                fail=0.4 * contact_mm,
+                advice=tr("Outline and shading disagree: look for dirt, or press again"),
+            ),
+            judge(
+                "shading_misfit_percent",
+                tr("Shading not explained by the ball"),
+                100.0 * misfit,
+                "%",
+                warn=8.0,
+                fail=25.0,
+                advice=tr("Check the ball's radius and that nothing else touches the membrane"),
+            ),
+        )
+    )

@@ -1,0 +1,193 @@
+"""The reflectance stage: from all ball presses to one monotone table per channel (Eq. 6-8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reflectance.ball import BallPose, ball_surface
+from gelpolight_core.reflectance.press import LEAST_VALUE, SATURATED, BallPress, contact_mask
+from gelpolight_core.reflectance.table import ChannelFit, ReflectanceTable, fit_channel
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+CHANNEL_NAMES = ("red", "green", "blue")
+LEAST_COSINE = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class ReflectanceResult:
+    """The reflectance table with what it rests on.
+
+    Attributes
+    ----------
+    table : ReflectanceTable
+        G and R for each channel.
+    fits : tuple of 3 ChannelFit
+        Curve, bins and scatter of each channel.
+    presses : tuple of BallPress
+        The balls.
+    quality : QualityTable
+        Figures, limits and advice.
+    """
+
+    table: ReflectanceTable
+    fits: tuple[ChannelFit, ChannelFit, ChannelFit]
+    presses: tuple[BallPress, ...]
+    quality: QualityTable
+
+
+def ball_scatter(
+    presses: Sequence[BallPress],
+    pictures: Sequence[Map],
+    table: ResamplingTable,
+    led_positions_mm: Array,
+    radiance: RadianceResult,
+    factors: Map | None = None,
+) -> list[tuple[Array, Array]]:
+    """Return (cosines, processed values) of all ball pixels, one pair per channel.
+
+    As in the paper, light and view are those of the flat membrane: the ball's normals are taken
+    straight above each node, about the place where the contact's centre is seen.
+
+    Parameters
+    ----------
+    presses, pictures : sequences of equal length
+        The balls and their pictures (rows, columns, 3), resampled.
+    table, led_positions_mm, radiance
+        Earlier stages.
+    factors : (rows, columns, 3) float32, optional
+        rho, fed back from Eq. (9); by default 1.
+    """
+    scatter: list[list[tuple[Array, Array]]] = [[], [], []]
+    for press, picture in zip(presses, pictures, strict=True):
+        inside = contact_mask(press, table) & radiance.usable
+        rows, columns = np.nonzero(inside)
+        points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
+        centre = press.seen_centre_mm(table.drift[rows, columns].mean(axis=0).astype(np.float64))
+        seen = BallPose(
+            (float(centre[0]), float(centre[1])), press.pose.radius_mm, press.pose.depth_mm
+        )
+        _, normals = ball_surface(points, np.zeros_like(points), seen)
+        at_top = np.concatenate([points, np.zeros_like(points[:, :1])], axis=1)
+        light, _ = light_directions(led_positions_mm, at_top)
+        cosines = np.einsum("nkc,nc->nk", light, normals)
+        values = picture[rows, columns].astype(np.float64)
+        strength = radiance.radiance[rows, columns].astype(np.float64)
+        if factors is not None:
+            strength = strength * factors[rows, columns]
+        for k in range(3):
+            known = (
+                (values[:, k] > LEAST_VALUE)
+                & (values[:, k] < SATURATED)
+                & (cosines[:, k] > LEAST_COSINE)
+                & (strength[:, k] > 0.0)
+            )
+            scatter[k].append((cosines[known, k], values[known, k] / strength[known, k]))
+    return [
+        (np.concatenate([c for c, _ in channel]), np.concatenate([v for _, v in channel]))
+        for channel in scatter
+    ]
+
+
+def calibrate_reflectance(
+    presses: Sequence[BallPress],
+    pictures: Sequence[Map],
+    table: ResamplingTable,
+    led_positions_mm: Array,
+    radiance: RadianceResult,
+    factors: Map | None = None,
+) -> ReflectanceResult:
+    """Fit the reflectance table to all ball presses.
+
+    Parameters
+    ----------
+    presses, pictures, table, led_positions_mm, radiance, factors
+        As for :func:`ball_scatter`.
+
+    Raises
+    ------
+    InputError
+        If there is no press, or a channel's scatter is too poor for a curve.
+    """
+    if not presses:
+        raise InputError(
+            tr("no ball press is left"),
+            where=tr("balls"),
+            advice=tr("Press a ball of known radius at several places"),
+        )
+    scatter = ball_scatter(presses, pictures, table, led_positions_mm, radiance, factors)
+    fits = [
+        fit_channel(cosines, values, name=tr(CHANNEL_NAMES[k]))
+        for k, (cosines, values) in enumerate(scatter)
+    ]
+    reflectance = ReflectanceTable(
+        (fits[0].cosines, fits[1].cosines, fits[2].cosines),
+        (fits[0].values, fits[1].values, fits[2].values),
+        np.array([f.coverage for f in fits]),
+    )
+    three = (fits[0], fits[1], fits[2])
+    return ReflectanceResult(reflectance, three, tuple(presses), _judge(three, presses))
+
+
+def _judge(
+    fits: tuple[ChannelFit, ChannelFit, ChannelFit], presses: Sequence[BallPress]
+) -> QualityTable:
+    worst = max(presses, key=lambda p: p.shading_misfit)
+    return QualityTable(
+        (
+            judge(
+                "ball_presses",
+                tr("Ball presses"),
+                float(len(presses)),
+                warn=4.0,
+                fail=0.5,
+                higher_is_better=True,
+                advice=tr("Press balls at five or more places"),
+            ),
+            judge(
+                "lowest_cosine",
+                tr("Lowest cosine that all channels have seen"),
+                float(max(f.coverage[0] for f in fits)),
+                warn=0.4,
+                fail=0.7,
+                advice=tr("Press balls deeper, or smaller ones: steep walls are extrapolated"),
+            ),
+            judge(
+                "scatter_percent",
+                tr("Scatter about the curve, widest channel"),
+                100.0 * max(f.spread for f in fits),
+                "%",
+                warn=8.0,
+                fail=25.0,
+                advice=tr("Check ball radii and LED positions, then repeat the worst presses"),
+            ),
+            judge(
+                "outlier_percent",
+                tr("Outliers filtered"),
+                100.0 * max(f.outlier_share for f in fits),
+                "%",
+                warn=5.0,
+                fail=20.0,
+                advice=tr("Clean the membrane and repeat the worst presses"),
+            ),
+            judge(
+                "worst_misfit_percent",
+                tr("Shading misfit of the worst press ({name})").format(name=worst.name),
+                100.0 * worst.shading_misfit,
+                "%",
+                warn=10.0,
+                fail=25.0,
+                advice=tr("Repeat the press {name}").format(name=worst.name),
+            ),
+        )
+    )

@@ -1,0 +1,203 @@
+"""The reflectance table: how bright the membrane is at each angle of light (Eq. 6, 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import isotonic_regression
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+BIN_COUNT = 40
+LEAST_IN_BIN = 30
+LEAST_STEP = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class ReflectanceTable:
+    """G and its inverse R for each channel, as monotone nodes.
+
+    Attributes
+    ----------
+    cosines : tuple of 3 (nodes,) arrays
+        cos(theta), strictly increasing from 0 to 1.
+    values : tuple of 3 (nodes,) arrays
+        Processed pixel values I / (rho |L|) at those cosines, strictly increasing; the first is
+        what stray light leaves in a shadow.
+    coverage : (3, 2)
+        Lowest and highest cosine that the ball presses have shown; beyond it is extrapolated.
+    """
+
+    cosines: tuple[Array, Array, Array]
+    values: tuple[Array, Array, Array]
+    coverage: Array
+
+    def response(self, channel: int, cosine: Array) -> Array:
+        """Return G(cos theta) of one channel (Eq. 6); clipped to cosines 0..1."""
+        curve = PchipInterpolator(self.cosines[channel], self.values[channel])
+        return np.asarray(curve(np.clip(cosine, 0.0, 1.0)))
+
+    def cosine(self, channel: int, value: Array) -> Array:
+        """Return R(I / (rho |L|)) of one channel (Eq. 7); clipped to cosines 0..1."""
+        nodes = self.values[channel]
+        curve = PchipInterpolator(nodes, self.cosines[channel])
+        return np.asarray(curve(np.clip(value, nodes[0], nodes[-1])))
+
+    def lookup(self, size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return R sampled evenly for the live path.
+
+        Returns
+        -------
+        table : (3, size) float32
+            Cosines at `size` even steps of the processed value, from 0 to each channel's last node.
+        scale : (3,) float32
+            Multiply a processed value by this to get its place in the table.
+        """
+        table = np.stack(
+            [self.cosine(k, np.linspace(0.0, self.values[k][-1], size)) for k in range(3)]
+        )
+        scale = np.array([(size - 1) / self.values[k][-1] for k in range(3)])
+        return table.astype(np.float32), scale.astype(np.float32)
+
+
+def cosine_table() -> ReflectanceTable:
+    """Return the table of an ideal diffuse membrane: G(cos) = cos."""
+    nodes = np.linspace(0.0, 1.0, 11)
+    coverage = np.tile([0.0, 1.0], (3, 1))
+    return ReflectanceTable((nodes, nodes, nodes), (nodes, nodes, nodes), coverage)
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelFit:
+    """One channel's curve with the scatter that it was fitted to.
+
+    Attributes
+    ----------
+    cosines, values : (nodes,)
+        The curve.
+    coverage : (2,)
+        Lowest and highest cosine with data.
+    bin_cosines, bin_values, bin_counts : (bins,)
+        Robust centre of each bin before it was made monotone.
+    spread : float
+        Robust relative scatter of the points about the curve.
+    outlier_share : float
+        Share of points beyond four spreads.
+    """
+
+    cosines: Array
+    values: Array
+    coverage: Array
+    bin_cosines: Array
+    bin_values: Array
+    bin_counts: Array
+    spread: float
+    outlier_share: float
+
+
+def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
+    """Fit one channel's monotone curve to a scatter of ball pixels.
+
+    The cosine is known from the ball's shape and the noise is in the picture, so the value is
+    averaged at given cosine (robustly, by the median), made monotone and then inverted.
+
+    Parameters
+    ----------
+    cosines : (N,)
+        cos(theta) from the ball's normals.
+    values : (N,)
+        Processed pixel values I / (rho |L|).
+    name : str
+        The channel's name, for messages.
+
+    Raises
+    ------
+    InputError
+        If there are too few points, or they do not grow with the cosine.
+    """
+    seen = np.isfinite(cosines) & np.isfinite(values) & (cosines > 0.0) & (cosines <= 1.0)
+    cosines, values = np.asarray(cosines)[seen], np.asarray(values)[seen]
+    if cosines.size < 10 * LEAST_IN_BIN:
+        raise _poor(name, tr("only {n} usable pixels in the {name} channel"), n=cosines.size)
+    low, high = np.quantile(cosines, [0.002, 0.998])
+    edges = np.linspace(low, high, BIN_COUNT + 1)
+    centre, middle, count = _bin(cosines, values, edges)
+    if centre.size < 4:
+        raise _poor(name, tr("the {name} channel shows only {n} angles of light"), n=centre.size)
+    monotone = np.asarray(isotonic_regression(middle, weights=np.sqrt(count)).x)
+    if monotone[-1] < 1.05 * monotone[0]:
+        raise _poor(
+            name,
+            tr("the {name} channel does not grow brighter as it faces its light ({n} bins)"),
+            n=centre.size,
+        )
+    node_cosines, node_values = _close_ends(centre, monotone)
+    curve = PchipInterpolator(node_cosines, node_values)
+    residual = values / np.maximum(curve(cosines), 1e-9) - 1.0
+    spread = 1.4826 * float(np.median(np.abs(residual)))
+    outliers = float((np.abs(residual) > 4.0 * max(spread, 1e-6)).mean())
+    return ChannelFit(
+        node_cosines,
+        node_values,
+        np.array([centre[0], centre[-1]]),
+        centre,
+        middle,
+        count,
+        spread,
+        outliers,
+    )
+
+
+def _poor(name: str, text: str, *, n: int) -> InputError:
+    return InputError(
+        text.format(name=name, n=n),
+        where=tr("balls"),
+        advice=tr("Press balls deeper and at more places, and check each ball's radius"),
+    )
+
+
+def _bin(cosines: Array, values: Array, edges: Array) -> tuple[Array, Array, Array]:
+    """Return each bin's mean cosine and the value there, sigma-clipped about its own line."""
+    which = np.digitize(cosines, edges) - 1
+    rows = []
+    for i in range(edges.size - 1):
+        mine = which == i
+        if mine.sum() < LEAST_IN_BIN:
+            continue
+        x, y = cosines[mine], values[mine]
+        for _ in range(3):
+            middle = np.median(y)
+            keep = np.abs(y - middle) <= 3.0 * 1.4826 * np.median(np.abs(y - middle)) + 1e-12
+            x, y = x[keep], y[keep]
+        rows.append((x.mean(), y.mean(), y.size))
+    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    return table[:, 0], table[:, 1], table[:, 2]
+
+
+def _close_ends(cosines: Array, values: Array) -> tuple[Array, Array]:
+    """Extend the curve to no light and to full light; no flat steps.
+
+    The value at cos = 0 is where the low end's line leads, not zero by decree: what is left there
+    is stray light and crosstalk, which a shadow shows too.
+    """
+    low = cosines <= cosines[0] + 0.2 * (cosines[-1] - cosines[0])
+    first = values[0] - _slope(cosines[low], values[low]) * cosines[0]
+    high = cosines >= cosines[-1] - 0.25 * (cosines[-1] - cosines[0])
+    last = values[-1] + _slope(cosines[high], values[high]) * (1.0 - cosines[-1])
+    node_cosines = np.concatenate([[0.0], cosines, [1.0]])
+    node_values = np.concatenate([[max(first, 0.0)], values, [last]])
+    if node_cosines[-1] - node_cosines[-2] < LEAST_STEP:
+        node_cosines, node_values = node_cosines[:-1], node_values[:-1]
+        node_cosines[-1] = 1.0
+    ramp = LEAST_STEP * node_values[-1] * np.arange(node_values.size)
+    return node_cosines, np.maximum.accumulate(node_values - ramp) + ramp
+
+
+def _slope(cosines: Array, values: Array) -> float:
+    """Return the slope of a line through the points, not below zero; 0 for less than two."""
+    return max(float(np.polyfit(cosines, values, 1)[0]), 0.0) if cosines.size > 1 else 0.0

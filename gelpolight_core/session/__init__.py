@@ -1,0 +1,1 @@
+"""Session folders: what was captured of one sensor, read and checked."""

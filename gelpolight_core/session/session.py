@@ -1,0 +1,328 @@
+"""Read a session folder: its description (session.toml) and the pictures of each stage."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.picture import Picture
+from gelpolight_core.translation import tr
+
+FORMAT = "gelpolight-session"
+VERSION = 1
+SUFFIXES = (".png", ".tif", ".tiff")
+MAX_PIXELS = 64_000_000
+ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A checkerboard as session.toml states it."""
+
+    inner_corners: tuple[int, int]
+    square_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class SensorData:
+    """The sensor as its maker states it; lengths in mm (session.toml, ``[sensor]``)."""
+
+    serial: str
+    led_height_mm: float
+    elastomer_thickness_mm: float
+    elastomer_refractive_index: float
+    window_thickness_mm: float
+    window_refractive_index: float
+    working_diameter_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A session folder whose description was read and checked; pictures are read on demand."""
+
+    folder: Path
+    sensor: SensorData
+    checkerboard: Board
+    top_pose: Board
+    ball_radii_mm: Mapping[str, float] = field(default_factory=dict)
+    ball_default_radius_mm: float | None = None
+
+    def files(self, stage: str) -> tuple[Path, ...]:
+        """Return the picture files of a stage in the order of their names.
+
+        Raises
+        ------
+        InputError
+            If the stage's folder is missing or holds no PNG or TIFF picture.
+        """
+        folder = self.folder / stage
+        found = tuple(sorted(p for p in folder.glob("*") if p.suffix.lower() in SUFFIXES))
+        if not found:
+            raise InputError(
+                tr("the stage has no pictures"),
+                where=str(folder),
+                advice=tr("Capture the stage, or copy its PNG or TIFF pictures there"),
+            )
+        return found
+
+    def pictures(self, stage: str) -> tuple[Picture, ...]:
+        """Return the pictures of a stage; all must have one size."""
+        pictures = tuple(read_picture(path) for path in self.files(stage))
+        for picture in pictures[1:]:
+            if picture.size != pictures[0].size:
+                raise InputError(
+                    tr("the picture is {a} pixels and {name} is {b}").format(
+                        a="x".join(map(str, picture.size)),
+                        name=pictures[0].name,
+                        b="x".join(map(str, pictures[0].size)),
+                    ),
+                    where=str(self.folder / stage / picture.name),
+                    advice=tr("Capture all pictures of a session at one size"),
+                )
+        return pictures
+
+    def averaged(self, stage: str) -> Picture:
+        """Return the average of a one-image stage's frames."""
+        return average(self.pictures(stage), name=f"{stage}")
+
+    def ball_radius_mm(self, name: str) -> float:
+        """Return the radius of the ball pressed in the picture `name`."""
+        radius = self.ball_radii_mm.get(name, self.ball_default_radius_mm)
+        if radius is None:
+            raise InputError(
+                tr("[balls] states no radius for {name}").format(name=name),
+                where=str(self.folder / "session.toml"),
+                advice=tr('Add "{name}" = radius in mm, or a default').format(name=name),
+            )
+        return radius
+
+
+def average(pictures: Sequence[Picture], *, name: str) -> Picture:
+    """Average frames of one view; a lone frame is passed on."""
+    if len(pictures) == 1:
+        return pictures[0]
+    mean = np.mean([p.rgb for p in pictures], axis=0, dtype=np.float64).astype(np.float32)
+    return Picture(
+        name,
+        mean,
+        bit_depth=max(p.bit_depth for p in pictures),
+        frame_count=sum(p.frame_count for p in pictures),
+        grey=all(p.grey for p in pictures),
+    )
+
+
+def read_picture(path: Path) -> Picture:
+    """Read a PNG or TIFF picture, 8 or 16 bit, as linear light 0..1 in RGB order.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not a picture, or is neither 8 nor 16 bit.
+    """
+    if not path.is_file():
+        raise InputError(
+            tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
+        )
+    raw = _decode(path)
+    if raw is None:
+        raise InputError(
+            tr("the file is not a whole PNG or TIFF picture"),
+            where=str(path),
+            advice=tr("Capture or copy it again"),
+        )
+    if raw.dtype not in (np.uint8, np.uint16):
+        raise InputError(
+            tr("the picture holds {kind} values").format(kind=raw.dtype),
+            where=str(path),
+            advice=tr("Use pictures of 8 or 16 bit"),
+        )
+    depth = 8 if raw.dtype == np.uint8 else 16
+    grey = raw.ndim == 2
+    bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
+    rgb = np.ascontiguousarray(bgr[:, :, ::-1], dtype=np.float32) / np.float32(2**depth - 1)
+    return Picture(path.name, rgb, bit_depth=depth, grey=grey)
+
+
+def _decode(path: Path) -> np.ndarray[Any, Any] | None:
+    data = np.fromfile(path, dtype=np.uint8)
+    _check_declared_size(path, data[:64].tobytes())
+    if data.size == 0:
+        return None
+    try:
+        return cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        return None
+
+
+def _check_declared_size(path: Path, head: bytes) -> None:
+    """Refuse a PNG that declares more pixels than any camera has, before memory is taken."""
+    if head[:8] != b"\x89PNG\r\n\x1a\n" or len(head) < 24:
+        return
+    width, height = int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            tr("the picture declares {w} x {h} pixels").format(w=width, h=height),
+            where=str(path),
+            advice=tr("Use pictures of at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
+        )
+
+
+def require_colour(picture: Picture, *, where: str) -> None:
+    """Refuse a grey picture where the three LEDs' colours are needed."""
+    rgb = picture.rgb
+    same = picture.grey or bool(
+        np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
+    )
+    if same and float(rgb.max()) > 0.0:
+        raise InputError(
+            tr("the picture is grey"),
+            where=where,
+            advice=tr("Capture it in colour: each LED is told by its own channel"),
+        )
+
+
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal text."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def read_session(folder: Path) -> Session:
+    """Read and check ``session.toml`` of a session folder.
+
+    Raises
+    ------
+    InputError
+        If the folder or file is missing, is not TOML, has another format or version, or a key
+        that is unknown, missing, of the wrong kind or out of range.
+    """
+    path = folder / "session.toml"
+    if not path.is_file():
+        raise InputError(
+            tr("there is no session.toml"),
+            where=str(folder),
+            advice=tr("Name a session folder, or make one with gelpolight simulate"),
+        )
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(
+            tr("the file is not valid TOML ({error})").format(error=error),
+            where=str(path),
+            advice=tr("Mend that line"),
+        ) from error
+    return _parse(content, path)
+
+
+def _parse(content: dict[str, Any], path: Path) -> Session:
+    top = _Table(content, "", path)
+    if top.text("format") != FORMAT:
+        raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))
+    version = top.whole("version")
+    if version > VERSION:
+        raise InputError(
+            tr("the session has version {v} and this program knows version {k}").format(
+                v=version, k=VERSION
+            ),
+            where=str(path),
+            advice=tr("Use a newer version of GelPoLight Studio"),
+        )
+    if version != VERSION:
+        raise top.wrong("version", tr("is unknown"))
+    sensor = _parse_sensor(top.table("sensor"))
+    checkerboard = _parse_board(top.table("checkerboard"))
+    pose = _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard
+    balls = top.table("balls")
+    radii = {str(name): balls.number(str(name), 0.05, 500.0) for name in balls.content}
+    top.no_more("format", "version", "sensor", "checkerboard", "top_pose", "balls")
+    default = radii.pop("default", None)
+    return Session(path.parent, sensor, checkerboard, pose, radii, default)
+
+
+def _parse_sensor(table: _Table) -> SensorData:
+    sensor = SensorData(
+        serial=table.text("serial"),
+        led_height_mm=table.number("led_height_mm", 0.1, 500.0),
+        elastomer_thickness_mm=table.number("elastomer_thickness_mm", 0.0, 500.0),
+        elastomer_refractive_index=table.number("elastomer_refractive_index", 1.0, 3.0),
+        window_thickness_mm=table.number("window_thickness_mm", 0.0, 100.0, default=0.0),
+        window_refractive_index=table.number("window_refractive_index", 1.0, 3.0, default=1.49),
+        working_diameter_mm=table.number("working_diameter_mm", 0.5, 1000.0),
+    )
+    table.no_more(*SensorData.__dataclass_fields__)
+    return sensor
+
+
+def _parse_board(table: _Table) -> Board:
+    corners = table.content.get("inner_corners")
+    whole = isinstance(corners, list) and len(corners) == 2
+    if not whole or not all(type(n) is int and 3 <= n <= 100 for n in corners or ()):
+        raise table.wrong("inner_corners", tr("is not two whole numbers from 3 to 100"))
+    assert corners is not None
+    square = table.number("square_mm", 0.05, 500.0)
+    table.no_more("inner_corners", "square_mm")
+    return Board((corners[0], corners[1]), square)
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """A table of session.toml, with errors that name the key."""
+
+    content: dict[str, Any]
+    name: str
+    path: Path
+
+    def _key(self, key: str) -> str:
+        return f"[{self.name}] {key}" if self.name else key
+
+    def wrong(self, key: str, what: str) -> InputError:
+        if key not in self.content:
+            what = tr("is missing")
+        return InputError(
+            f"{self._key(key)} {what}",
+            where=str(self.path),
+            advice=tr("Mend the key {key}").format(key=self._key(key)),
+        )
+
+    def text(self, key: str) -> str:
+        value = self.content.get(key)
+        if not isinstance(value, str) or not value.strip():
+            raise self.wrong(key, tr("is not a text"))
+        return value
+
+    def whole(self, key: str) -> int:
+        value = self.content.get(key)
+        if type(value) is not int:
+            raise self.wrong(key, tr("is not a whole number"))
+        return value
+
+    def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
+        value = self.content.get(key, default)
+        good = isinstance(value, int | float) and not isinstance(value, bool)
+        if not good or not math.isfinite(value) or not low <= value <= high:  # type: ignore[arg-type, operator]
+            text = tr("is {value}, not a number from {low} to {high}")
+            raise self.wrong(key, text.format(value=value, low=low, high=high))
+        return float(value)  # type: ignore[arg-type]
+
+    def table(self, key: str) -> _Table:
+        value = self.content.get(key)
+        if not isinstance(value, dict):
+            raise self.wrong(key, tr("is not a table"))
+        return _Table(value, key, self.path)
+
+    def no_more(self, *known: str) -> None:
+        for key in self.content:
+            if key not in known:
+                raise InputError(
+                    tr("the key {key} is unknown").format(key=self._key(key)),
+                    where=str(self.path),
+                    advice=tr("Remove it, or correct its spelling"),
+                )

@@ -1,0 +1,215 @@
+"""Checkerboards before the virtual camera: patterns, poses and their pictures, in air."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.design.parts import CameraDesign, LayerDesign
+from gelpolight_core.simulation.compiled import compiled
+from gelpolight_core.simulation.rays import pixel_directions, project_to_pixels, sensor_axes
+
+Array = NDArray[np.float64]
+
+WHITE, BLACK, ROOM = 200.0 / 255.0, 9.5 / 255.0, 58.7 / 255.0
+"""Brightness of printed white, printed black and what lies behind a board under room light."""
+DARK_ROOM = 2.2 / 255.0
+"""Brightness beside the working circle when the board lies on the sensor's top."""
+
+_SAMPLES = 4
+_PICTURE_EDGE_SHARE = 0.02
+_POSE_TRIES = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class BoardPose:
+    """A checkerboard in space.
+
+    Attributes
+    ----------
+    inner_corners : (columns, rows)
+        Inner corners of the pattern.
+    square_mm : float
+        Side of a square.
+    axes : (3, 3)
+        Rows: the board's x, y and normal in the camera frame.
+    centre_mm : (3,)
+        Middle of the pattern, camera frame.
+    disc_radius_mm : float
+        The board is seen inside this circle about `disc_centre_mm`; infinite: the board is a
+        rectangle with a white border of one square.
+    disc_centre_mm : (2,)
+        In the board's own x and y.
+    """
+
+    inner_corners: tuple[int, int]
+    square_mm: float
+    axes: Array
+    centre_mm: Array
+    disc_radius_mm: float = math.inf
+    disc_centre_mm: tuple[float, float] = (0.0, 0.0)
+
+    def corners_mm(self) -> Array:
+        """(rows * columns, 3) inner corners in the camera frame, row by row."""
+        columns, rows = self.inner_corners
+        y, x = np.mgrid[:rows, :columns].astype(np.float64)
+        x = (x.ravel() - 0.5 * (columns - 1)) * self.square_mm
+        y = (y.ravel() - 0.5 * (rows - 1)) * self.square_mm
+        return np.asarray(self.centre_mm + x[:, None] * self.axes[0] + y[:, None] * self.axes[1])
+
+
+@compiled
+def _board_value(
+    x: float, y: float, columns: int, rows: int, square: float
+) -> float:  # pragma: no cover - compiled
+    """Return 0 black, 1 white, -1 off the board; the pattern's middle is the origin."""
+    a, b = x / square + 0.5 * (columns + 1), y / square + 0.5 * (rows + 1)
+    if 0.0 <= a < columns + 1 and 0.0 <= b < rows + 1:
+        return float((math.floor(a) + math.floor(b)) % 2)
+    if -1.0 <= a < columns + 2 and -1.0 <= b < rows + 2:
+        return 1.0
+    return -1.0
+
+
+@compiled
+def _draw(
+    directions: Any, axes: Any, centre: Any, board: Any, disc: Any, levels: Any, samples: int
+) -> Any:  # pragma: no cover - compiled
+    height, width = directions.shape[0] - 1, directions.shape[1] - 1
+    columns, rows, square = board
+    out = np.empty((height, width))
+    away = centre[0] * axes[2, 0] + centre[1] * axes[2, 1] + centre[2] * axes[2, 2]
+    for i in range(height):
+        for j in range(width):
+            total = 0.0
+            for part in range(samples * samples):
+                a = (part // samples + 0.5) / samples
+                b = (part % samples + 0.5) / samples
+                x = (1 - a) * ((1 - b) * directions[i, j, 0] + b * directions[i, j + 1, 0])
+                x += a * ((1 - b) * directions[i + 1, j, 0] + b * directions[i + 1, j + 1, 0])
+                y = (1 - a) * ((1 - b) * directions[i, j, 1] + b * directions[i, j + 1, 1])
+                y += a * ((1 - b) * directions[i + 1, j, 1] + b * directions[i + 1, j + 1, 1])
+                scale = away / (x * axes[2, 0] + y * axes[2, 1] + axes[2, 2])
+                px, py, pz = x * scale - centre[0], y * scale - centre[1], scale - centre[2]
+                u = px * axes[0, 0] + py * axes[0, 1] + pz * axes[0, 2]
+                v = px * axes[1, 0] + py * axes[1, 1] + pz * axes[1, 2]
+                value = _board_value(u, v, columns, rows, square)
+                if scale <= 0.0:
+                    value = -1.0
+                elif disc[2] < 1e300:
+                    outside = math.hypot(u - disc[0], v - disc[1]) > disc[2]
+                    value = -1.0 if outside else abs(value)
+                level = levels[2]
+                if value >= 0.0:
+                    level = levels[0] if value > 0.5 else levels[1]
+                total += level
+            out[i, j] = total / (samples * samples)
+    return out
+
+
+def board_picture(camera: CameraDesign, pose: BoardPose) -> Array:
+    """Return (rows, columns): the board's brightness at each pixel, without blur and noise."""
+    # Directions at the pixels' corners: within a pixel the lens is straight to 1e-8.
+    v, u = np.mgrid[: camera.height_px + 1, : camera.width_px + 1] - 0.5
+    directions = pixel_directions(camera, u, v)
+    disc = (*pose.disc_centre_mm, min(pose.disc_radius_mm, 1e308))
+    round_board = math.isfinite(pose.disc_radius_mm)
+    levels = (WHITE, BLACK, DARK_ROOM if round_board else ROOM)
+    board = (*pose.inner_corners, pose.square_mm)
+    return np.asarray(_draw(directions, pose.axes, pose.centre_mm, board, disc, levels, _SAMPLES))
+
+
+def _turned(rx: float, ry: float, rz: float) -> Array:
+    """Return board axes (rows) after turning about z, then y, then x."""
+    cx, sx, cy, sy = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry)
+    cz, sz = math.cos(rz), math.sin(rz)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, sx], [0.0, -sx, cx]])
+    about_y = np.array([[cy, 0.0, -sy], [0.0, 1.0, 0.0], [sy, 0.0, cy]])
+    about_z = np.array([[cz, sz, 0.0], [-sz, cz, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(about_z @ about_y @ about_x)
+
+
+def board_views(
+    camera: CameraDesign,
+    rng: np.random.Generator,
+    *,
+    count: int = 16,
+    inner_corners: tuple[int, int] = (9, 6),
+    square_mm: float = 3.0,
+) -> tuple[BoardPose, ...]:
+    """Return poses of a hand-held board with all its inner corners in the picture.
+
+    The board is tilted by up to 32 degrees, fills half to nine tenths of the picture's width, and
+    leans towards the four corners in turn, so that the views together reach the picture's borders.
+
+    Parameters
+    ----------
+    camera : CameraDesign
+        The lens.
+    rng : Generator
+        Source of the poses.
+    count, inner_corners, square_mm
+        How many views of which board.
+    """
+    length = (inner_corners[0] + 1) * square_mm
+    size = np.array([camera.width_px, camera.height_px], dtype=np.float64)
+    poses = []
+    for number in range(count):
+        for _ in range(_POSE_TRIES):
+            share = rng.uniform(0.5, 0.9)
+            distance = length * camera.fx / (share * camera.width_px)
+            side = np.array([2 * (number % 2) - 1, 2 * (number // 2 % 2) - 1])
+            room = size - np.array([1.0, 0.8]) * share * camera.width_px
+            u, v = 0.5 * size + 0.5 * side * rng.uniform(0.0, 1.0, 2) * np.maximum(room, 0.0)
+            direction = pixel_directions(camera, np.array(u), np.array(v))
+            tilt = rng.uniform(-1.0, 1.0, 2) * math.radians(32.0)
+            axes = _turned(tilt[0], tilt[1], math.radians(rng.uniform(-25.0, 25.0)))
+            pose = BoardPose(inner_corners, square_mm, axes, distance * direction)
+            if _in_picture(camera, pose):
+                poses.append(pose)
+                break
+    return tuple(poses)
+
+
+def _in_picture(camera: CameraDesign, pose: BoardPose) -> bool:
+    corners = pose.corners_mm()
+    if corners[:, 2].min() <= 0.0:
+        return False
+    room = _PICTURE_EDGE_SHARE * camera.width_px
+    # One square of room, so that the squares around the outer corners are seen whole.
+    middle = corners.mean(axis=0)
+    pixels = project_to_pixels(camera, middle + 1.35 * (corners - middle))
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    size = np.array([camera.width_px, camera.height_px])
+    return bool((low > room - 0.5).all() and (high < size - 0.5 - room).all())
+
+
+def board_on_top(
+    layers: LayerDesign,
+    *,
+    working_diameter_mm: float,
+    yaw_deg: float = 14.0,
+    shift_mm: tuple[float, float] = (0.35, -0.25),
+    inner_corners: tuple[int, int] = (9, 6),
+    square_mm: float = 2.0,
+) -> BoardPose:
+    """Return the pose of the small board that lies on the sensor's top surface."""
+    yaw = math.radians(yaw_deg)
+    frame = sensor_axes(layers)
+    turn = np.array(
+        [[math.cos(yaw), math.sin(yaw), 0.0], [-math.sin(yaw), math.cos(yaw), 0.0], [0, 0, 1.0]]
+    )
+    centre = np.array([*shift_mm, layers.top_distance_mm]) @ frame
+    back = -(turn[:2, :2] @ np.array(shift_mm))
+    return BoardPose(
+        inner_corners,
+        square_mm,
+        turn @ frame,
+        np.asarray(centre),
+        0.5 * working_diameter_mm,
+        (float(back[0]), float(back[1])),
+    )

@@ -1,0 +1,154 @@
+"""How the membrane lies over an indenter: an elastic foundation with an obstacle.
+
+Outside the contact the depth w obeys ``lambda^2 laplacian(w) = w``; where the indenter touches, the
+membrane follows it; everywhere w is at least the indenter's depth. For a shape with an axis the
+free part is ``w = w_b K0(r / lambda) / K0(b / lambda)``, and the membrane leaves the shape at the
+radius b at which both slopes agree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import k0, k1
+
+from gelpolight_core.simulation.compiled import compiled
+
+Array = NDArray[np.float64]
+
+NOWHERE_MM = -1e9
+"""Depth of an obstacle where there is none."""
+
+_COARSEST_CELLS = 24
+_MOST_SWEEPS = 4000
+
+
+def contact_radius(
+    profile: Callable[[float], tuple[float, float]], edge_mm: float, decay_mm: float
+) -> float:
+    """Return the radius at which the membrane leaves a shape with an axis.
+
+    Parameters
+    ----------
+    profile : callable
+        Radius in mm -> (depth of the shape, how fast it falls per mm of radius); falling ever
+        faster.
+    edge_mm : float
+        Radius at which the shape ends.
+    decay_mm : float
+        Decay length lambda of the foundation.
+
+    Returns
+    -------
+    float
+        b in mm; the edge when the membrane holds on to the shape up to there.
+    """
+
+    def steeper(radius: float) -> float:
+        depth, fall = profile(radius)
+        ratio = float(k1(radius / decay_mm) / k0(radius / decay_mm))
+        return fall - depth * ratio / decay_mm
+
+    first, last = 1e-9 * edge_mm, edge_mm * (1.0 - 1e-12)
+    if steeper(last) <= 0.0:
+        return edge_mm
+    if steeper(first) >= 0.0:
+        return 0.0
+    return float(brentq(steeper, first, last, xtol=1e-13))
+
+
+def free_profile(radius_mm: Array, contact_mm: float, depth_mm: float, decay_mm: float) -> Array:
+    """Return the depth outside a round contact: ``depth K0(r / lambda) / K0(b / lambda)``."""
+    if contact_mm <= 0.0:
+        return np.zeros_like(radius_mm)
+    return np.asarray(depth_mm * k0(radius_mm / decay_mm) / k0(contact_mm / decay_mm))
+
+
+@compiled
+def _sweep(
+    depth: Any, obstacle: Any, weight: float, relaxation: float
+) -> float:  # pragma: no cover - compiled
+    """One projected over-relaxed Gauss-Seidel sweep; returns the largest change."""
+    largest = 0.0
+    centre = 1.0 / (1.0 + 4.0 * weight)
+    for i in range(1, depth.shape[0] - 1):
+        for j in range(1, depth.shape[1] - 1):
+            around = depth[i - 1, j] + depth[i + 1, j] + depth[i, j - 1] + depth[i, j + 1]
+            old = depth[i, j]
+            new = old + relaxation * (weight * around * centre - old)
+            new = max(new, obstacle[i, j])
+            depth[i, j] = new
+            largest = max(largest, abs(new - old))
+    return largest
+
+
+@compiled
+def _relax(
+    depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float, most: int
+) -> int:  # pragma: no cover - compiled
+    for number in range(most):
+        if _sweep(depth, obstacle, weight, relaxation) < tolerance:
+            return number + 1
+    return most
+
+
+def solve_drape(
+    obstacle: Callable[[Array, Array], Array],
+    x_mm: Array,
+    y_mm: Array,
+    *,
+    decay_mm: float,
+    tolerance_mm: float = 2e-7,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Solve the obstacle problem on a grid whose border lies flat.
+
+    Projected successive over-relaxation, started from the same problem on grids of twice the pitch.
+
+    Parameters
+    ----------
+    obstacle : callable
+        (x_mm, y_mm) -> depth of the indenter; `NOWHERE_MM` beside it.
+    x_mm, y_mm : (columns,), (rows,)
+        Evenly spaced positions with one common pitch.
+    decay_mm : float
+        Decay length lambda.
+    tolerance_mm : float, optional
+        Largest change of the last sweep.
+
+    Returns
+    -------
+    depth_mm : (rows, columns)
+    contact : (rows, columns) bool
+    """
+    pitch = float(x_mm[1] - x_mm[0])
+    if min(x_mm.size, y_mm.size) > 2 * _COARSEST_CELLS:
+        coarse_x = np.arange(x_mm[0], x_mm[-1] + 2.0 * pitch, 2.0 * pitch)
+        coarse_y = np.arange(y_mm[0], y_mm[-1] + 2.0 * pitch, 2.0 * pitch)
+        coarse, _ = solve_drape(
+            obstacle, coarse_x, coarse_y, decay_mm=decay_mm, tolerance_mm=4.0 * tolerance_mm
+        )
+        depth = _between(coarse, y_mm.size, x_mm.size)
+    else:
+        depth = np.zeros((y_mm.size, x_mm.size))
+    shape = np.ascontiguousarray(obstacle(*np.meshgrid(x_mm, y_mm)), dtype=np.float64)
+    depth[0], depth[-1], depth[:, 0], depth[:, -1] = 0.0, 0.0, 0.0, 0.0
+    weight = (decay_mm / pitch) ** 2
+    radius = 4.0 * weight / (1.0 + 4.0 * weight)
+    # Young's optimal factor for the problem without the obstacle, which is the slower one.
+    relaxation = 2.0 / (1.0 + math.sqrt(1.0 - radius * radius))
+    _relax(depth, shape, weight, relaxation, tolerance_mm, _MOST_SWEEPS)
+    return depth, depth <= shape + 1e-9
+
+
+def _between(coarse: Array, rows: int, columns: int) -> Array:
+    """Return a grid of half the pitch, linear between the cells."""
+    fine = np.empty((2 * coarse.shape[0] - 1, 2 * coarse.shape[1] - 1))
+    fine[::2, ::2] = coarse
+    fine[1::2, ::2] = 0.5 * (coarse[1:] + coarse[:-1])
+    fine[:, 1::2] = 0.5 * (fine[:, 2::2] + fine[:, :-2:2])
+    return np.ascontiguousarray(fine[:rows, :columns])

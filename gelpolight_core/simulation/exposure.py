@@ -1,0 +1,54 @@
+"""From brightness to the camera's numbers: blur, crosstalk, noise, saturation, quantisation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from gelpolight_core.design.parts import CameraDesign
+
+Array = NDArray[np.float64]
+Frame = NDArray[np.uint8] | NDArray[np.uint16]
+
+
+def blurred(picture: Array, sigma_px: float) -> Array:
+    """Return the picture after the optics' Gaussian blur."""
+    if sigma_px <= 0.0:
+        return picture
+    sigma = (sigma_px, sigma_px) + (0.0,) * (picture.ndim - 2)
+    return np.asarray(gaussian_filter(picture, sigma, mode="nearest", truncate=5.0))
+
+
+def mixed(brightness: Array, crosstalk: tuple[tuple[float, ...], ...]) -> Array:
+    """Return camera channels (rows, columns, 3) from the lamps' shares (rows, columns, 3)."""
+    return np.asarray(brightness @ np.array(crosstalk).T)
+
+
+def exposed(
+    signal: Array, camera: CameraDesign, rng: np.random.Generator, *, averaged: int = 1
+) -> Frame:
+    """Return the camera's numbers for a signal.
+
+    Shot noise has the variance ``shot_variance * signal``, read noise ``read_sd ** 2``; averaging
+    frames divides both. What exceeds 1 saturates.
+
+    Parameters
+    ----------
+    signal : (rows, columns[, 3])
+        Linear light, 1 is full scale.
+    camera : CameraDesign
+        Noise and bit depth.
+    rng : Generator
+        Source of the noise.
+    averaged : int, optional
+        Number of frames averaged.
+    """
+    full = float(2**camera.bit_depth - 1)
+    variance = camera.shot_variance * np.maximum(signal, 0.0) + camera.read_sd**2
+    noise = rng.standard_normal(signal.shape, dtype=np.float32)
+    value = signal + noise * np.sqrt(variance / averaged)
+    whole = np.rint(full * np.clip(value, 0.0, 1.0))
+    if camera.bit_depth == 8:
+        return whole.astype(np.uint8)
+    return whole.astype(np.uint16)

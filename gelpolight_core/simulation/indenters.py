@@ -1,0 +1,278 @@
+"""What is pressed into the virtual sensor, and the surface that the membrane takes on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from gelpolight_core.simulation.drape import (
+    NOWHERE_MM,
+    contact_radius,
+    free_profile,
+    solve_drape,
+)
+from gelpolight_core.simulation.surface import PressedSurface
+
+Array = NDArray[np.float64]
+
+PITCH_MM = 0.025
+"""Default cell of a pressed surface: the size of a pixel of the default sensor's picture."""
+
+MARGIN_DECAYS = 8.0
+"""Room around an indenter in decay lengths: the depth has fallen to exp(-8) of its edge's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ball:
+    """A ball whose lowest point goes `depth_mm` deep."""
+
+    radius_mm: float
+    depth_mm: float
+
+    @property
+    def reach_mm(self) -> float:
+        """Radius of the circle that holds all of it that can touch."""
+        rest = max(self.radius_mm - self.depth_mm, 0.0)
+        return math.sqrt(self.radius_mm**2 - rest**2)
+
+    def profile(self, radius_mm: float) -> tuple[float, float]:
+        """Return (depth, fall per mm) at a distance from the axis."""
+        root = math.sqrt(max(self.radius_mm**2 - radius_mm**2, 1e-300))
+        return self.depth_mm - self.radius_mm + root, radius_mm / root
+
+    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+        """Return the ball's depth at points around its axis."""
+        inside = self.radius_mm**2 - x_mm**2 - y_mm**2
+        root = np.sqrt(np.maximum(inside, 0.0))
+        return np.where(inside > 0.0, self.depth_mm - self.radius_mm + root, NOWHERE_MM)
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """A flat-faced cylinder with a rounded edge."""
+
+    diameter_mm: float
+    depth_mm: float
+    edge_radius_mm: float = 0.05
+
+    @property
+    def reach_mm(self) -> float:
+        """Radius of the cylinder."""
+        return 0.5 * self.diameter_mm
+
+    def profile(self, radius_mm: float) -> tuple[float, float]:
+        """Return (depth, fall per mm) at a distance from the axis."""
+        drop, fall = _rounding(np.array(self.reach_mm - radius_mm), self.edge_radius_mm)
+        return self.depth_mm - float(drop), float(fall)
+
+    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+        """Return the cylinder's depth at points around its axis."""
+        inside = self.reach_mm - np.hypot(x_mm, y_mm)
+        drop, _ = _rounding(inside, self.edge_radius_mm)
+        return np.where(inside >= 0.0, self.depth_mm - drop, NOWHERE_MM)
+
+
+@dataclass(frozen=True, slots=True)
+class Cuboid:
+    """A flat-faced square block with rounded edges."""
+
+    side_mm: float
+    depth_mm: float
+    edge_radius_mm: float = 0.05
+
+    @property
+    def reach_mm(self) -> float:
+        """Half the side."""
+        return 0.5 * self.side_mm
+
+    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+        """Return the block's depth in its own frame."""
+        inside = self.reach_mm - np.maximum(np.abs(x_mm), np.abs(y_mm))
+        drop, _ = _rounding(inside, self.edge_radius_mm)
+        return np.where(inside >= -1e-9, self.depth_mm - drop, NOWHERE_MM)
+
+
+@dataclass(frozen=True, slots=True)
+class Relief:
+    """A shape given by heights, pressed until its highest point is `depth_mm` deep.
+
+    Attributes
+    ----------
+    height_mm : (rows, columns)
+        Above its base; NaN where there is no material.
+    pitch_mm : float
+        Distance between heights.
+    depth_mm : float
+        Of the highest point.
+    """
+
+    height_mm: Array
+    pitch_mm: float
+    depth_mm: float
+
+    @property
+    def reach_mm(self) -> float:
+        """Half the longer side."""
+        return 0.5 * self.pitch_mm * float(max(self.height_mm.shape) - 1)
+
+    def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
+        """Return the relief's depth around its middle."""
+        rows, columns = self.height_mm.shape
+        place = [
+            y_mm / self.pitch_mm + 0.5 * (rows - 1),
+            x_mm / self.pitch_mm + 0.5 * (columns - 1),
+        ]
+        missing = np.isnan(self.height_mm)
+        filled = np.where(missing, 0.0, self.height_mm)
+        height = map_coordinates(filled, place, order=1, mode="constant", cval=0.0)
+        gap = map_coordinates(missing.astype(float), place, order=1, mode="constant", cval=1.0)
+        depth = height - float(np.nanmax(self.height_mm)) + self.depth_mm
+        return np.where(gap > 1e-6, NOWHERE_MM, depth)
+
+
+Indenter = Ball | Cylinder | Cuboid | Relief
+
+
+def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
+    """Return how far a rounded edge has dropped at a distance inside the outline, and its slope."""
+    if edge_mm <= 0.0:
+        return np.zeros_like(inside_mm), np.zeros_like(inside_mm)
+    beyond = np.clip(edge_mm - inside_mm, 0.0, edge_mm)
+    root = np.sqrt(edge_mm**2 - beyond**2)
+    return edge_mm - root, beyond / np.maximum(root, 1e-12)
+
+
+def press(
+    indenter: Indenter,
+    *,
+    x_mm: float = 0.0,
+    y_mm: float = 0.0,
+    yaw_deg: float = 0.0,
+    decay_mm: float = 0.7,
+    pitch_mm: float = PITCH_MM,
+    margin_mm: float = 0.0,
+) -> PressedSurface:
+    """Return the membrane's surface under an indenter.
+
+    A shape with an axis is solved in closed form, any other on a grid in its own frame, which is
+    then turned.
+
+    Parameters
+    ----------
+    indenter : Ball, Cylinder, Cuboid or Relief
+        What is pressed.
+    x_mm, y_mm, yaw_deg : float, optional
+        Where, and how turned (from x to y).
+    decay_mm : float, optional
+        Decay length of the membrane.
+    pitch_mm : float, optional
+        Cell of the surface.
+    margin_mm : float, optional
+        Room around the indenter; at least as much as the membrane needs to come to rest.
+    """
+    margin = max(MARGIN_DECAYS * decay_mm, margin_mm)
+    turned = not isinstance(indenter, (Ball, Cylinder))
+    half = indenter.reach_mm * (_square_reach(yaw_deg) if turned else 1.0) + margin
+    xs, ys = _cells(x_mm, half, pitch_mm), _cells(y_mm, half, pitch_mm)
+    dx, dy = np.meshgrid(xs - x_mm, ys - y_mm)
+    if isinstance(indenter, (Ball, Cylinder)):
+        depth, contact = _round_drape(indenter, np.hypot(dx, dy), decay_mm)
+    else:
+        yaw = math.radians(yaw_deg)
+        along = dx * math.cos(yaw) + dy * math.sin(yaw)
+        across = dy * math.cos(yaw) - dx * math.sin(yaw)
+        depth, contact = _turned_drape(indenter, along, across, decay_mm, pitch_mm)
+    return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
+
+
+def _square_reach(yaw_deg: float) -> float:
+    yaw = math.radians(yaw_deg)
+    return abs(math.cos(yaw)) + abs(math.sin(yaw))
+
+
+def _cells(middle: float, half: float, pitch: float) -> Array:
+    """Return cells on whole multiples of the pitch, so that all surfaces share one lattice."""
+    first, last = math.floor((middle - half) / pitch), math.ceil((middle + half) / pitch)
+    return pitch * np.arange(first, last + 1, dtype=np.float64)
+
+
+def _round_drape(
+    indenter: Ball | Cylinder, radius: Array, decay_mm: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    contact_mm = contact_radius(indenter.profile, indenter.reach_mm, decay_mm)
+    contact = radius <= contact_mm
+    edge_depth, _ = indenter.profile(contact_mm)
+    outside = free_profile(np.maximum(radius, contact_mm), contact_mm, edge_depth, decay_mm)
+    zeros = np.zeros_like(radius)
+    return np.where(contact, indenter.obstacle(radius, zeros), outside), contact
+
+
+def _turned_drape(
+    indenter: Cuboid | Relief, along: Array, across: Array, decay_mm: float, pitch_mm: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Solve in the indenter's frame, then read the solution at turned positions."""
+    half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
+    # The outline falls on cells, so that the block has its nominal side.
+    count = math.ceil(half / pitch_mm)
+    step = indenter.reach_mm / max(1, round(indenter.reach_mm / pitch_mm))
+    cells = step * np.arange(-count, count + 1, dtype=np.float64)
+    depth, contact = solve_drape(indenter.obstacle, cells, cells, decay_mm=decay_mm)
+    place = [across / step + count, along / step + count]
+    turned = map_coordinates(depth, place, order=3, mode="constant", cval=0.0, prefilter=True)
+    touched = map_coordinates(contact.astype(np.float64), place, order=1, cval=0.0) > 0.5
+    return np.clip(turned, 0.0, indenter.depth_mm), touched
+
+
+def _heights(half_mm: float, pitch_mm: float, height: Callable[[Array, Array], Array]) -> Array:
+    count = math.ceil(half_mm / pitch_mm)
+    cells = pitch_mm * np.arange(-count, count + 1)
+    return height(*np.meshgrid(cells, cells))
+
+
+def _ramp(inside_mm: Array, width_mm: float) -> Array:
+    """Return 0 outside, 1 inside, with a smooth flank of a given width."""
+    t = np.clip(inside_mm / width_mm + 0.5, 0.0, 1.0)
+    return np.asarray(t * t * (3.0 - 2.0 * t))
+
+
+def coin(diameter_mm: float = 8.0, depth_mm: float = 0.6, *, pitch_mm: float = PITCH_MM) -> Relief:
+    """Return a coin with a raised rim, a ring of beads and a six-petalled flower."""
+    radius = 0.5 * diameter_mm
+    flank = 0.02 * diameter_mm
+
+    def height(x: Array, y: Array) -> Array:
+        r, angle = np.hypot(x, y), np.arctan2(y, x)
+        rim = _ramp(r - 0.88 * radius, flank)
+        petals = radius * (0.32 + 0.16 * np.cos(6.0 * angle))
+        flower = _ramp(petals - r, flank) * (0.7 + 0.3 * np.cos(math.pi * r / radius))
+        turn = np.mod(angle, math.radians(15.0)) - math.radians(7.5)
+        bead = np.hypot(r * np.cos(turn) - 0.72 * radius, r * np.sin(turn))
+        beads = np.sqrt(np.clip(1.0 - (bead / (0.045 * radius)) ** 2, 0.0, None))
+        relief = 0.45 + 0.15 * np.maximum(np.maximum(rim, flower), 0.7 * beads)
+        return np.where(r <= radius, relief, np.nan)
+
+    return Relief(_heights(radius, pitch_mm, height), pitch_mm, depth_mm)
+
+
+def nut(
+    across_flats_mm: float = 5.5, depth_mm: float = 0.8, *, pitch_mm: float = PITCH_MM
+) -> Relief:
+    """Return a hexagonal nut with a bevelled crown and a countersunk hole."""
+    flat = 0.5 * across_flats_mm
+    hole = 0.55 * flat
+
+    def height(x: Array, y: Array) -> Array:
+        r, angle = np.hypot(x, y), np.arctan2(y, x)
+        turn = np.mod(angle, math.radians(60.0)) - math.radians(30.0)
+        inside = flat - r * np.cos(turn)
+        # The crown's bevel is 30 degrees to the face, the countersink 45.
+        crown = math.tan(math.radians(30.0)) * np.clip(r - 0.95 * flat, 0.0, None)
+        sink = np.clip(1.15 * hole - r, 0.0, None)
+        return np.where((inside >= 0.0) & (r >= hole), 1.0 - crown - sink, np.nan)
+
+    return Relief(_heights(1.16 * flat, pitch_mm, height), pitch_mm, depth_mm)

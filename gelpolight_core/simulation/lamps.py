@@ -1,0 +1,94 @@
+"""The lights of the virtual sensor: small lamps close by, or parallel light from far away."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.design.sensor_design import SensorDesign
+
+Array = NDArray[np.float64]
+
+# Columns of the table that the compiled code reads.
+X, Y, Z, POWER, LOBE, RADIUS, PARALLEL = range(7)
+
+
+@dataclass(frozen=True, slots=True)
+class PointLamp:
+    """A small disc parallel to the top surface that radiates towards it.
+
+    Attributes
+    ----------
+    x_mm, y_mm, height_mm : float
+        Sensor frame; height below the top surface.
+    power : float
+        Irradiance on a facing surface at 1 mm on the lamp's axis.
+    lobe_exponent : float
+        Intensity goes as cos^exponent of the angle to the lamp's axis.
+    diameter_mm : float
+        Of the disc; gives shadows their soft edge.
+    """
+
+    x_mm: float
+    y_mm: float
+    height_mm: float
+    power: float = 1.0
+    lobe_exponent: float = 1.0
+    diameter_mm: float = 0.2
+
+    def row(self) -> tuple[float, ...]:
+        """Return the lamp as the compiled code reads it."""
+        radius = 0.5 * self.diameter_mm
+        return (
+            self.x_mm, self.y_mm, -self.height_mm, self.power, self.lobe_exponent, radius, 0.0
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class ParallelLamp:
+    """Parallel light, the "directional lighting" of earlier sensors (paper, Fig. 1a).
+
+    Attributes
+    ----------
+    azimuth_deg : float
+        Side of the sensor on which the light stands, from x to y.
+    elevation_deg : float
+        Between the light's direction and the top surface; 90: perpendicular to it.
+    power : float
+        Irradiance on a facing surface.
+    """
+
+    azimuth_deg: float
+    elevation_deg: float
+    power: float = 1.0
+
+    def row(self) -> tuple[float, ...]:
+        """Return the lamp as the compiled code reads it: x, y, z hold the unit direction to it."""
+        azimuth, elevation = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
+        flat = math.cos(elevation)
+        return (
+            flat * math.cos(azimuth), flat * math.sin(azimuth), -math.sin(elevation),
+            self.power, 0.0, 0.0, 1.0,
+        )  # fmt: skip
+
+
+Lamp = PointLamp | ParallelLamp
+
+
+def lamps_of(design: SensorDesign) -> tuple[PointLamp, ...]:
+    """Return the three lamps of a design."""
+    ring = design.ring
+    return tuple(
+        PointLamp(
+            led.x_mm, led.y_mm, led.height_mm, led.power, ring.lobe_exponent, ring.disc_diameter_mm
+        )
+        for led in design.leds
+    )
+
+
+def lamp_table(lamps: tuple[Lamp, ...]) -> Array:
+    """Return (lamps, 7) float64 for the compiled code."""
+    return np.array([lamp.row() for lamp in lamps], dtype=np.float64)

@@ -1,0 +1,261 @@
+"""Which point of the membrane a ray meets, and how much of a lamp that point sees.
+
+Both march over the depth map itself, so hidden walls, perspective and cast shadows come out of the
+geometry and not out of an approximation.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.simulation.compiled import compiled
+from gelpolight_core.simulation.surface import TILE
+
+Array = NDArray[np.float64]
+
+_ROOT_STEPS = 30
+_SHADOW_STEP = 0.7
+"""Marching step towards a lamp in cells: below one, so that no ridge is stepped over."""
+
+
+@compiled
+def sample(values: Any, column: float, row: float) -> float:  # pragma: no cover - compiled
+    """Return the bilinear value at a fractional cell; 0 outside the grid."""
+    rows, columns = values.shape
+    if not (0.0 <= column <= columns - 1.0 and 0.0 <= row <= rows - 1.0):
+        return 0.0
+    i, j = min(int(row), rows - 2), min(int(column), columns - 2)
+    a, b = row - i, column - j
+    top = values[i, j] + b * (values[i, j + 1] - values[i, j])
+    bottom = values[i + 1, j] + b * (values[i + 1, j + 1] - values[i + 1, j])
+    return float(top + a * (bottom - top))
+
+
+@compiled
+def tile_range(
+    tile_max: Any, tile_min: Any, first: Any, last: Any
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Return the highest and lowest depth over the tiles between two cells (column, row)."""
+    rows, columns = tile_max.shape
+    high, low = 0.0, 1e300
+    j0 = math.floor(min(first[0], last[0]) / TILE)
+    j1 = math.floor(max(first[0], last[0]) / TILE)
+    i0 = math.floor(min(first[1], last[1]) / TILE)
+    i1 = math.floor(max(first[1], last[1]) / TILE)
+    for i in range(i0, i1 + 1):
+        for j in range(j0, j1 + 1):
+            if 0 <= i < rows and 0 <= j < columns:
+                high, low = max(high, tile_max[i, j]), min(low, tile_min[i, j])
+            else:
+                low = 0.0
+    return high, min(low, high)
+
+
+@compiled
+def visible_depth(
+    depth: Any, tile_max: Any, tile_min: Any, deepest: float, cell: Any, move: Any
+) -> float:  # pragma: no cover - compiled
+    """Return the depth at which the ray of a pixel first meets the membrane.
+
+    Parameters
+    ----------
+    depth, tile_max, tile_min : arrays
+        Of the :class:`PressedSurface`.
+    deepest : float
+        Greatest depth of the whole surface.
+    cell : (column, row)
+        Where the ray would meet the undeformed surface.
+    move : (columns, rows)
+        How far the ray moves per mm of depth.
+    """
+    end = (cell[0] + deepest * move[0], cell[1] + deepest * move[1])
+    high, low = tile_range(tile_max, tile_min, cell, end)
+    if high - low < 1e-12:
+        return high
+    sideways = math.hypot(move[0], move[1])
+    count = max(1, math.ceil((high - low) * sideways))
+    step = (high - low) / count
+    above, below, f_above, f_below = high, low, 0.0, 0.0
+    # From the camera's side towards the membrane: the first crossing is what the camera sees.
+    for number in range(count + 1):
+        d = high - number * step
+        f = d - sample(depth, cell[0] + d * move[0], cell[1] + d * move[1])
+        if f <= 0.0:
+            below, f_below = d, f
+            break
+        above, f_above = d, f
+    if below >= above:
+        return below
+    for number in range(_ROOT_STEPS):
+        if above - below < 1e-9:
+            break
+        d = 0.5 * (above + below)
+        # Regula falsi is exact where the surface is straight; the guard keeps it from creeping.
+        guess = below - f_below * (above - below) / (f_above - f_below)
+        if number < 6 and above > guess > below:
+            d = guess
+        f = d - sample(depth, cell[0] + d * move[0], cell[1] + d * move[1])
+        if f > 0.0:
+            above, f_above = d, f
+        else:
+            below, f_below = d, f
+        if abs(f) < 1e-10:
+            return d
+    return 0.5 * (above + below)
+
+
+@compiled
+def steepest_horizon(
+    depth: Any, tile_max: Any, deepest: float, cell: Any, d: float, way: Any, rise: float
+) -> float:  # pragma: no cover - compiled
+    """Return the steepest slope, per cell, of what stands between a point and a lamp.
+
+    Parameters
+    ----------
+    depth, tile_max, deepest
+        Of the :class:`PressedSurface`.
+    cell : (column, row)
+        The point.
+    d : float
+        Its depth in mm.
+    way : (columns, rows)
+        Unit direction to the lamp's foot, in cells.
+    rise : float
+        Depth that a ray to the lamp's highest reach gains per cell of way.
+    """
+    steepest = -1e300
+    along = 1.0
+    rows, columns = tile_max.shape
+    while d + rise * along < deepest:
+        x, y = cell[0] + way[0] * along, cell[1] + way[1] * along
+        j, i = math.floor(x / TILE), math.floor(y / TILE)
+        if not (0 <= i < rows and 0 <= j < columns):
+            break
+        if tile_max[i, j] - d > along * max(rise, steepest):
+            slope = (sample(depth, x, y) - d) / along
+            steepest = max(steepest, slope)
+            along += _SHADOW_STEP
+        else:
+            along += _tile_exit(x, y, way, i, j)
+    return steepest
+
+
+@compiled
+def _tile_exit(
+    x: float, y: float, way: Any, i: int, j: int
+) -> float:  # pragma: no cover - compiled
+    """Return how far it is along `way` to leave tile (i, j)."""
+    far = 1e300
+    if way[0] > 1e-12:
+        far = min(far, ((j + 1) * TILE - x) / way[0])
+    elif way[0] < -1e-12:
+        far = min(far, (j * TILE - x) / way[0])
+    if way[1] > 1e-12:
+        far = min(far, ((i + 1) * TILE - y) / way[1])
+    elif way[1] < -1e-12:
+        far = min(far, (i * TILE - y) / way[1])
+    return far + 1e-6
+
+
+@compiled
+def disc_share(offset: float) -> float:  # pragma: no cover - compiled
+    """Return the share of a unit disc on the near side of a line at `offset` from its centre."""
+    if offset >= 1.0:
+        return 1.0
+    if offset <= -1.0:
+        return 0.0
+    return 0.5 + (offset * math.sqrt(1.0 - offset * offset) + math.asin(offset)) / math.pi
+
+
+@compiled
+def lamp_share(
+    depth: Any, tile_max: Any, grid: Any, point: Any, lamp: Any
+) -> float:  # pragma: no cover - compiled
+    """Return the share of a lamp's disc that a point of the membrane sees, 0..1.
+
+    Parameters
+    ----------
+    depth, tile_max
+        Of the :class:`PressedSurface`.
+    grid : (x0_mm, y0_mm, pitch_mm, deepest_mm)
+        Where the depth map lies.
+    point : (x_mm, y_mm, depth_mm)
+        The point.
+    lamp : (7,)
+        A row of the lamp table.
+    """
+    x0, y0, pitch, deepest = grid
+    d = point[2]
+    if d >= deepest:
+        return 1.0
+    if lamp[6] > 0.5:
+        away, rise_mm = math.hypot(lamp[0], lamp[1]), -lamp[2]
+        dx, dy, radius = lamp[0], lamp[1], 0.0
+    else:
+        dx, dy = lamp[0] - point[0], lamp[1] - point[1]
+        away, rise_mm, radius = math.hypot(dx, dy), -lamp[2] - d, lamp[5]
+    if rise_mm <= 0.0:
+        return 0.0
+    if away < 1e-9:
+        return 1.0
+    way = (dx / away, dy / away)
+    cell = ((point[0] - x0) / pitch, (point[1] - y0) / pitch)
+    slope = rise_mm / (away + radius)
+    steepest = steepest_horizon(depth, tile_max, deepest, cell, d, way, slope * pitch) / pitch
+    if steepest <= slope:
+        return 1.0
+    # The horizon cuts the lamp's plane at this distance; what lies beyond it is hidden.
+    cut = rise_mm / steepest
+    if radius <= 0.0:
+        return 0.0 if cut < away else 1.0
+    return disc_share((cut - away) / radius)
+
+
+@compiled
+def lit_share(
+    depth: Any, tile_max: Any, grid: Any, slopes: Any, lamps: Any
+) -> Any:  # pragma: no cover - compiled
+    """Return (rows, columns, lamps): the share of each lamp that the cells see.
+
+    A cell whose surface is turned away from a lamp does not see it.
+
+    Parameters
+    ----------
+    depth, tile_max, grid
+        As in :func:`lamp_share`.
+    slopes : (slope_x, slope_y)
+        Of the depth map.
+    lamps : (lamps, 7)
+        Lamp table.
+    """
+    rows, columns = depth.shape
+    share = np.zeros((rows, columns, lamps.shape[0]))
+    for i in range(rows):
+        for j in range(columns):
+            x, y, d = grid[0] + j * grid[2], grid[1] + i * grid[2], depth[i, j]
+            for k in range(lamps.shape[0]):
+                lamp = lamps[k]
+                lx, ly, lz = lamp[0], lamp[1], lamp[2]
+                if lamp[6] < 0.5:
+                    lx, ly, lz = lx - x, ly - y, lz + d
+                if -(slopes[0][i, j] * lx + slopes[1][i, j] * ly + lz) > 0.0:
+                    share[i, j, k] = lamp_share(depth, tile_max, grid, (x, y, d), lamp)
+    return share
+
+
+@compiled
+def _sample_all(values: Any, column: Any, row: Any) -> Any:  # pragma: no cover - compiled
+    out = np.zeros(column.shape)
+    for i in range(column.shape[0]):
+        for j in range(column.shape[1]):
+            out[i, j] = sample(values, column[i, j], row[i, j])
+    return out
+
+
+def sample_all(values: Array, column: Array, row: Array) -> Array:
+    """Return bilinear values at fractional cells (rows, columns); 0 outside the grid."""
+    return np.asarray(_sample_all(values, column, row))

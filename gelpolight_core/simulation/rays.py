@@ -1,0 +1,234 @@
+"""Camera rays of the virtual sensor, from a pixel through the layers to the top surface and back.
+
+Written for the simulation alone: the calibration has its own optics, so that a fault in either
+shows as a difference. In the sensor frame the layers are perpendicular to z, which makes the stack
+axially symmetric whatever its tilt; only the camera is turned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.design.parts import CameraDesign, LayerDesign
+
+Array = NDArray[np.float64]
+
+_NEWTON_STEPS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class RayTable:
+    """Where the ray of each pixel meets the flat top surface, and how it runs below.
+
+    Attributes
+    ----------
+    x_mm, y_mm : (rows, columns)
+        Point on the undeformed top surface, sensor frame.
+    slope_x, slope_y : (rows, columns)
+        Sideways move per mm of depth: the ray is at ``x_mm - depth * slope_x`` at a depth below the
+        top surface.
+    transmission : (rows, columns)
+        Share of the light that comes through all faces to the camera (Fresnel, unpolarised).
+    """
+
+    x_mm: Array
+    y_mm: Array
+    slope_x: Array
+    slope_y: Array
+    transmission: Array
+
+
+def pixel_directions(camera: CameraDesign, u: Array, v: Array) -> Array:
+    """Return camera-frame directions (x, y, 1) of pixels, lens distortion removed.
+
+    Parameters
+    ----------
+    camera : CameraDesign
+        Brown-Conrady lens.
+    u, v : (...)
+        Pixel coordinates.
+
+    Returns
+    -------
+    (..., 3)
+    """
+    xd, yd = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
+    k1, k2, p1, p2 = camera.distortion
+    x, y = xd.copy(), yd.copy()
+    if any(camera.distortion):
+        for _ in range(_NEWTON_STEPS):
+            r2 = x * x + y * y
+            radial = 1.0 + r2 * (k1 + r2 * k2)
+            slope = 2.0 * (k1 + 2.0 * k2 * r2)
+            ex = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) - xd
+            ey = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y - yd
+            j_xx = radial + slope * x * x + 2.0 * p1 * y + 6.0 * p2 * x
+            j_xy = slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y
+            j_yy = radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x
+            det = j_xx * j_yy - j_xy * j_xy
+            x -= (j_yy * ex - j_xy * ey) / det
+            y -= (j_xx * ey - j_xy * ex) / det
+    return np.stack([x, y, np.ones_like(x)], axis=-1)
+
+
+def project_to_pixels(camera: CameraDesign, points_mm: Array) -> Array:
+    """Return (..., 2) pixels of camera-frame points (..., 3) seen in air."""
+    x, y = points_mm[..., 0] / points_mm[..., 2], points_mm[..., 1] / points_mm[..., 2]
+    k1, k2, p1, p2 = camera.distortion
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * k2)
+    xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+    yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    return np.stack([camera.fx * xd + camera.cx, camera.fy * yd + camera.cy], axis=-1)
+
+
+def sensor_axes(layers: LayerDesign) -> Array:
+    """(3, 3) rows: the sensor's x, y, z axes in the camera frame."""
+    normal = layers.normal_camera
+    x_axis = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+    x_axis /= np.linalg.norm(x_axis)
+    return np.stack([x_axis, np.cross(normal, x_axis), normal])
+
+
+def camera_points(layers: LayerDesign, points_mm: Array) -> Array:
+    """Return sensor-frame points (..., 3) in the camera frame."""
+    moved = np.asarray(points_mm, dtype=np.float64) + np.array([0.0, 0.0, layers.top_distance_mm])
+    return np.asarray(moved @ sensor_axes(layers))
+
+
+def _steps(layers: LayerDesign, height_mm: Array | float) -> list[tuple[Array, float]]:
+    """(thickness, index) of what lies between the camera and a height below the top surface."""
+    elastomer, window = layers.elastomer_thickness_mm, layers.window_thickness_mm
+    in_elastomer = np.clip(elastomer - np.asarray(height_mm, dtype=np.float64), 0.0, None)
+    in_window = np.clip(elastomer + window - height_mm, 0.0, window)
+    in_air = np.minimum(layers.air_gap_mm, layers.top_distance_mm - height_mm)
+    return [
+        (in_air, 1.0),
+        (in_window, layers.window_refractive_index),
+        (in_elastomer, layers.elastomer_refractive_index),
+    ]
+
+
+def radius_through_layers(
+    layers: LayerDesign, sine_in_air: Array, *, height_mm: Array | float = 0.0
+) -> Array:
+    """Return the distance from the axis at which a ray reaches a height, after Snell at each face.
+
+    Parameters
+    ----------
+    layers : LayerDesign
+        The stack.
+    sine_in_air : (...)
+        Sine of the angle between the ray in air and the layers' normal.
+    height_mm : (...) or float, optional
+        Below the top surface; may lie in the elastomer, the window or the air.
+    """
+    total = np.zeros(np.shape(sine_in_air))
+    for thickness, index in _steps(layers, height_mm):
+        sine = sine_in_air / index
+        total = total + thickness * sine / np.sqrt(1.0 - sine * sine)
+    return total
+
+
+def project_through_layers(camera: CameraDesign, layers: LayerDesign, points_mm: Array) -> Array:
+    """Return the pixels at which points inside the stack are seen.
+
+    Solves the monotone radius equation for the sine in air by Newton's method with bisection.
+
+    Parameters
+    ----------
+    camera, layers : CameraDesign, LayerDesign
+        The sensor.
+    points_mm : (..., 3)
+        Sensor frame; z <= 0.
+
+    Returns
+    -------
+    (..., 2)
+        Pixels.
+    """
+    points = np.asarray(points_mm, dtype=np.float64)
+    radius = np.hypot(points[..., 0], points[..., 1])
+    low, high = np.zeros_like(radius), np.full_like(radius, 1.0 - 1e-12)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        beyond = radius_through_layers(layers, middle, height_mm=-points[..., 2]) > radius
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    sine = 0.5 * (low + high)
+    share = np.where(radius > 0.0, sine / np.where(radius > 0.0, radius, 1.0), 0.0)
+    direction = np.stack(
+        [points[..., 0] * share, points[..., 1] * share, np.sqrt(1.0 - sine * sine)], axis=-1
+    )
+    return project_to_pixels(camera, np.asarray(direction @ sensor_axes(layers)))
+
+
+def transmission(sine_in_air: Array, first_index: float, second_index: float) -> Array:
+    """Return the unpolarised Fresnel transmission of one face.
+
+    Parameters
+    ----------
+    sine_in_air : (...)
+        The invariant n sin(angle) of the ray.
+    first_index, second_index : float
+        Refractive indices on the two sides.
+    """
+    return 1.0 - reflection(sine_in_air, first_index, second_index)
+
+
+def reflection(invariant: Array, first_index: float, second_index: float) -> Array:
+    """Return the unpolarised Fresnel reflectance of one face; 1 beyond total reflection.
+
+    Parameters
+    ----------
+    invariant : (...)
+        n sin(angle), the same on both sides.
+    first_index, second_index : float
+        Refractive indices on the two sides.
+    """
+    cos_1 = np.sqrt(np.clip(1.0 - (invariant / first_index) ** 2, 0.0, None))
+    cos_2 = np.sqrt(np.clip(1.0 - (invariant / second_index) ** 2, 0.0, None))
+    across = (first_index * cos_1 - second_index * cos_2) / (
+        first_index * cos_1 + second_index * cos_2
+    )
+    along = (first_index * cos_2 - second_index * cos_1) / (
+        first_index * cos_2 + second_index * cos_1
+    )
+    return np.asarray(0.5 * (across * across + along * along))
+
+
+def trace_pixels(camera: CameraDesign, layers: LayerDesign) -> RayTable:
+    """Trace the ray of every pixel to the undeformed top surface.
+
+    Parameters
+    ----------
+    camera, layers : CameraDesign, LayerDesign
+        The sensor.
+
+    Returns
+    -------
+    RayTable
+        One entry per pixel; NaN where a ray never reaches the layers.
+    """
+    v, u = np.mgrid[: camera.height_px, : camera.width_px].astype(np.float64)
+    direction = pixel_directions(camera, u, v) @ sensor_axes(layers).T
+    sideways = np.hypot(direction[..., 0], direction[..., 1])
+    length = np.hypot(sideways, direction[..., 2])
+    sine = np.where(direction[..., 2] > 0.0, sideways / length, np.nan)
+    share = np.where(sideways > 0.0, 1.0 / np.where(sideways > 0.0, sideways, 1.0), 0.0)
+    unit_x, unit_y = direction[..., 0] * share, direction[..., 1] * share
+    radius = radius_through_layers(layers, sine)
+    inner = sine / layers.elastomer_refractive_index
+    slope = inner / np.sqrt(1.0 - inner * inner)
+    return RayTable(
+        unit_x * radius, unit_y * radius, unit_x * slope, unit_y * slope, _through(layers, sine)
+    )
+
+
+def _through(layers: LayerDesign, sine: Array) -> Array:
+    elastomer, window = layers.elastomer_refractive_index, layers.window_refractive_index
+    if layers.window_thickness_mm == 0.0:
+        return transmission(sine, 1.0, elastomer)
+    return transmission(sine, 1.0, window) * transmission(sine, window, elastomer)

@@ -1,0 +1,364 @@
+"""Write a complete calibration session of the virtual sensor, with its truth."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from gelpolight_core.design.parts import BallPress, Press
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.simulation.boards import board_views
+from gelpolight_core.simulation.drape import contact_radius
+from gelpolight_core.simulation.indenters import (
+    PITCH_MM,
+    Ball,
+    Cuboid,
+    Cylinder,
+    Indenter,
+    coin,
+    nut,
+    press,
+)
+from gelpolight_core.simulation.rays import camera_points
+from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.virtual_sensor import (
+    BareMembrane,
+    BoardOnTop,
+    Checkerboard,
+    Mirror,
+    PressedMembrane,
+    State,
+    VirtualSensor,
+    Whiteboard,
+)
+from gelpolight_core.translation import tr
+
+Progress = Callable[[float, str], None]
+
+AVERAGED = {
+    "checkerboard": 8,
+    "top_pose": 8,
+    "mirror": 8,
+    "whiteboard": 8,
+    "background": 8,
+    "balls": 1,
+    "presses": 1,
+}
+"""How many frames each stage's picture is the average of."""
+
+TRUTH_PITCH_MM = 0.05
+
+_BOARD_STAGES = ("checkerboard", "top_pose")
+_INNER_CORNERS = (9, 6)
+_VIEW_SQUARE_MM = 3.0
+_TOP_SQUARE_MM = 2.0
+_THREADS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class _Shot:
+    """One picture to be made."""
+
+    stage: str
+    file: str
+    make_state: Callable[[], State]
+    keeps_truth: bool = False
+
+
+def simulate_session(
+    design: SensorDesign,
+    out: Path,
+    *,
+    seed: int = 0,
+    scale: float = 1.0,
+    progress: Progress | None = None,
+) -> None:
+    """Write a session folder of the virtual sensor with ``truth.json`` and ``truth/*.npz``.
+
+    The folder holds 16 checkerboard views, the board on the top surface, mirror, whiteboard,
+    background, and the balls and presses of the design.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The sensor and what is pressed into it.
+    out : Path
+        Folder to be made; it must not exist, or be empty.
+    seed : int, optional
+        Of the membrane's pattern, the board's poses and the noise.
+    scale : float, optional
+        Size of the pictures; the geometry in mm stays.
+    progress : callable, optional
+        Called with the share done, 0..1, and the file just written; what it raises stops the work.
+
+    Raises
+    ------
+    InputError
+        If the folder holds files already, or the design does not hold together.
+    """
+    out = Path(out)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(
+            tr("there are files already"), where=str(out), advice=tr("Name a new folder")
+        )
+    sensor = VirtualSensor(design.scaled(scale), seed)
+    for stage in (*AVERAGED, "truth"):
+        (out / stage).mkdir(parents=True, exist_ok=True)
+    _write_texts(out, sensor)
+    shots = tuple(_shots(sensor))
+    with ThreadPoolExecutor(_THREADS) as pool:
+        jobs = [(shot, pool.submit(_take, sensor, shot, out)) for shot in shots]
+        try:
+            for number, (shot, job) in enumerate(jobs, start=1):
+                job.result()
+                if progress is not None:
+                    progress(number / len(jobs), f"{shot.stage}/{shot.file}")
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
+    design = sensor.design
+    # The dearest first, so that the last picture does not keep one thread waiting.
+    for name, item in zip(press_names(design.presses), design.presses, strict=True):
+        yield _Shot("presses", f"{name}.png", _press_maker(design, item), keeps_truth=True)
+    for number, ball in enumerate(design.balls):
+        yield _Shot("balls", f"ball_{number:02d}.png", _ball_maker(design, ball))
+    rng = np.random.default_rng([sensor.seed, 2])
+    poses = board_views(design.camera, rng, inner_corners=_INNER_CORNERS, square_mm=_VIEW_SQUARE_MM)
+    for number, pose in enumerate(poses):
+        state = Checkerboard(pose)
+        yield _Shot("checkerboard", f"view_{number:02d}.png", lambda state=state: state)  # type: ignore[misc]
+    yield _Shot("top_pose", "top_pose.png", BoardOnTop)
+    yield _Shot("mirror", "mirror.png", Mirror)
+    yield _Shot("whiteboard", "whiteboard.png", Whiteboard)
+    yield _Shot("background", "background.png", BareMembrane)
+
+
+def indenter_of(item: Press) -> Indenter:
+    """Return the shape that a design's press asks for."""
+    if item.shape == "cylinder":
+        return Cylinder(item.size_mm, item.depth_mm, item.edge_radius_mm)
+    if item.shape == "cuboid":
+        return Cuboid(item.size_mm, item.depth_mm, item.edge_radius_mm)
+    return (coin if item.shape == "coin" else nut)(item.size_mm, item.depth_mm)
+
+
+def press_names(presses: tuple[Press, ...]) -> tuple[str, ...]:
+    """Return a file name without suffix for each press; a repeated one gets a number."""
+    names: list[str] = []
+    for item in presses:
+        if item.shape in ("cylinder", "cuboid"):
+            name = f"{item.shape}_s{item.size_mm:g}_d{round(100 * item.depth_mm):03d}"
+        else:
+            name = f"object_{item.shape}"
+        repeat = sum(n == name or n.startswith(f"{name}_r") for n in names)
+        names.append(f"{name}_r{repeat + 1}" if repeat else name)
+    return tuple(names)
+
+
+def _press_maker(design: SensorDesign, item: Press) -> Callable[[], State]:
+    def make() -> State:
+        return PressedMembrane(
+            press(
+                indenter_of(item),
+                x_mm=item.x_mm,
+                y_mm=item.y_mm,
+                yaw_deg=item.yaw_deg,
+                decay_mm=design.membrane.decay_length_mm,
+                pitch_mm=_pitch(design),
+            )
+        )
+
+    return make
+
+
+def _ball_maker(design: SensorDesign, ball: BallPress) -> Callable[[], State]:
+    def make() -> State:
+        return PressedMembrane(
+            press(
+                Ball(ball.radius_mm, ball.depth_mm),
+                x_mm=ball.x_mm,
+                y_mm=ball.y_mm,
+                decay_mm=design.membrane.decay_length_mm,
+                pitch_mm=_pitch(design),
+            )
+        )
+
+    return make
+
+
+def _pitch(design: SensorDesign) -> float:
+    """Cell of the pressed surfaces: no finer than the pixels of the picture call for."""
+    pixel = design.layers.top_distance_mm / design.camera.fx
+    return max(PITCH_MM, 0.7 * pixel)
+
+
+def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:
+    state = shot.make_state()
+    averaged = AVERAGED[shot.stage]
+    frame = sensor.frame(state, averaged=averaged, stream=f"{shot.stage}/{shot.file}")
+    picture = frame[..., 0] if shot.stage in _BOARD_STAGES else frame[..., ::-1]
+    path = out / shot.stage / shot.file
+    done, data = cv2.imencode(".png", np.ascontiguousarray(picture))
+    if not done:
+        raise RuntimeError(f"OpenCV could not encode {path}")
+    path.write_bytes(data.tobytes())
+    if shot.keeps_truth and isinstance(state, PressedMembrane):
+        depth, contact, x0, y0 = truth_grid(state.surface)
+        np.savez_compressed(
+            out / "truth" / f"{path.stem}.npz",
+            depth_mm=depth,
+            contact=contact,
+            x0_mm=np.float64(x0),
+            y0_mm=np.float64(y0),
+            pitch_mm=np.float64(TRUTH_PITCH_MM),
+        )
+
+
+def truth_grid(
+    surface: PressedSurface,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_], float, float]:
+    """Return (depth_mm, contact, x0_mm, y0_mm) of a surface on the truth's coarser grid."""
+    step = TRUTH_PITCH_MM
+    columns = np.arange(
+        math.ceil(surface.x_mm[0] / step - 1e-9), math.floor(surface.x_mm[-1] / step + 1e-9) + 1
+    )
+    rows = np.arange(
+        math.ceil(surface.y_mm[0] / step - 1e-9), math.floor(surface.y_mm[-1] / step + 1e-9) + 1
+    )
+    place = np.meshgrid(
+        (rows * step - surface.y0_mm) / surface.pitch_mm,
+        (columns * step - surface.x0_mm) / surface.pitch_mm,
+        indexing="ij",
+    )
+    depth = map_coordinates(surface.depth_mm, place, order=1, mode="nearest")
+    contact = map_coordinates(surface.contact.astype(np.float32), place, order=1, mode="nearest")
+    return depth.astype(np.float32), contact > 0.5, float(columns[0] * step), float(rows[0] * step)
+
+
+def _write_texts(out: Path, sensor: VirtualSensor) -> None:
+    design = sensor.design
+    (out / "session.toml").write_text(session_toml(design), encoding="utf-8")
+    (out / "truth.json").write_text(json.dumps(truth_table(sensor), indent=1), encoding="utf-8")
+    with (out / "presses" / "truth.csv").open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["file", "shape", "diameter_mm", "side_mm", "height_mm"])
+        for name, item in zip(press_names(design.presses), design.presses, strict=True):
+            if item.shape in ("cylinder", "cuboid"):
+                size = [item.size_mm, ""] if item.shape == "cylinder" else ["", item.size_mm]
+                writer.writerow([f"{name}.png", item.shape, *size, item.depth_mm])
+
+
+def session_toml(design: SensorDesign) -> str:
+    """Return the session's description as the program reads it."""
+    layers = design.layers
+    balls = "\n".join(
+        f'"ball_{number:02d}.png" = {ball.radius_mm!r}' for number, ball in enumerate(design.balls)
+    )
+    corners = list(_INNER_CORNERS)
+    return f"""format = "gelpolight-session"
+version = 1
+
+[sensor]
+serial = {json.dumps(design.serial)}
+led_height_mm = {design.ring.nominal_height_mm!r}
+elastomer_thickness_mm = {layers.elastomer_thickness_mm!r}
+elastomer_refractive_index = {layers.elastomer_refractive_index!r}
+window_thickness_mm = {layers.window_thickness_mm!r}
+window_refractive_index = {layers.window_refractive_index!r}
+working_diameter_mm = {design.membrane.working_diameter_mm!r}
+
+[checkerboard]
+inner_corners = {corners}
+square_mm = {_VIEW_SQUARE_MM}
+
+[top_pose]
+inner_corners = {corners}
+square_mm = {_TOP_SQUARE_MM}
+
+[balls]
+{balls}
+"""
+
+
+def truth_table(sensor: VirtualSensor) -> dict[str, Any]:
+    """Return what the pictures were made from, as plain values for JSON."""
+    design = sensor.design
+    camera, layers, membrane = design.camera, design.layers, design.membrane
+    places = [
+        camera_points(layers, np.array([led.x_mm, led.y_mm, -led.height_mm])) for led in design.leds
+    ]
+    return {
+        "camera": {
+            "fx": camera.fx,
+            "fy": camera.fy,
+            "cx": camera.cx,
+            "cy": camera.cy,
+            "k1_k2_p1_p2": list(camera.distortion),
+        },
+        "top_plane": {
+            "normal_camera": layers.normal_camera.tolist(),
+            "offset_mm": layers.top_distance_mm,
+        },
+        "leds": {
+            name: {"camera_mm": place.tolist(), "relative_power": led.power}
+            for name, place, led in zip("RGB", places, design.leds, strict=True)
+        },
+        "crosstalk_camera_from_led": [list(row) for row in design.photometry.crosstalk],
+        "balls": [
+            {
+                "file": f"ball_{number:02d}.png",
+                "radius_mm": ball.radius_mm,
+                "depth_mm": ball.depth_mm,
+                "contact_radius_mm": _ball_contact(ball, membrane.decay_length_mm),
+                "centre_sensor_xy_mm": [ball.x_mm, ball.y_mm],
+            }
+            for number, ball in enumerate(design.balls)
+        ],
+        "membrane": {
+            "kind": "blend" if membrane.specular_weight > 0.0 else "diffuse",
+            "diffuse": membrane.diffuse_reflectance,
+            "spec_weight": membrane.specular_weight,
+            "alpha": membrane.roughness,
+            "spec_scale": membrane.specular_reflectance,
+            "rho_texture": membrane.variation > 0.0 or membrane.speck_count > 0,
+            "decay_length_mm": membrane.decay_length_mm,
+        },
+        "photometry": _photometry_table(sensor),
+        "transport": "direct light of the LEDs with cast shadows only",
+    }
+
+
+def _photometry_table(sensor: VirtualSensor) -> dict[str, Any]:
+    camera = sensor.design.camera
+    full = 2**camera.bit_depth - 1
+    signal = 200.0 / 255.0
+    sd = math.sqrt(camera.shot_variance * signal + camera.read_sd**2)
+    return {
+        "response": f"linear (gamma 1); value = {full}*linear",
+        "exposure_membrane": sensor.exposure,
+        "whiteboard_exposure_relative_to_membrane": 1.0,
+        "psf_gaussian_sigma_px": camera.blur_sigma_px,
+        "noise": {"shot_var_per_unit": camera.shot_variance, "read_sigma": camera.read_sd},
+        "snr_db_at_200": 20.0 * math.log10(signal / sd) if sd > 0.0 else None,
+        "averaged_frames": dict(AVERAGED),
+    }
+
+
+def _ball_contact(ball: BallPress, decay_mm: float) -> float:
+    shape = Ball(ball.radius_mm, ball.depth_mm)
+    return contact_radius(shape.profile, shape.reach_mm, decay_mm)

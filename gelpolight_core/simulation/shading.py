@@ -1,0 +1,260 @@
+"""Brightness of a membrane point under the lamps, and of the pixels that see it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, uniform_filter
+
+from gelpolight_core.design.parts import MembraneDesign
+from gelpolight_core.simulation.compiled import compiled
+from gelpolight_core.simulation.occlusion import lamp_share, sample, visible_depth
+from gelpolight_core.simulation.rays import RayTable
+from gelpolight_core.simulation.surface import PressedSurface
+
+Array = NDArray[np.float64]
+
+_ROUGH_SHARE = 0.002
+"""Departure from the neighbours' mean, as a share of the peak, that asks for more rays."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """How a surface throws light back.
+
+    Attributes
+    ----------
+    diffuse : float
+        Reflectance of the Lambertian share, its weight included.
+    specular : float
+        Reflectance at normal incidence of the metallic share, its weight included.
+    roughness : float
+        GGX alpha of the metallic share.
+    """
+
+    diffuse: float
+    specular: float = 0.0
+    roughness: float = 0.5
+
+    @classmethod
+    def of_membrane(cls, membrane: MembraneDesign) -> Material:
+        """Return the membrane of a design."""
+        weight = membrane.specular_weight
+        return cls(
+            (1.0 - weight) * membrane.diffuse_reflectance,
+            weight * membrane.specular_reflectance,
+            membrane.roughness,
+        )
+
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """The material as the compiled code reads it."""
+        return self.diffuse, self.specular, self.roughness
+
+
+@compiled
+def metallic_lobe(
+    n_l: float, n_v: float, n_h: float, v_h: float, alpha: float
+) -> float:  # pragma: no cover - compiled
+    """Return pi times the reflectance density of rough metal of unit reflectance.
+
+    Facets spread as GGX (Trowbridge-Reitz), masked and shadowed after Smith; the reflectance of a
+    metal rises to 1 at grazing incidence, which is left to the caller (`v_h` is passed for it).
+    """
+    a2 = alpha * alpha
+    spread = n_h * n_h * (a2 - 1.0) + 1.0
+    facets = a2 / (spread * spread)
+    seen = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_v * n_v) - 1.0)))
+    lit = 2.0 / (1.0 + math.sqrt(1.0 + a2 * (1.0 / (n_l * n_l) - 1.0)))
+    return facets * seen * lit / (4.0 * n_l * n_v)
+
+
+@compiled
+def point_brightness(
+    point: Any, normal: Any, to_camera: Any, lamp: Any, material: Any
+) -> float:  # pragma: no cover - compiled
+    """Return the brightness that one unobstructed lamp gives a point.
+
+    Irradiance falls as 1/r^2 times the lamp's lobe times the cosine at the surface; a Lambertian
+    surface of reflectance 1 has the brightness of its irradiance.
+    """
+    if lamp[6] > 0.5:
+        lx, ly, lz = lamp[0], lamp[1], lamp[2]
+        strength = lamp[3]
+    else:
+        lx, ly, lz = lamp[0] - point[0], lamp[1] - point[1], lamp[2] + point[2]
+        r2 = lx * lx + ly * ly + lz * lz
+        r = math.sqrt(r2)
+        lx, ly, lz = lx / r, ly / r, lz / r
+        if lz >= 0.0:
+            return 0.0
+        strength = lamp[3] * (-lz) ** lamp[4] / r2
+    n_l = normal[0] * lx + normal[1] * ly + normal[2] * lz
+    if n_l <= 0.0:
+        return 0.0
+    thrown = material[0]
+    n_v = normal[0] * to_camera[0] + normal[1] * to_camera[1] + normal[2] * to_camera[2]
+    if material[1] > 0.0 and n_v > 1e-6:
+        hx, hy, hz = lx + to_camera[0], ly + to_camera[1], lz + to_camera[2]
+        h = math.sqrt(hx * hx + hy * hy + hz * hz)
+        v_h = (to_camera[0] * hx + to_camera[1] * hy + to_camera[2] * hz) / h
+        n_h = (normal[0] * hx + normal[1] * hy + normal[2] * hz) / h
+        rise = (1.0 - v_h) ** 5
+        metal = material[1] * (1.0 + (1.0 / 0.91 - 1.0) * rise)
+        thrown += metal * metallic_lobe(n_l, n_v, n_h, v_h, material[2])
+    return float(strength * n_l * thrown)
+
+
+@compiled
+def _flat(
+    x: Any, y: Any, slope_x: Any, slope_y: Any, lamps: Any, material: Any
+) -> Any:  # pragma: no cover - compiled
+    rows, columns = x.shape
+    out = np.zeros((rows, columns, lamps.shape[0]))
+    for i in range(rows):
+        for j in range(columns):
+            sx, sy = slope_x[i, j], slope_y[i, j]
+            length = math.sqrt(1.0 + sx * sx + sy * sy)
+            view = (-sx / length, -sy / length, -1.0 / length)
+            for k in range(lamps.shape[0]):
+                out[i, j, k] = point_brightness(
+                    (x[i, j], y[i, j], 0.0), (0.0, 0.0, -1.0), view, lamps[k], material
+                )
+    return out
+
+
+def flat_brightness(rays: RayTable, lamps: Array, material: Material) -> Array:
+    """Return (rows, columns, lamps): the flat surface's brightness at each pixel, no losses."""
+    return np.asarray(
+        _flat(rays.x_mm, rays.y_mm, rays.slope_x, rays.slope_y, lamps, material.values)
+    )
+
+
+@compiled
+def _blend(table: Any, row: float, column: float) -> float:  # pragma: no cover - compiled
+    """Return a smooth per-pixel table between pixels, carried on straight past its border."""
+    i = min(max(math.floor(row), 0), table.shape[0] - 2)
+    j = min(max(math.floor(column), 0), table.shape[1] - 2)
+    a, b = row - i, column - j
+    top = table[i, j] + b * (table[i, j + 1] - table[i, j])
+    bottom = table[i + 1, j] + b * (table[i + 1, j + 1] - table[i + 1, j])
+    return float(top + a * (bottom - top))
+
+
+@compiled
+def _pressed(
+    out: Any, chosen: Any, rays: Any, surface: Any, grid: Any, factor: Any, lamps: Any,
+    material: Any, samples: int,
+) -> None:  # fmt: skip  # pragma: no cover - compiled
+    depth, slope_x, slope_y, tile_max, tile_min = surface
+    x0, y0, pitch, deepest = grid
+    factors, factor_x0, factor_pitch, rim = factor
+    share = 1.0 / (samples * samples)
+    value = np.zeros(lamps.shape[0])
+    for number in range(chosen.shape[0]):
+        i, j = chosen[number, 0], chosen[number, 1]
+        value[:] = 0.0
+        for part in range(samples * samples):
+            row = i + (part // samples + 0.5) / samples - 0.5
+            column = j + (part % samples + 0.5) / samples - 0.5
+            x, y = _blend(rays[0], row, column), _blend(rays[1], row, column)
+            sx, sy = _blend(rays[2], row, column), _blend(rays[3], row, column)
+            cell = ((x - x0) / pitch, (y - y0) / pitch)
+            move = (-sx / pitch, -sy / pitch)
+            d = visible_depth(depth, tile_max, tile_min, deepest, cell, move)
+            px, py = x - d * sx, y - d * sy
+            if px * px + py * py > rim * rim:
+                continue
+            at = ((px - x0) / pitch, (py - y0) / pitch)
+            gx, gy = sample(slope_x, at[0], at[1]), sample(slope_y, at[0], at[1])
+            length = math.sqrt(1.0 + gx * gx + gy * gy)
+            normal = (-gx / length, -gy / length, -1.0 / length)
+            length = math.sqrt(1.0 + sx * sx + sy * sy)
+            view = (-sx / length, -sy / length, -1.0 / length)
+            rho = sample(factors, (px - factor_x0) / factor_pitch,
+                         (py - factor_x0) / factor_pitch)  # fmt: skip
+            for k in range(lamps.shape[0]):
+                bright = point_brightness((px, py, d), normal, view, lamps[k], material)
+                if bright > 0.0:
+                    bright *= lamp_share(depth, tile_max, grid, (px, py, d), lamps[k])
+                value[k] += share * rho * bright
+        through = rays[4][i, j]
+        for k in range(lamps.shape[0]):
+            out[i, j, k] = value[k] * through
+
+
+def shade_pressed(
+    out: Array,
+    rays: RayTable,
+    surface: PressedSurface,
+    factors: tuple[Array, float, float, float],
+    lamps: Array,
+    material: Material,
+    *,
+    samples: int = 3,
+) -> None:
+    """Overwrite the pixels that see a pressed patch with what they see.
+
+    Parameters
+    ----------
+    out : (rows, columns, lamps)
+        Picture of the bare membrane, changed in place.
+    rays : RayTable
+        Rays of all pixels.
+    surface : PressedSurface
+        The patch.
+    factors : (map, first position in mm, pitch in mm, working radius in mm)
+        Reflectance factor over the membrane.
+    lamps : (lamps, 7)
+        Lamp table.
+    material : Material
+        Of the membrane.
+    samples : int, optional
+        Rays per pixel and side at edges; 1 is fastest.
+    """
+    deepest = float(surface.depth_mm.max(initial=0.0))
+    if deepest <= 0.0:
+        return
+    window = _seen_window(rays, surface, deepest)
+    if window is None:
+        return
+    rows, columns = window
+    chosen = np.argwhere(np.ones((rows.stop - rows.start, columns.stop - columns.start), bool))
+    corner = np.array([rows.start, columns.start])
+    parts = (
+        (rays.x_mm, rays.y_mm, rays.slope_x, rays.slope_y, rays.transmission),
+        (surface.depth_mm, surface.slope_x, surface.slope_y, surface.tile_max, surface.tile_min),
+        (surface.x0_mm, surface.y0_mm, surface.pitch_mm, deepest),
+        factors,
+        lamps,
+        material.values,
+    )
+    peak = float(out.max(initial=0.0))
+    _pressed(out, chosen + corner, *parts, 1)
+    if samples > 1:
+        rough = np.argwhere(_is_rough(out[window], _ROUGH_SHARE * peak))
+        _pressed(out, rough + corner, *parts, samples)
+
+
+def _is_rough(picture: Array, limit: float) -> NDArray[np.bool_]:
+    """Return where one ray per pixel is not enough: at edges of walls, shadows and specks."""
+    spread = np.abs(picture - uniform_filter(picture, size=(3, 3, 1), mode="nearest"))
+    return np.asarray(maximum_filter((spread > limit).any(axis=2), size=3), dtype=np.bool_)
+
+
+def _seen_window(
+    rays: RayTable, surface: PressedSurface, deepest: float
+) -> tuple[slice, slice] | None:
+    """Return the rows and columns of the pixels whose rays can meet the patch."""
+    reach = deepest * float(np.nanmax(np.hypot(rays.slope_x, rays.slope_y))) + surface.pitch_mm
+    x, y = surface.x_mm, surface.y_mm
+    meets = (rays.x_mm > x[0] - reach) & (rays.x_mm < x[-1] + reach)
+    meets &= (rays.y_mm > y[0] - reach) & (rays.y_mm < y[-1] + reach)
+    rows, columns = np.flatnonzero(meets.any(axis=1)), np.flatnonzero(meets.any(axis=0))
+    if rows.size == 0:
+        return None
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

@@ -1,0 +1,80 @@
+"""A pressed membrane as the virtual sensor keeps it: a depth map with tiles to skip empty space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
+
+Array = NDArray[np.float64]
+
+TILE = 16
+"""Side of a tile in cells; within it only the extremes are known while skipping."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressedSurface:
+    """Depth of the membrane on a regular grid; zero outside it.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns)
+        Indentation towards the camera.
+    contact : (rows, columns) bool
+        Where the indenter touches.
+    x0_mm, y0_mm : float
+        Position of the first cell's centre, sensor frame.
+    pitch_mm : float
+        Distance between cells.
+    """
+
+    depth_mm: Array
+    contact: NDArray[np.bool_]
+    x0_mm: float
+    y0_mm: float
+    pitch_mm: float
+    slope_x: Array = field(init=False, repr=False)
+    slope_y: Array = field(init=False, repr=False)
+    tile_max: Array = field(init=False, repr=False)
+    tile_min: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Derive slopes and tiles."""
+        depth = np.ascontiguousarray(self.depth_mm, dtype=np.float64)
+        slope_y, slope_x = np.gradient(depth, self.pitch_mm)
+        high, low = _tiles(depth)
+        values = {
+            "depth_mm": depth,
+            "slope_x": np.ascontiguousarray(slope_x),
+            "slope_y": np.ascontiguousarray(slope_y),
+            "tile_max": high,
+            "tile_min": low,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def x_mm(self) -> Array:
+        """(columns,) positions of the cells."""
+        return self.x0_mm + self.pitch_mm * np.arange(self.depth_mm.shape[1], dtype=np.float64)
+
+    @property
+    def y_mm(self) -> Array:
+        """(rows,) positions of the cells."""
+        return self.y0_mm + self.pitch_mm * np.arange(self.depth_mm.shape[0], dtype=np.float64)
+
+
+def _tiles(depth_mm: Array) -> tuple[Array, Array]:
+    """Return the highest and lowest depth of each tile and of its next cells."""
+    high = maximum_filter(depth_mm, size=3, mode="nearest")
+    low = minimum_filter(depth_mm, size=3, mode="nearest")
+    rows, columns = (-(-n // TILE) for n in depth_mm.shape)
+    room = ((0, rows * TILE - depth_mm.shape[0]), (0, columns * TILE - depth_mm.shape[1]))
+    high = np.pad(high, room, mode="edge").reshape(rows, TILE, columns, TILE)
+    low = np.pad(low, room, mode="edge").reshape(rows, TILE, columns, TILE)
+    return (
+        np.ascontiguousarray(high.max(axis=(1, 3))),
+        np.ascontiguousarray(low.min(axis=(1, 3))),
+    )

@@ -1,0 +1,234 @@
+"""The virtual sensor: shows what the camera would see in each state of a calibration session."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.design.sensor_design import SensorDesign, validate_design
+from gelpolight_core.simulation.boards import BoardPose, board_on_top, board_picture
+from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
+from gelpolight_core.simulation.lamps import Lamp, PointLamp, lamp_table, lamps_of
+from gelpolight_core.simulation.membrane import reflectance_factor
+from gelpolight_core.simulation.occlusion import sample_all
+from gelpolight_core.simulation.rays import (
+    camera_points,
+    pixel_directions,
+    project_to_pixels,
+    sensor_axes,
+    trace_pixels,
+)
+from gelpolight_core.simulation.shading import Material, flat_brightness, shade_pressed
+from gelpolight_core.simulation.surface import PressedSurface
+
+Array = NDArray[np.float64]
+
+_MIRROR_SAMPLES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Checkerboard:
+    """A checkerboard held before the camera, before anything is mounted."""
+
+    pose: BoardPose
+
+
+@dataclass(frozen=True, slots=True)
+class BoardOnTop:
+    """The small checkerboard on the sensor's top surface, before the elastomer is mounted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mirror:
+    """A flat mirror on the sensor's top surface, before the elastomer is mounted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Whiteboard:
+    """The diffuse standard pressed onto the bare elastomer."""
+
+
+@dataclass(frozen=True, slots=True)
+class BareMembrane:
+    """The finished sensor that nothing touches."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressedMembrane:
+    """The finished sensor with something pressed into it."""
+
+    surface: PressedSurface
+
+
+State = Checkerboard | BoardOnTop | Mirror | Whiteboard | BareMembrane | PressedMembrane
+
+
+class VirtualSensor:
+    """A sensor made of a design.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        What it is made of.
+    seed : int, optional
+        Of the membrane's pattern and of the noise; one seed gives one sequence of bytes.
+    lamps : tuple of PointLamp or ParallelLamp, optional
+        Other lights in place of the design's three LEDs.
+
+    Raises
+    ------
+    InputError
+        If the design does not hold together (see :func:`validate_design`).
+    """
+
+    def __init__(
+        self, design: SensorDesign, seed: int = 0, *, lamps: tuple[Lamp, ...] | None = None
+    ) -> None:
+        self.design = validate_design(design)
+        self.seed = seed
+        self.lamps = lamps_of(design) if lamps is None else lamps
+        self.material = Material.of_membrane(design.membrane)
+        self._table = lamp_table(self.lamps)
+        self._count = 0
+        self.rays = trace_pixels(design.camera, design.layers)
+        self.factors = reflectance_factor(
+            design.membrane, np.random.default_rng([seed, zlib.crc32(b"membrane")])
+        )
+        self.exposure = self._exposure()
+        self._cover = self._rim_cover()
+        self._membrane = self._flat(self.material) * self._factor_seen()[..., None]
+
+    def brightness(self, state: State, *, samples: int = 3) -> Array:
+        """Return the exact picture (rows, columns, 3), linear, before noise and saturation.
+
+        Parameters
+        ----------
+        state : State
+            What is before the camera.
+        samples : int, optional
+            Rays per pixel and side at the edges of what is pressed; 1 is fastest.
+        """
+        camera, photometry = self.design.camera, self.design.photometry
+        if isinstance(state, (Checkerboard, BoardOnTop)):
+            pose = state.pose if isinstance(state, Checkerboard) else self.top_pose
+            grey = blurred(board_picture(camera, pose), camera.blur_sigma_px)
+            return np.repeat(grey[..., None], 3, axis=2)
+        if isinstance(state, Mirror):
+            light = self._mirror() * photometry.mirror_peak
+        elif isinstance(state, Whiteboard):
+            light = self._flat(Material(photometry.whiteboard_reflectance)) * self.exposure
+        else:
+            light = self._membrane.copy()
+            if isinstance(state, PressedMembrane):
+                shade_pressed(
+                    light, self.rays, state.surface, self.factors, self._table, self.material,
+                    samples=samples,
+                )  # fmt: skip
+            light *= self.exposure
+        return blurred(mixed(light, photometry.crosstalk), camera.blur_sigma_px)
+
+    def frame(
+        self, state: State, *, averaged: int = 1, stream: str | None = None, samples: int = 3
+    ) -> Frame:
+        """Return what the camera delivers, (rows, columns, 3) in RGB order.
+
+        Parameters
+        ----------
+        state : State
+            What is before the camera.
+        averaged : int, optional
+            Number of frames that are averaged.
+        stream : str, optional
+            Name of the noise; the same name gives the same noise. Left out, each call gives the
+            next noise of the sensor's sequence.
+        samples : int, optional
+            Rays per pixel and side at the edges of what is pressed; 1 is fastest.
+        """
+        if stream is None:
+            self._count += 1
+            key = [self.seed, 0, self._count]
+        else:
+            key = [self.seed, 1, zlib.crc32(stream.encode())]
+        picture = self.brightness(state, samples=samples)
+        rng = np.random.default_rng(key)
+        if isinstance(state, (Checkerboard, BoardOnTop)):
+            grey = exposed(picture[..., 0], self.design.camera, rng, averaged=averaged)
+            return np.asarray(np.repeat(grey[..., None], 3, axis=2))
+        return exposed(picture, self.design.camera, rng, averaged=averaged)
+
+    @property
+    def top_pose(self) -> BoardPose:
+        """Where the small checkerboard lies on the top surface."""
+        return board_on_top(
+            self.design.layers, working_diameter_mm=self.design.membrane.working_diameter_mm
+        )
+
+    def _flat(self, material: Material) -> Array:
+        """Brightness of the flat top surface at each pixel, before exposure."""
+        light = flat_brightness(self.rays, self._table, material)
+        light *= (self.rays.transmission * self._cover)[..., None]
+        return np.nan_to_num(light)
+
+    def _rim_cover(self) -> Array:
+        """Share of each pixel that lies inside the working circle."""
+        rays, rim = self.rays, 0.5 * self.design.membrane.working_diameter_mm
+        radius = np.hypot(rays.x_mm, rays.y_mm)
+        pixel = np.hypot(*np.gradient(radius))
+        cover = np.clip((rim - radius) / np.maximum(pixel, 1e-9) + 0.5, 0.0, 1.0)
+        return np.asarray(np.nan_to_num(cover))
+
+    def _factor_seen(self) -> Array:
+        factor, first, pitch, _ = self.factors
+        rays = self.rays
+        column, row = (rays.x_mm - first) / pitch, (rays.y_mm - first) / pitch
+        return sample_all(factor, np.asarray(column), np.asarray(row))
+
+    def _exposure(self) -> float:
+        """Exposure at which the whiteboard's brightest point in the picture has its stated peak."""
+        photometry = self.design.photometry
+        rim = 0.5 * self.design.membrane.working_diameter_mm
+        rays = self.rays
+        light = flat_brightness(rays, self._table, Material(photometry.whiteboard_reflectance))
+        light *= rays.transmission[..., None]
+        inside = np.hypot(rays.x_mm, rays.y_mm) <= rim
+        seen = mixed(light[inside], photometry.crosstalk)
+        peak = float(seen.max(initial=0.0))
+        return photometry.whiteboard_peak / peak if peak > 0.0 else 1.0
+
+    def _mirror(self) -> Array:
+        """Picture of the lamps' mirror twins, an emitting disc of power 1 having brightness 1."""
+        camera, layers = self.design.camera, self.design.layers
+        out = np.zeros((camera.height_px, camera.width_px, len(self.lamps)))
+        rim = 0.5 * self.design.membrane.working_diameter_mm
+        for k, lamp in enumerate(self.lamps):
+            if not isinstance(lamp, PointLamp):
+                continue
+            twin = camera_points(layers, np.array([lamp.x_mm, lamp.y_mm, lamp.height_mm]))
+            u, v = project_to_pixels(camera, twin)
+            reach = 2 + math.ceil(camera.fx * lamp.diameter_mm / twin[2])
+            i0, j0 = max(0, round(v) - reach), max(0, round(u) - reach)
+            i1 = min(camera.height_px, round(v) + reach + 1)
+            j1 = min(camera.width_px, round(u) + reach + 1)
+            if i0 < i1 and j0 < j1:
+                out[i0:i1, j0:j1, k] = lamp.power * self._disc_share(lamp, (i0, i1, j0, j1), rim)
+        strongest = max((p.power for p in self.lamps), default=1.0)
+        return out / max(strongest, 1e-12)
+
+    def _disc_share(self, lamp: PointLamp, window: tuple[int, int, int, int], rim: float) -> Array:
+        """Share of each pixel of a window that shows the twin of a lamp's disc in the mirror."""
+        layers, n = self.design.layers, _MIRROR_SAMPLES
+        i0, i1, j0, j1 = window
+        v = i0 - 0.5 + (np.arange((i1 - i0) * n) + 0.5) / n
+        u = j0 - 0.5 + (np.arange((j1 - j0) * n) + 0.5) / n
+        directions = pixel_directions(self.design.camera, *np.meshgrid(u, v))
+        ray = directions @ sensor_axes(layers).T
+        slope_x, slope_y = ray[..., 0] / ray[..., 2], ray[..., 1] / ray[..., 2]
+        total = layers.top_distance_mm + lamp.height_mm
+        hit = np.hypot(slope_x * total - lamp.x_mm, slope_y * total - lamp.y_mm)
+        on_mirror = np.hypot(slope_x, slope_y) * layers.top_distance_mm <= rim
+        share = ((hit <= 0.5 * lamp.diameter_mm) & on_mirror).astype(np.float64)
+        return np.asarray(share.reshape(i1 - i0, n, j1 - j0, n).mean(axis=(1, 3)))

@@ -1,0 +1,146 @@
+#!/bin/sh
+# Makes .venv in the checkout: the locked libraries by their hashes, then the project itself, editable.
+#
+#     sh packaging/setup.sh run     what the program needs
+#     sh packaging/setup.sh test    that, and what the checks and tests need
+#
+# Safe to run again; quick when nothing has changed. PYTHON=/path/to/python chooses another Python.
+# What the system lacks is installed with apt-get, as root or by sudo, and only when it is missing.
+set -eu
+cd "$(dirname "$0")/.."
+
+kind=${1:-run}
+case $kind in
+run) lock=packaging/requirements.lock ;;
+test) lock=packaging/requirements-dev.lock ;;
+*)
+    echo "packaging/setup.sh: unknown argument \"$kind\"; use run or test." >&2
+    exit 2
+    ;;
+esac
+
+venv=.venv
+libraries_stamp=$venv/gelpolight-libraries # "run HASH" or "test HASH": written when all of them are in
+project_stamp=$venv/gelpolight-project
+trusted_authorities=/etc/ssl/certs/ca-certificates.crt
+step="looking at this machine"
+
+explain_failure() {
+    [ "$1" -eq 0 ] || echo "The set-up failed while $step: see above. It can be run again as it is." >&2
+}
+trap 'explain_failure $?' EXIT
+
+stop() {
+    echo "$1" >&2
+    trap - EXIT
+    exit 2
+}
+
+begin() {
+    step=$1
+    echo "Set-up: $1."
+}
+
+# Python 3.11, 3.12 or 3.13, 64 bit: what the locked libraries are built for.
+fits() { # PYTHON
+    "$1" -c 'import sys; sys.exit(not ((3, 11) <= sys.version_info[:2] < (3, 14) and sys.maxsize > 2**32))' \
+        >/dev/null 2>&1
+}
+
+makes_environments() { # PYTHON
+    "$1" -c 'import ensurepip, venv' >/dev/null 2>&1
+}
+
+# The first fitting Python that can make an environment; else the first that fits, to be completed by apt-get.
+choose_python() {
+    python=
+    if [ -n "${PYTHON:-}" ]; then set -- "$PYTHON"; else set -- python3 python3.11 python3.12 python3.13; fi
+    for candidate in "$@"; do
+        fits "$candidate" || continue
+        if makes_environments "$candidate"; then
+            python=$candidate
+            return
+        fi
+        python=${python:-$candidate}
+    done
+    [ -n "$python" ] || stop "No 64-bit Python 3.11, 3.12 or 3.13 was found${PYTHON:+ as $PYTHON}; install one\
+ (on Debian 12: apt-get install python3 python3-venv), or name it with PYTHON=/path/to/python, and run this again."
+}
+
+install_packages() { # PACKAGE...
+    command -v apt-get >/dev/null 2>&1 ||
+        stop "This machine lacks what Debian packages as: $*. There is no apt-get here; install them and run this again."
+    if [ "$(id -u)" -eq 0 ]; then
+        as_root=
+    elif command -v sudo >/dev/null 2>&1; then
+        as_root=sudo
+    else
+        stop "These system packages are missing: $*. Ask an administrator for \"apt-get install $*\" and run this again."
+    fi
+    begin "installing the system packages $*"
+    $as_root apt-get update -qq
+    $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+install_what_the_system_lacks() {
+    set --
+    if ! makes_environments "$python"; then
+        set -- "$("$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"
+    fi
+    # Without it no download can be verified. Systems that keep it elsewhere have no apt-get.
+    if command -v apt-get >/dev/null 2>&1 && [ ! -s "$trusted_authorities" ]; then
+        set -- "$@" ca-certificates
+    fi
+    [ $# -eq 0 ] || install_packages "$@"
+    makes_environments "$python" ||
+        stop "$python cannot make environments (venv and ensurepip are missing); install them, or name another Python\
+ with PYTHON=/path/to/python, and run this again."
+}
+
+make_environment() {
+    choose_python
+    install_what_the_system_lacks
+    if [ -e "$venv" ]; then
+        begin "removing the unfinished or outdated $venv"
+        rm -rf "$venv"
+    fi
+    begin "making $venv with $("$python" --version 2>&1)"
+    "$python" -m venv "$venv"
+}
+
+pip() {
+    "$venv/bin/python" -m pip --disable-pip-version-check --no-input "$@"
+}
+
+hash_of() { # FILE...: together with where the environment stands, which it cannot survive being moved from
+    { pwd -P && cat "$@"; } | sha256sum | cut -d ' ' -f 1
+}
+
+# One set of versions in both locks, so that the test environment also serves the program.
+libraries=$(hash_of packaging/requirements.lock packaging/requirements-dev.lock)
+project=$(hash_of pyproject.toml)
+found=
+if fits "$venv/bin/python" && [ -f "$libraries_stamp" ]; then
+    found=$(cat "$libraries_stamp")
+fi
+if [ -n "${PYTHON:-}" ] && [ -n "$found" ]; then
+    version='import sys; print(sys.version_info[:2])'
+    [ "$("$venv/bin/python" -c "$version")" = "$("$PYTHON" -c "$version")" ] || found=
+fi
+
+if [ "$found" != "$kind $libraries" ] && [ "$found" != "test $libraries" ]; then
+    # Adding the tests' libraries to a whole environment is safe; everything else starts afresh.
+    [ "$found" = "run $libraries" ] || make_environment
+    rm -f "$libraries_stamp"
+    begin "installing the libraries of $lock (the first time, some minutes)"
+    pip install --quiet --require-hashes --only-binary :all: --requirement "$lock"
+    echo "$kind $libraries" >"$libraries_stamp"
+fi
+
+if [ "$(cat "$project_stamp" 2>/dev/null)" != "$project" ] || [ ! -x "$venv/bin/gelpolight" ]; then
+    begin "installing the project into $venv"
+    pip install --quiet --no-deps --no-build-isolation --no-index --editable .
+    echo "$project" >"$project_stamp"
+fi
+step="finishing"
+echo "Set-up: $venv is ready."

@@ -1,0 +1,32 @@
+#!/bin/sh
+# Passes every check and test, from a bare machine on: sh packaging/test.sh [PYTEST-OPTION...]
+set -eu
+cd "$(dirname "$0")/.."
+sh packaging/setup.sh test
+
+failed=
+check() { # NAME COMMAND...
+    name=$1
+    shift
+    echo
+    echo "== $name"
+    started=$(date +%s)
+    if "$@"; then verdict=passed; else
+        verdict=FAILED
+        failed="$failed, $name"
+    fi
+    echo "== $name $verdict in $(($(date +%s) - started)) s"
+}
+
+check "code style" .venv/bin/python -m ruff check .
+check "formatting" .venv/bin/python -m ruff format --check .
+check "types of the core" .venv/bin/python -m mypy --strict
+check "import contracts" .venv/bin/lint-imports
+check "tests" .venv/bin/python -m pytest "$@"
+
+echo
+if [ -n "$failed" ]; then
+    echo "Failed: ${failed#, }" >&2
+    exit 1
+fi
+echo "All checks and tests passed."

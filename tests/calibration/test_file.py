@@ -1,0 +1,120 @@
+"""The calibration file: nothing lost, nothing half-read, nothing believed unchecked."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scene
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.calibration.file import MANIFEST, read_calibration, write_calibration
+from gelpolight_core.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a good calibration file."""
+    path = tmp_path_factory.mktemp("calibration") / "good.gplcal"
+    write_calibration(scene.calibration(), path)
+    return path
+
+
+def test_every_number_comes_back(whole: Path) -> None:
+    before, after = scene.calibration(), read_calibration(whole)
+    assert after.identity == before.identity
+    assert (after.sensor, after.camera, after.plane) == (before.sensor, before.camera, before.plane)
+    assert after.quality == before.quality
+    assert after.provenance == before.provenance
+    np.testing.assert_array_equal(after.radiance, before.radiance)
+    np.testing.assert_array_equal(after.factors, before.factors)
+    np.testing.assert_array_equal(after.led_positions_mm, before.led_positions_mm)
+    np.testing.assert_array_equal(after.table.u_px, before.table.u_px)
+    assert after.radiance.dtype == np.float32
+
+
+def test_the_same_calibration_is_the_same_file(whole: Path, tmp_path: Path) -> None:
+    write_calibration(read_calibration(whole), tmp_path / "again.gplcal")
+    assert (tmp_path / "again.gplcal").read_bytes() == whole.read_bytes()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_a_truncated_or_altered_file_is_refused_or_the_same(
+    whole: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    content = bytearray(whole.read_bytes())
+    place = data.draw(st.integers(0, len(content) - 1))
+    if data.draw(st.booleans()):
+        content = content[:place]
+    else:
+        content[place] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.mktemp("damaged") / "c.gplcal"
+    path.write_bytes(content)
+    try:
+        read = read_calibration(path)
+    except InputError as refusal:
+        assert str(path) in str(refusal)
+    else:
+        assert read.identity == scene.calibration().identity
+
+
+def rewritten(whole: Path, target: Path, change: dict[str, object]) -> Path:
+    """Return a copy whose manifest was changed and whose checksum was made anew by the forger."""
+    import hashlib
+
+    with zipfile.ZipFile(whole) as old, zipfile.ZipFile(target, "w") as new:
+        manifest = json.loads(old.read(MANIFEST))
+        manifest.update(change)
+        text = json.dumps(manifest).encode()
+        for name in old.namelist():
+            data = old.read(name)
+            if name == MANIFEST:
+                data = text
+            elif name == f"{MANIFEST}.sha256":
+                data = hashlib.sha256(text).hexdigest().encode()
+            new.writestr(name, data)
+    return target
+
+
+def test_a_newer_version_is_refused_by_name(whole: Path, tmp_path: Path) -> None:
+    path = rewritten(whole, tmp_path / "new.gplcal", {"version": 99})
+    with pytest.raises(InputError, match="version 99"):
+        read_calibration(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"model": "guess"},
+        {"camera": {"width": 320}},
+        {"plane": {"normal_camera": [0, 0, 5], "distance_mm": 39}},
+        {"plane": {"normal_camera": [0, 0, 1], "distance_mm": 1e300}},
+        {"sensor": None},
+        {"arrays": {}},
+        {"arrays": {"radiance": {"shape": [10**6, 10**6, 3], "kind": "<f8", "sha256": ""}}},
+        {"arrays": {"radiance": {"shape": [1], "kind": "|O", "sha256": ""}}},
+        {"quality": [1, 2]},
+    ],
+)
+def test_a_forged_manifest_is_refused(
+    whole: Path, tmp_path: Path, change: dict[str, object]
+) -> None:
+    with pytest.raises(InputError):
+        read_calibration(rewritten(whole, tmp_path / "forged.gplcal", change))
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.gplcal", tmp_path):
+        with pytest.raises(InputError, match="no such file"):
+            read_calibration(path)
+
+
+def test_a_calibration_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        write_calibration(scene.calibration(), tmp_path / "no" / "such" / "c.gplcal")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,143 @@
+"""What a user relies on when a file is written: it is there whole, or as it was before."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import make_folder, write_atomically
+
+
+def half_then(fault: BaseException) -> Callable[[BinaryIO], None]:
+    """Return a writer that fails midway."""
+
+    def writer(file: BinaryIO) -> None:
+        file.write(b"half a file")
+        file.flush()
+        raise fault
+
+    return writer
+
+
+def test_the_new_file_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
+    path = tmp_path / "press.npz"
+    write_atomically(path, lambda file: file.write(b"old"))
+    write_atomically(path, lambda file: file.write(b"new"))
+    assert path.read_bytes() == b"new"
+    assert os.listdir(tmp_path) == ["press.npz"]
+
+
+@pytest.mark.parametrize(
+    "fault", [ValueError("a fault of ours"), KeyboardInterrupt(), OSError(errno.ENOSPC, "full")]
+)
+@pytest.mark.parametrize("old", [b"old", None])
+def test_a_writer_that_fails_midway_leaves_all_as_it_was(
+    tmp_path: Path, fault: BaseException, old: bytes | None
+) -> None:
+    path = tmp_path / "press.npz"
+    if old is not None:
+        path.write_bytes(old)
+    expected = InputError if isinstance(fault, OSError) else type(fault)
+    with pytest.raises(expected):
+        write_atomically(path, half_then(fault))
+    assert (path.read_bytes() if path.exists() else None) == old
+    assert os.listdir(tmp_path) == (["press.npz"] if old else [])
+
+
+def test_the_old_file_is_whole_while_the_new_one_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "press.npz"
+    path.write_bytes(b"old")
+
+    def writer(file: BinaryIO) -> None:
+        file.write(b"new, ")
+        file.flush()
+        assert path.read_bytes() == b"old"
+        file.seek(0)
+        file.write(b"New")
+
+    write_atomically(path, writer)
+    assert path.read_bytes() == b"New, "
+
+
+@pytest.mark.parametrize(
+    ("number", "found"),
+    [
+        (errno.ENOSPC, "disk is full"),
+        (errno.EACCES, "no permission"),
+        (errno.EPERM, "no permission"),
+        (errno.EROFS, "only be read"),
+        (errno.EIO, "cannot be written"),
+    ],
+)
+def test_a_disk_that_refuses_is_told_in_plain_words(
+    tmp_path: Path, number: int, found: str
+) -> None:
+    path = tmp_path / "press.npz"
+    with pytest.raises(InputError) as caught:
+        write_atomically(path, half_then(OSError(number, os.strerror(number))))
+    assert found in caught.value.found
+    assert caught.value.where == str(path)
+    assert caught.value.advice
+
+
+def test_a_real_full_disk_is_told_in_plain_words(tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("this system has no /dev/full")
+
+    def writer(file: BinaryIO) -> None:
+        with full.open("wb", buffering=0) as device:
+            device.write(b"too much")
+
+    with pytest.raises(InputError, match="disk is full"):
+        write_atomically(tmp_path / "press.npz", writer)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_missing_folder_and_a_file_in_its_place_are_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputError, match="does not exist"):
+        write_atomically(tmp_path / "nowhere" / "a.npz", lambda file: None)
+    with pytest.raises(InputError, match="where a folder should be"):
+        write_atomically(tmp_path / "file" / "a.npz", lambda file: None)
+    with pytest.raises(InputError, match="where the file should be"):
+        write_atomically(tmp_path / "folder", lambda file: None)
+    with pytest.raises(InputError, match="where a folder should be"):
+        make_folder(tmp_path / "file")
+    with pytest.raises(InputError, match="name is too long"):
+        make_folder(tmp_path / ("x" * 300))
+    assert sorted(os.listdir(tmp_path)) == ["file", "folder"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_colleagues_can_read_the_file_as_any_other(tmp_path: Path) -> None:
+    ordinary, ours = tmp_path / "ordinary", tmp_path / "ours"
+    ordinary.write_bytes(b"")
+    write_atomically(ours, lambda file: None)
+    assert stat.S_IMODE(ours.stat().st_mode) == stat.S_IMODE(ordinary.stat().st_mode)
+    ours.chmod(0o640)
+    write_atomically(ours, lambda file: None)
+    assert stat.S_IMODE(ours.stat().st_mode) == 0o640
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").write_bytes(b"old")
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    write_atomically(tmp_path / "link", lambda file: file.write(b"new"))
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_bytes() == b"new"
+
+
+def test_folders_are_made_with_those_above_them(tmp_path: Path) -> None:
+    make_folder(tmp_path / "a" / "b")
+    make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()

@@ -1,0 +1,326 @@
+"""What a user relies on when a height map goes to another program."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import tifffile
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.export.mesh import mesh_of
+from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, Flag, HeightMap
+
+ROWS, COLUMNS, PITCH_MM = 17, 23, 0.125
+
+
+@pytest.fixture
+def heightmap() -> HeightMap:
+    """Return an uneven dent, off the middle, in a working area that is not the whole grid."""
+    x_mm = -1.25 + PITCH_MM * np.arange(COLUMNS)
+    y_mm = -0.75 + PITCH_MM * np.arange(ROWS)
+    x, y = np.meshgrid(x_mm, y_mm)
+    depth = 0.4 * np.exp(-((x - 0.2) ** 2) / 0.9 - (y - 0.1) ** 2 / 0.4)
+    slopes = np.stack([-2 * (x - 0.2) / 0.9 * depth, -2 * (y - 0.1) / 0.4 * depth], axis=-1)
+    normals = np.concatenate([-slopes, -np.ones((ROWS, COLUMNS, 1))], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    flags = np.where(np.hypot(x, y) > 1.2, Flag.OUTSIDE.value, 0).astype(np.uint8)
+    flags[5, 7] |= Flag.DARK.value | Flag.EXTRAPOLATED.value
+    return HeightMap(
+        depth_mm=depth.astype(np.float32),
+        x_mm=x_mm,
+        y_mm=y_mm,
+        pitch_mm=PITCH_MM,
+        normals=normals.astype(np.float32),
+        flags=flags,
+        calibration_id="A-001 <2> & µ",
+        model="full",
+        source="press_03.png",
+    )
+
+
+def write_one(heightmap: HeightMap, folder: Path, name: str, **options: int) -> Path:
+    """Write one format and return the file."""
+    (path,) = write_heightmap(heightmap, folder, formats=[name], **options)
+    return path
+
+
+def test_one_file_per_format_named_after_the_picture(tmp_path: Path, heightmap: HeightMap) -> None:
+    folder = tmp_path / "new" / "folder"
+    paths = write_heightmap(heightmap, folder, formats=["tif", "npz"])
+    assert paths == [folder / "press_03.tif", folder / "press_03.npz"]
+    write_heightmap(heightmap, folder, formats=FORMATS)
+    assert sorted(os.listdir(folder)) == sorted(f"press_03.{name}" for name in FORMATS)
+
+
+def test_npz_holds_everything_without_pickles(tmp_path: Path, heightmap: HeightMap) -> None:
+    with np.load(write_one(heightmap, tmp_path, "npz"), allow_pickle=False) as found:
+        assert found["depth_mm"].dtype == np.float32
+        assert found["flags"].dtype == np.uint8
+        for name in ("depth_mm", "x_mm", "y_mm", "normals", "flags"):
+            assert np.array_equal(found[name], getattr(heightmap, name))
+        assert float(found["pitch_mm"]) == PITCH_MM
+        for name in ("calibration_id", "model", "source"):
+            assert str(found[name]) == getattr(heightmap, name)
+        bits = dict(entry.split("=") for entry in found["flag_names"].tolist())
+    assert {name: int(bit) for name, bit in bits.items()} == dict(FLAG_NAMES)
+    assert bits["dark"] == "4"
+
+
+def test_npz_leaves_normals_out_where_there_are_none(tmp_path: Path, heightmap: HeightMap) -> None:
+    with np.load(write_one(replace(heightmap, normals=None), tmp_path, "npz")) as found:
+        assert "normals" not in found.files
+
+
+def test_tiff_is_read_by_other_programs_with_its_scale(
+    tmp_path: Path, heightmap: HeightMap
+) -> None:
+    path = write_one(heightmap, tmp_path, "tif")
+    depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert depth.dtype == np.float32
+    assert np.array_equal(depth, heightmap.depth_mm)
+    with tifffile.TiffFile(path) as tiff:
+        (page,) = tiff.pages
+        tags = {name: page.tags[name].value for name in ("XResolution", "YResolution")}
+        assert page.tags["ResolutionUnit"].value == 3  # centimetre
+        about = json.loads(page.description)
+    for over, under in tags.values():
+        assert over / under == pytest.approx(10 / PITCH_MM, rel=1e-6)
+    assert about["unit"] == "mm"
+    assert (about["pitch_mm"], about["x0_mm"], about["y0_mm"]) == (PITCH_MM, -1.25, -0.75)
+    assert about["calibration_id"] == heightmap.calibration_id
+
+
+@pytest.mark.parametrize("extra", ["", "x", "xx", "xxx", "line\nbreak\0 = 3"])
+def test_gsf_follows_the_published_format(tmp_path: Path, heightmap: HeightMap, extra: str) -> None:
+    path = write_one(replace(heightmap, calibration_id=extra), tmp_path, "gsf")
+    data = path.read_bytes()
+    end = data.index(b"\0")
+    magic, *lines = data[:end].decode().split("\n")
+    assert magic == "Gwyddion Simple Field 1.0"
+    assert lines.pop() == ""
+    header = dict(line.split(" = ", 1) for line in lines)
+    rows, columns = int(header["YRes"]), int(header["XRes"])
+    assert (rows, columns) == (ROWS, COLUMNS)
+    begin = end + 4 - end % 4  # one to four NUL bytes
+    assert data[end:begin] == b"\0" * (begin - end)
+    assert len(data) == begin + 4 * rows * columns
+    depth_m = np.frombuffer(data[begin:], dtype="<f4").reshape(rows, columns)
+    assert depth_m == pytest.approx(heightmap.depth_mm / 1000, rel=1e-6)
+    assert (header["XYUnits"], header["ZUnits"]) == ("m", "m")
+    # Gwyddion's lengths reach from outline to outline: the first pixel centre is half a pixel in.
+    step_m = float(header["XReal"]) / columns
+    assert step_m == pytest.approx(PITCH_MM / 1000)
+    assert float(header["YReal"]) / rows == pytest.approx(PITCH_MM / 1000)
+    assert float(header["XOffset"]) + step_m / 2 == pytest.approx(-1.25e-3)
+    assert float(header["YOffset"]) + step_m / 2 == pytest.approx(-0.75e-3)
+
+
+def read_with_vtk(path: Path):
+    """Return VTK's own reading of a mesh file."""
+    vtk_io = {
+        ".vtp": ("vtkmodules.vtkIOXML", "vtkXMLPolyDataReader"),
+        ".ply": ("vtkmodules.vtkIOPLY", "vtkPLYReader"),
+        ".stl": ("vtkmodules.vtkIOGeometry", "vtkSTLReader"),
+    }
+    module, reader_name = vtk_io[path.suffix]
+    reader = getattr(pytest.importorskip(module), reader_name)()
+    faults: list[str] = []
+    reader.AddObserver("ErrorEvent", lambda *_: faults.append("error"))
+    reader.SetFileName(str(path))
+    reader.Update()
+    assert not faults
+    return reader.GetOutput()
+
+
+def points_and_triangles(polydata) -> tuple[np.ndarray, np.ndarray]:
+    """Return (N, 3) points and (M, 3) corners of VTK's surface."""
+    support = pytest.importorskip("vtkmodules.util.numpy_support")
+    points = support.vtk_to_numpy(polydata.GetPoints().GetData())
+    corners = support.vtk_to_numpy(polydata.GetPolys().GetConnectivityArray())
+    return points, corners.reshape(-1, 3)
+
+
+def surface_area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return (M, 3) twice the area of each triangle, along the normal its winding gives."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0).astype(float)
+    return np.cross(b - a, c - a)
+
+
+@pytest.mark.parametrize("name", ["vtp", "ply", "stl"])
+def test_meshes_are_the_surface_within_the_working_area(
+    tmp_path: Path, heightmap: HeightMap, name: str
+) -> None:
+    points, triangles = points_and_triangles(read_with_vtk(write_one(heightmap, tmp_path, name)))
+    columns = np.rint((points[:, 0] - heightmap.x_mm[0]) / PITCH_MM).astype(int)
+    rows = np.rint((points[:, 1] - heightmap.y_mm[0]) / PITCH_MM).astype(int)
+    assert points[:, 0] == pytest.approx(heightmap.x_mm[columns], abs=1e-6)
+    assert points[:, 1] == pytest.approx(heightmap.y_mm[rows], abs=1e-6)
+    assert points[:, 2] == pytest.approx(-heightmap.depth_mm[rows, columns], abs=1e-6)
+    assert not (heightmap.flags[rows, columns] & Flag.OUTSIDE).any()
+    inside = (heightmap.flags & Flag.OUTSIDE) == 0
+    whole = inside[1:, 1:] & inside[1:, :-1] & inside[:-1, 1:] & inside[:-1, :-1]
+    assert 0 < whole.sum() < whole.size
+    assert len(triangles) == 2 * whole.sum()
+    vectors = surface_area_vectors(points, triangles)
+    assert -vectors[:, 2].sum() / 2 == pytest.approx(whole.sum() * PITCH_MM**2, rel=1e-6)
+    assert (vectors[:, 2] < 0).all()  # the normals point towards the camera
+    if heightmap.normals is not None and name != "stl":
+        own = heightmap.normals[rows, columns][triangles].mean(axis=1)
+        unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        assert (np.sum(unit * own, axis=1) > 0.9).all()
+
+
+@pytest.mark.parametrize("name", ["vtp", "ply"])
+def test_meshes_carry_depth_flags_and_normals(
+    tmp_path: Path, heightmap: HeightMap, name: str
+) -> None:
+    path = write_one(heightmap, tmp_path, name)
+    surface = mesh_of(heightmap)
+    if name == "vtp":
+        support = pytest.importorskip("vtkmodules.util.numpy_support")
+        data = read_with_vtk(path).GetPointData()
+        assert data.GetScalars().GetName() == "depth_mm"
+        assert data.GetNormals().GetName() == "normals"
+        found = {key: support.vtk_to_numpy(data.GetArray(key)) for key in ("depth_mm", "flags")}
+        found["normals"] = support.vtk_to_numpy(data.GetNormals())
+    else:
+        found = read_ply(path)
+    assert np.array_equal(found["depth_mm"], surface.depth_mm)
+    assert np.array_equal(found["flags"], surface.flags)
+    assert found["normals"] == pytest.approx(surface.normals, abs=1e-6)
+    assert Flag.DARK | Flag.EXTRAPOLATED in found["flags"]
+
+
+def read_ply(path: Path) -> dict[str, np.ndarray]:
+    """Return the point data of a binary PLY, byte by byte from its header."""
+    header, data = path.read_bytes().split(b"end_header\n", 1)
+    kinds = {"float": "<f4", "double": "<f8", "uchar": "u1", "uint8": "u1"}
+    lines = header.decode().splitlines()
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
+    first = next(k for k, line in enumerate(lines) if line.startswith("element vertex"))
+    fields = []
+    for line in lines[first + 1 :]:
+        if line.startswith("element"):
+            break
+        _, kind, name = line.split()
+        fields.append((name, kinds[kind]))
+    points = np.frombuffer(data, dtype=fields, count=int(lines[first].split()[2]))
+    found = {name: points[name] for name in points.dtype.names}
+    found["normals"] = np.stack([found.pop(name) for name in ("nx", "ny", "nz")], axis=-1)
+    return found
+
+
+def test_vtp_says_where_it_comes_from(tmp_path: Path, heightmap: HeightMap) -> None:
+    data = read_with_vtk(write_one(heightmap, tmp_path, "vtp", stride=2)).GetFieldData()
+    assert data.GetArray("pitch_mm").GetValue(0) == 2 * PITCH_MM
+    for name in ("calibration_id", "model", "source"):
+        assert data.GetAbstractArray(name).GetValue(0) == getattr(heightmap, name)
+    assert "dark=4" in data.GetAbstractArray("flag_names").GetValue(0)
+
+
+@pytest.mark.parametrize("name", ["vtp", "ply"])
+def test_meshes_do_without_normals(tmp_path: Path, heightmap: HeightMap, name: str) -> None:
+    bare = read_with_vtk(write_one(replace(heightmap, normals=None), tmp_path, name))
+    assert bare.GetNumberOfPoints() == len(mesh_of(heightmap).points_mm)
+    assert bare.GetPointData().GetNormals() is None
+
+
+@given(
+    arrays.arrays(bool, st.tuples(st.integers(2, 12), st.integers(2, 12)), fill=st.just(False)),
+    st.integers(1, 5),
+)
+def test_a_thinned_mesh_leaves_out_every_cell_with_a_pixel_outside(
+    outside: np.ndarray, stride: int
+) -> None:
+    rows, columns = outside.shape
+    heightmap = HeightMap(
+        depth_mm=np.zeros((rows, columns), dtype=np.float32),
+        x_mm=np.arange(columns, dtype=float),
+        y_mm=np.arange(rows, dtype=float),
+        pitch_mm=1.0,
+        normals=None,
+        flags=(outside * Flag.OUTSIDE).astype(np.uint8),
+        calibration_id="",
+        model="paper",
+        source="a.png",
+    )
+    expected = {
+        (row, column)
+        for row in range(0, rows - stride, stride)
+        for column in range(0, columns - stride, stride)
+        if not outside[row : row + stride + 1, column : column + stride + 1].any()
+    }
+    if not expected:
+        with pytest.raises(InputError, match="working area"):
+            mesh_of(heightmap, stride=stride)
+        return
+    mesh = mesh_of(heightmap, stride=stride)
+    lowest = mesh.points_mm[mesh.triangles].min(axis=1)
+    cells = [(int(y), int(x)) for x, y, _ in lowest]
+    assert set(cells) == expected
+    assert len(cells) == 2 * len(expected)
+    assert set(mesh.triangles.ravel()) == set(range(len(mesh.points_mm)))
+
+
+def test_a_pixel_without_finite_depth_makes_a_hole_not_a_broken_mesh(
+    heightmap: HeightMap,
+) -> None:
+    depth_mm = heightmap.depth_mm.copy()
+    depth_mm[8, 10] = np.nan
+    mesh = mesh_of(replace(heightmap, depth_mm=depth_mm))
+    assert np.isfinite(mesh.points_mm).all()
+    assert len(mesh.triangles) == len(mesh_of(heightmap).triangles) - 8
+
+
+def test_an_unknown_format_is_refused_before_anything_is_written(
+    tmp_path: Path, heightmap: HeightMap
+) -> None:
+    with pytest.raises(InputError, match=r"'xyz'.*npz"):
+        write_heightmap(heightmap, tmp_path / "out", formats=["npz", "xyz"])
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_file_in_place_of_the_folder_is_told(tmp_path: Path, heightmap: HeightMap) -> None:
+    (tmp_path / "out").write_bytes(b"")
+    with pytest.raises(InputError, match="folder"):
+        write_heightmap(heightmap, tmp_path / "out", formats=["npz"])
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_a_folder_that_may_not_be_written_is_told(tmp_path: Path, heightmap: HeightMap) -> None:
+    tmp_path.chmod(0o500)
+    with ordinary_user(), pytest.raises(InputError, match="no permission"):
+        write_heightmap(heightmap, tmp_path, formats=["npz"])
+    tmp_path.chmod(0o700)
+    assert os.listdir(tmp_path) == []
+
+
+@contextmanager
+def ordinary_user() -> Iterator[None]:
+    """Give up the rights of root for a while: root may write anywhere."""
+    user = os.geteuid()
+    if user == 0:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(user)
+
+
+def test_shapes_that_do_not_fit_are_refused(heightmap: HeightMap) -> None:
+    with pytest.raises(ValueError, match="x_mm"):
+        replace(heightmap, x_mm=heightmap.x_mm[1:])
+    with pytest.raises(ValueError, match="normals"):
+        replace(heightmap, normals=np.zeros((2, 2, 3), dtype=np.float32))

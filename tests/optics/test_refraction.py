@@ -1,0 +1,104 @@
+"""Refraction at flat layers: against the paper's Eq. (3), Fermat's principle and a round trip."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.refraction import (
+    build_stack,
+    camera_to_membrane,
+    corrected_radius_paper,
+    membrane_to_camera,
+)
+
+
+def tilted_plane(tilt_x: float, tilt_y: float, distance_mm: float = 39.0) -> TopPlane:
+    """Return a top surface tilted by two small slopes."""
+    normal = np.array([tilt_x, tilt_y, 1.0])
+    normal /= np.linalg.norm(normal)
+    return TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), distance_mm)
+
+
+@given(
+    st.floats(0.0, 600.0),
+    st.floats(1.0, 2.5),
+    st.floats(0.5, 30.0),
+    st.floats(1.0, 60.0),
+)
+def test_one_face_on_the_axis_is_the_papers_equation_3(
+    radius_px: float, index: float, gel_mm: float, air_mm: float
+) -> None:
+    focal_px = 1000.0
+    stack = build_stack(air_mm + gel_mm, elastomer_thickness_mm=gel_mm, elastomer_index=index)
+    direction = np.array([radius_px / focal_px, 0.0, 1.0])
+    point, _ = camera_to_membrane(direction, TopPlane((0.0, 0.0, 1.0), air_mm + gel_mm), stack)
+    expected_px = corrected_radius_paper(
+        np.array(radius_px), focal_px, index=index, gel_mm=gel_mm, air_mm=air_mm
+    )
+    assert point[0] * focal_px / (air_mm + gel_mm) == pytest.approx(float(expected_px), abs=1e-9)
+    assert point[1] == 0.0
+
+
+@given(
+    st.floats(-13.0, 13.0),
+    st.floats(-13.0, 13.0),
+    st.floats(-0.05, 0.05),
+    st.floats(-0.05, 0.05),
+    st.sampled_from([0.0, 2.0]),
+)
+def test_membrane_to_pixel_and_back_is_the_same_point(
+    x: float, y: float, tilt_x: float, tilt_y: float, window_mm: float
+) -> None:
+    plane = tilted_plane(tilt_x, tilt_y)
+    stack = build_stack(
+        39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41, window_thickness_mm=window_mm
+    )
+    back, _ = camera_to_membrane(membrane_to_camera(np.array([x, y]), plane, stack), plane, stack)
+    np.testing.assert_allclose(back, [x, y], atol=1e-9)
+
+
+def test_the_ray_takes_the_quickest_path() -> None:
+    """Fermat: the crossing points of the faces make the optical path an extremum."""
+    stack = build_stack(
+        39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41, window_thickness_mm=2.0
+    )
+    target = 9.0
+
+    def optical_path(crossings: np.ndarray) -> float:
+        nodes = np.concatenate([[0.0], crossings, [target]])
+        lengths = np.hypot(np.diff(nodes), stack.thicknesses_mm)
+        return float(lengths @ np.array(stack.indices))
+
+    quickest = minimize(optical_path, [5.0, 5.5], options={"gtol": 1e-12}).x
+    direction = membrane_to_camera(np.array([target, 0.0]), TopPlane((0.0, 0.0, 1.0), 39.0), stack)
+    assert direction[0] * stack.thicknesses_mm[0] == pytest.approx(quickest[0], abs=1e-5)
+
+
+def test_the_drift_is_where_the_ray_meets_a_higher_surface() -> None:
+    """Counting a millimetre of gel as thinner moves the seen point by the drift."""
+    plane = tilted_plane(0.01, -0.02)
+    stack = build_stack(39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41)
+    thinner = build_stack(38.0, elastomer_thickness_mm=13.0, elastomer_index=1.41)
+    direction = np.array([0.2, -0.1, 1.0])
+    point, drift = camera_to_membrane(direction, plane, stack)
+    closer, _ = camera_to_membrane(direction, plane, thinner)
+    np.testing.assert_allclose(point + 1.0 * drift, closer, atol=1e-12)
+
+
+def test_layers_thicker_than_the_distance_are_refused() -> None:
+    with pytest.raises(InputError, match="thicknesses"):
+        build_stack(12.0, elastomer_thickness_mm=14.0, elastomer_index=1.41)
+
+
+def test_rays_that_never_reach_the_surface_are_not_numbers() -> None:
+    stack = build_stack(39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41)
+    point, _ = camera_to_membrane(
+        np.array([1.0, 0.0, -0.1]), TopPlane((0.0, 0.0, 1.0), 39.0), stack
+    )
+    assert np.isnan(point).all()

@@ -1,0 +1,305 @@
+"""What a user relies on when slopes are turned into depth."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import scipy.sparse.linalg as sparse_linalg
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.reconstruction.poisson import (
+    SLOPE_LIMIT,
+    PoissonSolver,
+    good_length,
+    integrate_slopes,
+)
+
+SIZES = st.integers(min_value=1, max_value=43)
+
+
+def raised_cosine(size: int, width_px: float, *, height: float, offset_px: float = 0.3):
+    """Depth and slopes of a bump of full width `width_px` and pitch 1, off the pixel centres."""
+    centred = np.arange(size) - size / 2 + offset_px
+    y, x = np.meshgrid(centred, centred, indexing="ij")
+    r = np.hypot(x, y)
+    half = width_px / 2
+    inside = r < half
+    depth = np.where(inside, height / 2 * (1 + np.cos(np.pi * r / half)), 0.0)
+    fall = np.where(inside, -height / 2 * np.pi / half * np.sin(np.pi * r / half) / r, 0.0)
+    return depth, fall * x, fall * y
+
+
+def uneven_scene(rows: int, columns: int, pitch_mm: float):
+    """Three different Gaussian dents, none of them on a symmetry of the grid."""
+    x = (np.arange(columns) - columns / 2) * pitch_mm
+    y = (np.arange(rows) - rows / 2) * pitch_mm
+    y, x = np.meshgrid(y, x, indexing="ij")
+    width = columns * pitch_mm
+    depth, slope_x, slope_y = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    for u, v, sx, sy, height in (
+        (-0.13, 0.05, 0.035, 0.045, 1.0),
+        (0.11, -0.07, 0.05, 0.03, 0.6),
+        (0.04, 0.11, 0.03, 0.03, -0.3),
+    ):
+        dx, dy = x - u * width, y - v * width
+        dent = height * np.exp(-((dx / (sx * width)) ** 2 + (dy / (sy * width)) ** 2) / 2)
+        depth += dent
+        slope_x -= dx / (sx * width) ** 2 * dent
+        slope_y -= dy / (sy * width) ** 2 * dent
+    return depth, slope_x, slope_y
+
+
+def centroid(depth: np.ndarray) -> np.ndarray:
+    """(row, column) of the centre of mass."""
+    rows, columns = np.indices(depth.shape)
+    return np.array([(rows * depth).sum(), (columns * depth).sum()]) / depth.sum()
+
+
+def test_bumps_of_every_width_keep_their_height() -> None:
+    solver = PoissonSolver(320, 320, pitch_mm=1.0)
+    for width_px in range(15, 301):
+        depth, slope_x, slope_y = raised_cosine(320, width_px, height=width_px / 10)
+        found = solver.integrate(slope_x, slope_y).depth_mm
+        top = np.unravel_index(depth.argmax(), depth.shape)
+        assert np.unravel_index(found.argmax(), found.shape) == top
+        assert found[top] == pytest.approx(depth[top], rel=1e-3), f"{width_px} px wide"
+
+
+@pytest.mark.parametrize("stencil", [4, 2, 1])
+def test_error_falls_with_the_pitch_as_the_stencil_promises(stencil: int) -> None:
+    errors = []
+    for size in (100, 200, 400):
+        depth, slope_x, slope_y = uneven_scene(size, size, 10.0 / size)
+        found = integrate_slopes(slope_x, slope_y, pitch_mm=10.0 / size, stencil=stencil)
+        errors.append(np.abs(found.depth_mm - depth).max())
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert orders == pytest.approx(stencil, abs=0.25)
+
+
+@given(SIZES, SIZES, st.integers(0, 2**32 - 1), st.floats(0.005, 2.0))
+@example(1, 1, 0, 1.0)
+@example(2, 2, 0, 1.0)
+@example(1, 37, 1, 0.1)
+@example(41, 1, 1, 0.1)
+@example(31, 43, 2, 0.02)
+@settings(deadline=None, max_examples=150)
+def test_depth_whose_slopes_are_polynomials_comes_back_exactly(
+    rows: int, columns: int, seed: int, pitch_mm: float
+) -> None:
+    # The depth is 0 on the outline of the pixels; its slopes are cubic (lower on a grid too small
+    # for four slopes), which the stencil integrates without error, at the border and the padding
+    # too: what is left is rounding.
+    generator = np.random.default_rng(seed)
+
+    def profile(size: int):
+        if size == 1:
+            return np.ones(1), np.zeros(1)
+        free = generator.uniform(-1, 1, min(size, 4) - 1)
+        outline = np.polynomial.Polynomial([0, 1, -1])
+        curve = outline * np.polynomial.Polynomial(free)
+        place = (np.arange(size) + 0.5) / size
+        return curve(place), curve.deriv()(place) / (size * pitch_mm)
+
+    along_y, slope_along_y = profile(rows)
+    along_x, slope_along_x = profile(columns)
+    depth = np.outer(along_y, along_x) if rows * columns > 1 else np.zeros((1, 1))
+    solver = PoissonSolver(
+        rows, columns, pitch_mm=pitch_mm, dtype=np.float64, slope_limit=1e6, workers=1
+    )
+    found = solver.integrate(np.outer(along_y, slope_along_x), np.outer(slope_along_y, along_x))
+    assert found.depth_mm.shape == (rows, columns)
+    assert found.depth_mm == pytest.approx(depth, abs=1e-12)
+
+
+def sparse_answer(slope_x: np.ndarray, slope_y: np.ndarray, pitch_mm: float) -> np.ndarray:
+    """Return the least-squares depth of all edges, solved directly on the padded grid."""
+
+    def axis(size: int):
+        padded = good_length(size)
+        before = (padded - size) // 2
+        difference = sp.diags_array(
+            [np.ones(padded), -np.ones(padded)], offsets=[0, -1], shape=(padded + 1, padded)
+        )
+        weight = np.ones(padded + 1)
+        weight[[0, -1]] = 2.0  # half as long an edge: its slope counts double
+        integral = np.zeros((padded + 1, padded))
+        for edge in range(size + 1):
+            nodes = np.arange(4) + min(max(edge - 2, 0), size - 4)
+            for node in nodes:
+                values = (nodes == node).astype(float)
+                antiderivative = np.polynomial.Polynomial.fit(nodes, values, 3).integ()
+                begin, end = max(edge - 1, -0.5), min(edge, size - 0.5)
+                integral[edge + before, node + before] = antiderivative(end) - antiderivative(begin)
+        return before, difference, sp.diags_array(weight), sp.csr_array(integral)
+
+    (top, dy, wy, iy), (left, dx, wx, ix) = axis(slope_x.shape[0]), axis(slope_x.shape[1])
+    rows, columns = dy.shape[1], dx.shape[1]
+    inner = np.s_[top : top + slope_x.shape[0], left : left + slope_x.shape[1]]
+    padded_x, padded_y = np.zeros((2, rows, columns))
+    padded_x[inner], padded_y[inner] = slope_x * pitch_mm, slope_y * pitch_mm
+    across, down = sp.kron(sp.eye_array(rows), dx), sp.kron(dy, sp.eye_array(columns))
+    weigh_x, weigh_y = sp.kron(sp.eye_array(rows), wx), sp.kron(wy, sp.eye_array(columns))
+    right = across.T @ weigh_x @ (padded_x @ ix.T).ravel()
+    right += down.T @ weigh_y @ (iy @ padded_y).ravel()
+    matrix = across.T @ weigh_x @ across + down.T @ weigh_y @ down
+    return sparse_linalg.spsolve(matrix.tocsc(), right).reshape(rows, columns)[inner]
+
+
+@pytest.mark.parametrize("shape", [(24, 36), (4, 5), (23, 30), (30, 29), (17, 47)])
+def test_answer_is_that_of_a_direct_sparse_solver(shape: tuple[int, int]) -> None:
+    # Noise is not the slope of anything: only the same least-squares problem gives the same answer.
+    slope_x, slope_y = np.random.default_rng(5).normal(size=(2, *shape))
+    found = integrate_slopes(slope_x, slope_y, pitch_mm=0.03)
+    assert found.depth_mm == pytest.approx(sparse_answer(slope_x, slope_y, 0.03), abs=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(240, 320), (239, 317)])
+def test_depth_sits_where_the_slopes_are(shape: tuple[int, int]) -> None:
+    depth, slope_x, slope_y = uneven_scene(*shape, 0.05)
+    found = integrate_slopes(slope_x, slope_y, pitch_mm=0.05).depth_mm
+    assert found == pytest.approx(depth, abs=1e-4)
+    assert centroid(found) == pytest.approx(centroid(depth), abs=1e-3)
+
+
+@pytest.mark.parametrize(("stencil", "shift_px"), [(4, 0.0), (2, 0.0), (1, 0.5)])
+def test_only_forward_differences_shift_the_depth(stencil: int, shift_px: float) -> None:
+    place = (np.arange(200) - 90.7) / 12
+    bump = np.exp(-(place**2) / 2)[None]
+    slopes = -place * bump / 12
+    found = integrate_slopes(slopes, 0 * slopes, pitch_mm=1.0, stencil=stencil).depth_mm
+    assert centroid(found) - centroid(bump) == pytest.approx([0.0, shift_px], abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(40, 60), (37, 53)])
+def test_swapped_axes_and_turned_signs_swap_and_turn_the_depth(shape: tuple[int, int]) -> None:
+    _, slope_x, slope_y = uneven_scene(*shape, 0.2)
+    integrate = partial(integrate_slopes, pitch_mm=0.2)
+    depth = integrate(slope_x, slope_y).depth_mm
+    assert depth.max() > 0.5
+    assert integrate(-slope_x, -slope_y).depth_mm == pytest.approx(-depth, abs=1e-13)
+    assert integrate(slope_y.T, slope_x.T).depth_mm == pytest.approx(depth.T, abs=1e-13)
+    mirrored = integrate(-slope_x[:, ::-1], slope_y[:, ::-1]).depth_mm
+    assert mirrored[:, ::-1] == pytest.approx(depth, abs=1e-4)
+
+
+def test_a_millimetre_is_a_millimetre_at_any_pitch() -> None:
+    _, slope_x, slope_y = uneven_scene(60, 80, 0.1)
+    fine = integrate_slopes(slope_x, slope_y, pitch_mm=0.1).depth_mm
+    coarse = integrate_slopes(slope_x, slope_y, pitch_mm=0.3).depth_mm
+    assert coarse == pytest.approx(3 * fine, rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize("fault", [np.nan, np.inf, -np.inf])
+def test_a_fault_in_one_pixel_leaves_the_rest_of_the_map(fault: float) -> None:
+    depth, slope_x, slope_y = uneven_scene(120, 160, 0.1)
+    broken_x, broken_y = slope_x.copy(), slope_y.copy()
+    broken_x[50, 60] = broken_y[50, 60] = broken_y[0, 159] = fault
+    found = integrate_slopes(broken_x, broken_y, pitch_mm=0.1)
+    assert (found.sanitised_count, found.clipped_count) == (3, 0)
+    far = np.hypot(*(np.indices(depth.shape) - np.array([50, 60])[:, None, None])) > 10
+    # A missing slope s acts as a dipole: s h^2 / (2 pi r) = 2 % of a pixel's step at 10 px.
+    limit = 2 * np.abs([slope_x[50, 60], slope_y[50, 60]]).max() * 0.1 / (2 * np.pi * 10)
+    good = integrate_slopes(slope_x, slope_y, pitch_mm=0.1).depth_mm
+    assert np.isfinite(found.depth_mm).all()
+    assert np.abs(found.depth_mm - good)[far].max() < limit
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_an_absurd_slope_is_clipped_and_counted(dtype: type) -> None:
+    slope_x, slope_y = np.zeros((2, 90, 120), dtype=dtype)
+    slope_x[40, 50], slope_y[41, 50] = 1e4, -1e4
+    found = integrate_slopes(slope_x, slope_y, pitch_mm=0.02)
+    assert (found.sanitised_count, found.clipped_count) == (0, 2)
+    slope_x[40, 50], slope_y[41, 50] = SLOPE_LIMIT, -SLOPE_LIMIT
+    at_limit = integrate_slopes(slope_x, slope_y, pitch_mm=0.02)
+    assert at_limit.clipped_count == 0
+    assert np.array_equal(found.depth_mm, at_limit.depth_mm)
+    assert np.abs(found.depth_mm).max() < 2 * SLOPE_LIMIT * 0.02
+
+
+def test_single_precision_is_enough() -> None:
+    depth, slope_x, slope_y = uneven_scene(600, 800, 0.02)
+    exact = integrate_slopes(slope_x, slope_y, pitch_mm=0.02).depth_mm
+    single = integrate_slopes(slope_x.astype("f4"), slope_y.astype("f4"), pitch_mm=0.02).depth_mm
+    assert single.dtype == np.float32
+    assert exact.dtype == np.float64
+    # Eight roundings of 2^-24 (1 in 17 million): what transforms of this length may cost.
+    assert np.abs(single - exact).max() < 8 * 2**-24 * depth.max()
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 50), (50, 1), (1, 47)])
+def test_a_single_line_is_integrated_along_itself(rows: int, columns: int) -> None:
+    place = (np.arange(50 if 50 in (rows, columns) else 47) - 20.3) / 4
+    bump = np.exp(-(place**2) / 2)
+    slopes = {"slope_x": np.zeros((rows, columns)), "slope_y": np.zeros((rows, columns))}
+    along, across = ("slope_x", "slope_y") if rows == 1 else ("slope_y", "slope_x")
+    slopes[along] = (-place * bump / 4).reshape(rows, columns)
+    slopes[across] = np.ones((rows, columns))  # says nothing: there is no neighbour across
+    found = integrate_slopes(**slopes, pitch_mm=1.0).depth_mm
+    assert found.ravel() == pytest.approx(bump, abs=2e-4)
+
+
+def test_slopes_are_left_as_they_were_and_may_be_views() -> None:
+    _, slope_x, slope_y = uneven_scene(60, 80, 0.1)
+    stacked = np.stack([slope_x, slope_y], axis=-1).astype(np.float32)
+    stacked[3, 4] = np.nan
+    before = stacked.copy()
+    stacked.flags.writeable = False
+    solver = PoissonSolver(60, 80, pitch_mm=0.1)
+    from_views = solver.integrate(stacked[..., 0], stacked[..., 1])
+    planes = np.ascontiguousarray(np.moveaxis(stacked, -1, 0))
+    from_planes = solver.integrate(planes[0], planes[1])
+    assert np.array_equal(stacked, before, equal_nan=True)
+    assert np.array_equal(from_views.depth_mm, from_planes.depth_mm)
+    assert from_planes.depth_mm.flags.c_contiguous
+
+
+def test_one_solver_serves_several_threads() -> None:
+    scenes = np.random.default_rng(1).normal(size=(8, 2, 64, 50)).astype(np.float32)
+    solver = PoissonSolver(64, 50, pitch_mm=0.1)
+    alone = [solver.integrate(*scene).depth_mm for scene in scenes]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda scene: solver.integrate(*scene).depth_mm, scenes))
+    assert all(np.array_equal(a, b) for a, b in zip(alone, together, strict=True))
+
+
+@given(st.integers(1, 20_000))
+def test_good_lengths_have_small_primes_only(length: int) -> None:
+    good = good_length(length)
+    assert good >= length
+    rest = good
+    for prime in (2, 3, 5):
+        while rest % prime == 0:
+            rest //= prime
+    assert rest == 1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"rows": 0},
+        {"columns": -1},
+        {"pitch_mm": 0.0},
+        {"pitch_mm": np.nan},
+        {"dtype": np.int32},
+        {"stencil": 3},
+        {"slope_limit": 0.0},
+    ],
+)
+def test_a_solver_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
+    good: dict[str, object] = {"rows": 4, "columns": 5, "pitch_mm": 0.1}
+    options = good | wrong
+    with pytest.raises(ValueError, match=r"\d"):
+        PoissonSolver(options.pop("rows"), options.pop("columns"), **options)
+
+
+def test_slopes_of_another_size_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"\(4, 6\)"):
+        PoissonSolver(4, 5, pitch_mm=0.1).integrate(np.zeros((4, 5)), np.zeros((4, 6)))
+    with pytest.raises(ValueError, match=r"\(5,\)"):
+        integrate_slopes(np.zeros(5), np.zeros(5), pitch_mm=0.1)

@@ -1,0 +1,85 @@
+"""A small sensor whose pictures are shaded from the formula, for tests of single stages.
+
+It has no refraction to speak of and no noise unless asked; the virtual sensor is the physical one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gelpolight_core.calibration.calibration import Calibration, Provenance, sensor_stack
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.reflectance.table import cosine_table
+from gelpolight_core.session.session import SensorData
+
+CAMERA = Camera(320, 240, 345.0, 345.0, 161.3, 118.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
+PLANE = TopPlane((0.0, 0.0, 1.0), 39.0)
+SENSOR = SensorData("T-1", 13.7, 14.0, 1.41, 0.0, 1.49, 22.0)
+LEDS = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]])
+
+
+def table() -> ResamplingTable:
+    """Return the resampling table of the small sensor."""
+    return build_resampling_table(
+        CAMERA, PLANE, sensor_stack(SENSOR, PLANE), working_diameter_mm=SENSOR.working_diameter_mm
+    )
+
+
+def flat_light(points_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (cosines, radiance) of Lambertian LEDs on the flat membrane, brightest about 0.8."""
+    at_top = np.concatenate([points_mm, np.zeros_like(points_mm[..., :1])], axis=-1)
+    light, distance = light_directions(LEDS, at_top)
+    cosines = -light[..., 2]
+    return cosines, 150.0 * cosines / distance**2
+
+
+def calibration() -> Calibration:
+    """Return a perfect calibration for a membrane that is Lambertian and even."""
+    grid_table = table()
+    _, radiance = flat_light(grid_table.grid.points_mm())
+    shown = np.where(grid_table.valid[..., None], radiance, 0.0).astype(np.float32)
+    return Calibration(
+        sensor=SENSOR,
+        model="paper",
+        camera=CAMERA,
+        plane=PLANE,
+        led_positions_mm=LEDS,
+        led_covariance_mm2=np.tile(0.01 * np.eye(3), (3, 1, 1)),
+        crosstalk=np.eye(3),
+        radiance=shown,
+        factors=np.where(shown > 0, 1.0, 0.0).astype(np.float32),
+        reflectance=cosine_table(),
+        noise=np.full(3, 0.002),
+        quality={"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))},
+        provenance=Provenance("2026-01-02T03:04:05+00:00", "someone", "0.1.0", "s", {"a": "b"}),
+    )
+
+
+def raw_picture(slopes: np.ndarray, cal: Calibration) -> np.ndarray:
+    """Return the raw picture (height, width, 3) of a membrane with given slopes, lights frozen.
+
+    Parameters
+    ----------
+    slopes : function of points (..., 2) to (..., 2)
+        d(depth)/dx and d(depth)/dy.
+    cal : Calibration
+        Of the small sensor.
+    """
+    from gelpolight_core.optics.refraction import camera_to_membrane
+
+    v, u = np.mgrid[: CAMERA.height, : CAMERA.width].astype(float)
+    points, _ = camera_to_membrane(
+        CAMERA.directions(np.stack([u, v], axis=-1)), PLANE, cal.stack
+    )
+    _, radiance = flat_light(points)
+    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
+    light, _ = light_directions(LEDS, at_top)
+    slope = slopes(points)  # type: ignore[operator]
+    normal = np.concatenate([-slope, -np.ones_like(slope[..., :1])], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    cosine = np.clip(np.einsum("...kc,...c->...k", light, normal), 0.0, None)
+    return np.asarray(radiance * cosine, np.float32)

@@ -1,0 +1,166 @@
+"""Session folders: read right, and every mistake named with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.session import average, read_picture, read_session, require_colour
+
+GOOD = """format = "gelpolight-session"
+version = 1
+[sensor]
+serial = "A-001"
+led_height_mm = 13.8
+elastomer_thickness_mm = 14.0
+elastomer_refractive_index = 1.41
+working_diameter_mm = 26.0
+[checkerboard]
+inner_corners = [9, 6]
+square_mm = 3.0
+[top_pose]
+inner_corners = [7, 5]
+square_mm = 2.0
+[balls]
+default = 3.0
+"ball_03.png" = 4.0
+"""
+
+
+def session_folder(folder: Path, text: str = GOOD) -> Path:
+    """Write a session.toml and return its folder."""
+    folder.mkdir(exist_ok=True)
+    (folder / "session.toml").write_text(text)
+    return folder
+
+
+def test_a_good_description_is_read_with_its_defaults(tmp_path: Path) -> None:
+    session = read_session(session_folder(tmp_path))
+    assert session.sensor.led_height_mm == 13.8
+    assert session.sensor.window_thickness_mm == 0.0
+    assert session.checkerboard.inner_corners == (9, 6)
+    assert session.top_pose.square_mm == 2.0
+    assert session.ball_radius_mm("ball_00.png") == 3.0
+    assert session.ball_radius_mm("ball_03.png") == 4.0
+
+
+def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> None:
+    text = GOOD.replace("[top_pose]\ninner_corners = [7, 5]\nsquare_mm = 2.0\n", "")
+    session = read_session(session_folder(tmp_path, text))
+    assert session.top_pose == session.checkerboard
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("version = 1", "version = 2", "knows version 1"),
+        ("version = 1", 'version = "1"', "version"),
+        ("gelpolight-session", "other", "format"),
+        ("led_height_mm = 13.8", "", r"led_height_mm is missing"),
+        ("led_height_mm = 13.8", "led_height_mm = -3", "led_height_mm is -3"),
+        ("led_height_mm = 13.8", "led_height_mm = nan", "led_height_mm is nan"),
+        ("led_height_mm = 13.8", 'led_height_mm = "x"', "led_height_mm"),
+        ("led_height_mm = 13.8", "led_height_mm = true", "led_height_mm"),
+        ("working_diameter_mm = 26.0", "working_diameter_mm = 26.0\nfoo = 1", r"\[sensor\] foo"),
+        ("[balls]", "[colours]\nx = 1\n[balls]", "colours"),
+        ("inner_corners = [9, 6]", "inner_corners = [9]", "inner_corners"),
+        ("inner_corners = [9, 6]", "inner_corners = [9, 2.5]", "inner_corners"),
+        ("default = 3.0", "default = 0", "default"),
+        ("[sensor]", "[sensor", "TOML"),
+    ],
+)
+def test_every_mistake_in_session_toml_is_named(
+    tmp_path: Path, old: str, new: str, what: str
+) -> None:
+    with pytest.raises(InputError, match=what) as refusal:
+        read_session(session_folder(tmp_path, GOOD.replace(old, new, 1)))
+    assert "session.toml" in refusal.value.where
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(max_size=300))
+def test_no_file_of_bytes_is_more_than_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    folder = tmp_path_factory.mktemp("s")
+    (folder / "session.toml").write_bytes(data)
+    with pytest.raises(InputError):
+        read_session(folder)
+
+
+def test_a_folder_without_a_session_and_a_stage_without_pictures_are_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"session\.toml"):
+        read_session(tmp_path)
+    session = read_session(session_folder(tmp_path))
+    with pytest.raises(InputError, match="no pictures") as refusal:
+        session.files("mirror")
+    assert refusal.value.where.endswith("mirror")
+
+
+def test_a_ball_without_a_radius_is_named(tmp_path: Path) -> None:
+    session = read_session(session_folder(tmp_path, GOOD.replace("default = 3.0\n", "")))
+    with pytest.raises(InputError, match=r"ball_00\.png"):
+        session.ball_radius_mm("ball_00.png")
+
+
+def write_rgb(path: Path, rgb: np.ndarray) -> None:
+    """Write an RGB picture with another library's idea of colour order taken into account."""
+    assert cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1]))
+
+
+@pytest.mark.parametrize(("kind", "top", "ending"), [("u1", 255, "png"), ("u2", 65535, "tif")])
+def test_pictures_are_red_first_and_linear(
+    tmp_path: Path, kind: str, top: int, ending: str
+) -> None:
+    rgb = np.zeros((4, 5, 3), kind)
+    rgb[0, 0] = [top, top // 3, 0]
+    write_rgb(tmp_path / f"p.{ending}", rgb)
+    picture = read_picture(tmp_path / f"p.{ending}")
+    np.testing.assert_allclose(picture.rgb[0, 0], [1.0, 1 / 3, 0.0], atol=1e-6)
+    assert picture.size == (5, 4)
+    assert picture.bit_depth == (8 if top == 255 else 16)
+
+
+def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path: Path) -> None:
+    session = read_session(session_folder(tmp_path))
+    (tmp_path / "mirror").mkdir()
+    for n, value in enumerate((10, 20)):
+        write_rgb(tmp_path / f"mirror/{n}.png", np.full((4, 5, 3), value, np.uint8))
+    mean = session.averaged("mirror")
+    assert mean.rgb[0, 0, 0] == pytest.approx(15 / 255)
+    assert mean.frame_count == 2
+    write_rgb(tmp_path / "mirror/3.png", np.zeros((4, 6, 3), np.uint8))
+    with pytest.raises(InputError, match=r"6x4.*5x4"):
+        session.averaged("mirror")
+
+
+def test_a_lone_frame_is_passed_on() -> None:
+    picture = Picture("a", np.ones((2, 2, 3), np.float32))
+    assert average([picture], name="mean") is picture
+
+
+@pytest.mark.parametrize("data", [b"", b"not a picture", b"\x89PNG\r\n\x1a\n" + b"\0" * 40])
+def test_a_file_that_is_no_picture_is_refused(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "p.png").write_bytes(data)
+    with pytest.raises(InputError, match="not a whole"):
+        read_picture(tmp_path / "p.png")
+
+
+def test_a_picture_that_declares_a_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
+    head = b"\x89PNG\r\n\x1a\n" + b"\0\0\0\rIHDR" + (2**20).to_bytes(4, "big") * 2
+    (tmp_path / "p.png").write_bytes(head + b"\0" * 20)
+    with pytest.raises(InputError, match="declares"):
+        read_picture(tmp_path / "p.png")
+
+
+def test_a_grey_picture_is_refused_where_colour_is_needed() -> None:
+    with pytest.raises(InputError, match="grey"):
+        require_colour(Picture("g", np.full((2, 2, 3), 0.5, np.float32)), where="g")
+    require_colour(Picture("c", np.float32([[[0.5, 0.1, 0.2]]])), where="c")

@@ -1,0 +1,115 @@
+"""What people rely on around the code: a core that stands alone, and installs that repeat."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import gelpolight_core
+
+ROOT = Path(__file__).resolve().parents[1]
+RUNTIME_LOCK = ROOT / "packaging" / "requirements.lock"
+DEV_LOCK = ROOT / "packaging" / "requirements-dev.lock"
+
+# Imports every module of a package in a Python in which the given modules cannot be imported.
+IMPORT_ALL_WITHOUT = """
+import importlib, pkgutil, sys
+
+package, *blocked = sys.argv[1:]
+for name in blocked:
+    sys.modules[name] = None
+root = importlib.import_module(package)
+names = [module.name for module in pkgutil.walk_packages(root.__path__, package + ".")]
+for name in names:
+    importlib.import_module(name)
+print(len(names))
+"""
+WINDOWS_AND_VIEWS = ["PySide6", "pyqtgraph", "pyvista", "pyvistaqt", "vtk", "vtkmodules"]
+
+
+def import_all_without(package: str, blocked: list[str]) -> int:
+    """Import all modules of `package` in a Python of its own; return how many there are."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", IMPORT_ALL_WITHOUT, package, *blocked],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return int(done.stdout)
+
+
+def pins(lock: Path) -> dict[str, str]:
+    """Return the version of every library in a lock file."""
+    return dict(re.findall(r"^([\w.-]+)==([^ \\]+)", lock.read_text("utf-8"), flags=re.MULTILINE))
+
+
+def test_the_core_works_in_a_notebook_without_the_desktop_program() -> None:
+    """Scripts and clusters have no Qt and no VTK."""
+    assert import_all_without("gelpolight_core", ["app", *WINDOWS_AND_VIEWS]) > 0
+
+
+def test_the_command_line_works_on_a_machine_without_a_screen() -> None:
+    """Calibrating over a remote shell needs no window library."""
+    assert import_all_without("app.command_line", WINDOWS_AND_VIEWS) > 0
+
+
+def test_a_blocked_module_would_be_noticed() -> None:
+    """The two tests above can fail."""
+    with pytest.raises(AssertionError, match="numpy"):
+        import_all_without("gelpolight_core", ["numpy"])
+
+
+def test_the_installed_version_is_the_one_that_calibrations_record() -> None:
+    """Provenance names the program that people have installed."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    assert project["version"] == gelpolight_core.__version__
+
+
+@pytest.mark.parametrize("lock", [RUNTIME_LOCK, DEV_LOCK], ids=lambda path: path.name)
+def test_every_locked_library_is_pinned_and_has_a_hash(lock: Path) -> None:
+    """Everybody gets the very files that were tested."""
+    text = "\n".join(x for x in lock.read_text("utf-8").splitlines() if not x.startswith("#"))
+    entries = text.replace("\\\n", " ").splitlines()
+    assert entries
+    for entry in entries:
+        assert re.match(r"[\w.-]+==\S+ .*--hash=sha256:[0-9a-f]{64}( |$)", entry), entry
+
+
+@pytest.mark.parametrize("lock", [RUNTIME_LOCK, DEV_LOCK], ids=lambda path: path.name)
+def test_the_lock_files_name_no_address_and_no_folder(lock: Path) -> None:
+    """A mirror or an offline folder of wheels serves as well as the public registry."""
+    for line in lock.read_text("utf-8").splitlines():
+        if not line.startswith("# "):
+            assert not re.search(r"://|/|@|--(?!hash)", line), line
+
+
+def test_the_tests_run_with_the_versions_that_users_get() -> None:
+    """The test environment holds the program's environment."""
+    runtime, dev = pins(RUNTIME_LOCK), pins(DEV_LOCK)
+    assert runtime
+    assert {name: dev.get(name) for name in runtime} == runtime
+
+
+def test_every_dependency_is_locked() -> None:
+    """A library added to the project is added to the locks."""
+    text = (ROOT / "pyproject.toml").read_text("utf-8")
+    project = tomllib.loads(text)["project"]
+    for lock, wanted in (
+        (RUNTIME_LOCK, project["dependencies"]),
+        (DEV_LOCK, project["optional-dependencies"]["dev"]),
+    ):
+        names = {re.split(r"[<>=!~\[ ]", requirement)[0] for requirement in wanted}
+        assert names <= pins(lock).keys()
+
+
+def test_only_the_headless_opencv_is_installed() -> None:
+    """Its sibling brings a Qt of its own, which crashes beside PySide6."""
+    opencv = {name for name in pins(DEV_LOCK) if name.startswith("opencv")}
+    assert opencv == {"opencv-contrib-python-headless"}
