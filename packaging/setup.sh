@@ -36,9 +36,9 @@ stop() {
     exit 2
 }
 
-begin() {
+begin() { # STEP [NOTE]
     step=$1
-    echo "Set-up: $1."
+    echo "Set-up: $1${2:+ ($2)}."
 }
 
 # Python 3.11, 3.12 or 3.13, 64 bit: what the locked libraries are built for.
@@ -132,7 +132,7 @@ if [ "$found" != "$kind $libraries" ] && [ "$found" != "test $libraries" ]; then
     # Adding the tests' libraries to a whole environment is safe; everything else starts afresh.
     [ "$found" = "run $libraries" ] || make_environment
     rm -f "$libraries_stamp"
-    begin "installing the libraries of $lock (the first time, some minutes)"
+    begin "installing the libraries of $lock" "the first time, about a minute"
     pip install --quiet --require-hashes --only-binary :all: --requirement "$lock"
     echo "$kind $libraries" >"$libraries_stamp"
 fi

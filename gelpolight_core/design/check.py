@@ -3,8 +3,8 @@
 Light of an LED can reach the camera without telling anything of the membrane: mirrored at the outer
 lower face when the LED stands below it, mirrored at the top surface where the membrane is glossy or
 an air film is left, or mirrored there twice with a reflection at the lower face in between.
-Besides, the three light directions must differ enough everywhere, the LEDs must not hide the membrane, and
-no part of it may be too dark.
+Besides, the three light directions must differ enough everywhere, the LEDs must not hide the
+membrane, and no part of it may be too dark.
 """
 
 from __future__ import annotations
@@ -16,29 +16,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.design.parts import LayerDesign, LedDesign
+from gelpolight_core.design.reflections import LED_NAMES, Reflection, led_reflections
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.simulation.lamps import PointLamp, lamps_of
-from gelpolight_core.simulation.rays import (
-    camera_points,
-    pixel_directions,
-    project_through_layers,
-    project_to_pixels,
-    radius_through_layers,
-    reflection,
-    sensor_axes,
-    trace_pixels,
-)
+from gelpolight_core.simulation.rays import project_through_layers, reflection, trace_pixels
 from gelpolight_core.simulation.shading import Material, point_brightness
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
 CONDITION_WARN, CONDITION_FAIL = 6.0, 20.0
-"""Noise of a normal grows with the condition number of the light directions: three perpendicular
-lights have 1, good sensors 3 to 4. At 6 the noise doubles against those; at 20 a camera of 40 dB
-leaves normals of 10 degrees of noise and more."""
+"""The smallest singular value of three unit directions is at least 1 / condition, so 1 % of noise
+becomes up to 1 % * condition of a normal: 3 degrees at 6, 11 degrees at 20. Good sensors have 3
+to 4."""
 
 GLOSS_WARN, GLOSS_FAIL = 0.6, 0.9
 """Above about a half, what is seen depends more on the viewing side than on the angle to the light,
@@ -57,35 +48,6 @@ BLOCKED_FAIL = 0.01
 _GRID_CELLS = 81
 _VEIL_CELLS = 31
 _OUTLINE_POINTS = 48
-_NAMES = ("R", "G", "B")
-
-
-@dataclass(frozen=True, slots=True)
-class Reflection:
-    """One way on which an LED's mirror image may be seen.
-
-    Attributes
-    ----------
-    led : str
-        "R", "G" or "B".
-    face : str
-        "lower face", "top surface" or "top surface twice".
-    pixel : (u, v)
-        Where it would be seen.
-    at_mm : (x, y)
-        Where the light meets the face last, sensor frame.
-    reflectance : float
-        Product of the Fresnel reflectances on the way when there is air behind each face.
-    in_picture : bool
-        Whether the pixel lies in the picture and, for the top surface, in the working circle.
-    """
-
-    led: str
-    face: str
-    pixel: tuple[float, float]
-    at_mm: tuple[float, float]
-    reflectance: float
-    in_picture: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +112,7 @@ def check_design(design: SensorDesign) -> DesignCheckResult:
         _lower_face_figure(reflections),
         _gloss_figure(design, reflections),
         _bare_figure(reflections),
+        _embedding_figure(design),
         _condition_figure(float(np.nanmax(condition))),
         _blocked_figure(share),
         *_evenness_figures(irradiance),
@@ -190,88 +153,6 @@ def flat_irradiance(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:
         cosine = led.height_mm / np.sqrt(r2)
         shares.append(led.power * cosine ** (design.ring.lobe_exponent + 1.0) / r2)
     return np.stack(shares, axis=-1)
-
-
-def led_reflections(design: SensorDesign) -> tuple[Reflection, ...]:
-    """Return every mirror image of an LED that a flat face can show to the camera."""
-    found: list[Reflection] = []
-    for name, led in zip(_NAMES, design.leds, strict=True):
-        face_mm = design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
-        if led.height_mm > face_mm:
-            found.append(_below_lower_face(design, name, led, face_mm))
-        else:
-            found.extend(_by_top_surface(design, name, led, bounces) for bounces in (1, 2))
-    return tuple(found)
-
-
-def _below_lower_face(
-    design: SensorDesign, name: str, led: LedDesign, face_mm: float
-) -> Reflection:
-    """Mirror image of an LED in air below the layers: seen straight, through air alone."""
-    layers = design.layers
-    twin_height = 2.0 * face_mm - led.height_mm
-    pixel = project_to_pixels(
-        design.camera, camera_points(layers, np.array([led.x_mm, led.y_mm, -twin_height]))
-    )
-    distance = layers.top_distance_mm - twin_height
-    share = layers.air_gap_mm / distance
-    at = (led.x_mm * share, led.y_mm * share)
-    radius = math.hypot(led.x_mm, led.y_mm)
-    window = layers.window_thickness_mm > 0.0
-    index = layers.window_refractive_index if window else layers.elastomer_refractive_index
-    strength = reflection(np.array(radius / math.hypot(radius, distance)), 1.0, index)
-    return Reflection(
-        name, "lower face", _pair(pixel), at, float(strength), _in_picture(design, pixel)
-    )
-
-
-def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, bounces: int) -> Reflection:
-    """Mirror image by the top surface; with two bounces the lower face mirrors in between."""
-    layers = design.layers
-    # Unfolded, each further bounce adds the way down and up through all layers.
-    again = 2.0 * (bounces - 1)
-    unfolded = LayerDesign(
-        top_distance_mm=layers.top_distance_mm
-        + again * (layers.elastomer_thickness_mm + layers.window_thickness_mm),
-        tilt_deg=layers.tilt_deg,
-        tilt_azimuth_deg=layers.tilt_azimuth_deg,
-        elastomer_thickness_mm=layers.elastomer_thickness_mm * (1.0 + again),
-        elastomer_refractive_index=layers.elastomer_refractive_index,
-        window_thickness_mm=layers.window_thickness_mm * (1.0 + again),
-        window_refractive_index=layers.window_refractive_index,
-    )
-    twin = np.array([led.x_mm, led.y_mm, led.height_mm])
-    pixel = project_through_layers(design.camera, unfolded, twin)
-    sine = _sine_in_air(design, pixel)
-    radius = float(radius_through_layers(layers, np.array(sine)))
-    away = max(math.hypot(led.x_mm, led.y_mm), 1e-12)
-    at = (led.x_mm / away * radius, led.y_mm / away * radius)
-    top = float(reflection(np.array(sine), layers.elastomer_refractive_index, 1.0))
-    rim = 0.5 * design.membrane.working_diameter_mm
-    return Reflection(
-        name,
-        "top surface" if bounces == 1 else "top surface twice",
-        _pair(pixel),
-        at,
-        top ** (2 * bounces - 1),
-        _in_picture(design, pixel) and radius <= rim,
-    )
-
-
-def _sine_in_air(design: SensorDesign, pixel: Array) -> float:
-    """Sine of the angle between a pixel's ray in air and the layers' normal."""
-    direction = pixel_directions(design.camera, np.array(pixel[0]), np.array(pixel[1]))
-    ray = sensor_axes(design.layers) @ direction
-    return float(np.hypot(ray[0], ray[1]) / np.linalg.norm(ray))
-
-
-def _pair(pixel: Array) -> tuple[float, float]:
-    return float(pixel[0]), float(pixel[1])
-
-
-def _in_picture(design: SensorDesign, pixel: Array) -> bool:
-    size = np.array([design.camera.width_px, design.camera.height_px])
-    return bool((pixel >= -0.5).all() and (pixel <= size - 0.5).all())
 
 
 def blocked_pixels(design: SensorDesign) -> tuple[NDArray[np.bool_], float]:
@@ -355,7 +236,7 @@ def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> 
     shares, places = [0.0], [""]
     for number, lamp in enumerate(lamps_of(design)):
         for r in reflections:
-            if r.led == _NAMES[number] and r.face == "top surface" and r.in_picture:
+            if r.led == LED_NAMES[number] and r.face == "top surface" and r.in_picture:
                 shares.append(gloss_share(design, lamp, r.at_mm))
                 places.append(f"{r.led} ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})")
     worst = int(np.argmax(shares))
@@ -398,6 +279,21 @@ def _bare_figure(reflections: tuple[Reflection, ...]) -> Figure:
     )
 
 
+def _embedding_figure(design: SensorDesign) -> Figure:
+    deepest = max(led.height_mm for led in design.leds)
+    return judge(
+        "led_outside_elastomer",
+        tr("how far the lowest LED stands below the elastomer"),
+        max(0.0, deepest - design.layers.elastomer_thickness_mm),
+        "mm",
+        warn=0.0,
+        advice=tr(
+            "Light from there is refracted before it reaches the membrane, which the calibration "
+            "does not model: embed the LEDs in the elastomer"
+        ),
+    )
+
+
 def _condition_figure(worst: float) -> Figure:
     return judge(
         "light_condition",
@@ -435,7 +331,7 @@ def _evenness_figures(irradiance: Array) -> tuple[Figure, ...]:
             higher_is_better=True,
             advice=tr("Lower the LEDs below the top surface, or use a camera of more bits"),
         )
-        for k, name in enumerate(_NAMES)
+        for k, name in enumerate(LED_NAMES)
     )
 
 

@@ -19,7 +19,7 @@ _RADII, _ANGLES = 161, 99
 """Table size; the angles step over the ray at pi / 4, on which the integrand is singular."""
 _MARGIN = 8
 """Nodes past the corner and past the face, so that the spline meets no kink where they lie."""
-_ROUNDING = 0.055
+_ROUNDING = 0.07
 """Strength of the rounding of a corner whose three edges carry one fillet, from the numerical
 solution of the obstacle problem (the tests solve it again)."""
 

@@ -69,7 +69,9 @@ def _wrong_shape(
     if share <= GOOD_RESIDUAL:
         return ""
     rivals = {
-        name: fit_indenter(model, window, model.start(region), edge=edge).residual_rms_mm
+        name: fit_indenter(
+            model, window, model.start(region), edge=edge, most_rounds=1
+        ).residual_rms_mm
         for name, model in MODELS.items()
         if name != shape
     }

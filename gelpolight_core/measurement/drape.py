@@ -60,11 +60,13 @@ def cylinder_depth(
 
     depth = sharp(radius_mm)
     if blur_mm > 0.0:
-        depth = depth + _blur_change(
+        depth = _blurred(
+            depth,
             radius_mm - cylinder_radius_mm,
             lambda d: sharp(np.maximum(d + cylinder_radius_mm, 0.0)),
-            blur_mm,
-            edge,
+            blur_mm=blur_mm,
+            edge_mm=edge,
+            decay_mm=decay_mm,
         )
     return depth
 
@@ -117,12 +119,7 @@ def cuboid_depth(
             outside = contact_depth * np.exp(-np.maximum(d - inset, 0.0) / decay_mm)
             return np.where(d > inset, outside, _filleted(d, height_mm, edge))
 
-        depth = depth + _blur_change(
-            beyond,
-            straight,
-            blur_mm,
-            edge,
-        )
+        depth = _blurred(depth, beyond, straight, blur_mm=blur_mm, edge_mm=edge, decay_mm=decay_mm)
     return depth
 
 
@@ -235,18 +232,29 @@ def _rectangle_drape(x: Array, y: Array, half: tuple[float, float], edge: float)
     return np.maximum(drape, 0.0)
 
 
-def _blur_change(
-    beyond_mm: Array, profile: Callable[[Array], Array], blur_mm: float, edge_mm: float
+def _blurred(
+    depth_mm: Array,
+    beyond_mm: Array,
+    profile: Callable[[Array], Array],
+    *,
+    blur_mm: float,
+    edge_mm: float,
+    decay_mm: float,
 ) -> Array:
-    """Return what smoothing changes across a wall, from the wall's one-dimensional profile.
+    """Return the depth after smoothing across a wall, from the wall's one-dimensional profile.
 
-    The wall is straight on the scale of the blur, so its profile says it all.
+    The wall is straight on the scale of the blur, so its profile says what happens there. Farther
+    out the drape obeys decay**2 laplacian(w) = w and a Gaussian only multiplies it.
     """
     sigma = max(blur_mm, SMALL_BLUR_MM)
     reach = edge_mm + 5.0 * sigma
     step = sigma / 4.0
-    nodes = np.arange(-2.0 * reach, 2.0 * reach + step / 2.0, step)
+    # A margin on both sides, because the filter is wrong near the ends of its data.
+    nodes = np.arange(-reach - 6.0 * sigma, reach + 6.0 * sigma, step)
     values = profile(nodes)
-    change = gaussian_filter1d(values, sigma / step, mode="nearest", truncate=5.0) - values
-    change *= (blur_mm / sigma) ** 2
-    return np.asarray(np.interp(beyond_mm, nodes, change, left=0.0, right=0.0))
+    smooth = gaussian_filter1d(values, sigma / step, mode="nearest", truncate=5.0)
+    part = (blur_mm / sigma) ** 2
+    near = np.interp(beyond_mm, nodes, part * (smooth - values))
+    far = depth_mm * math.expm1(0.5 * (blur_mm / decay_mm) ** 2)
+    change = np.where(beyond_mm > reach, far, np.where(beyond_mm < -reach, 0.0, near))
+    return depth_mm + change

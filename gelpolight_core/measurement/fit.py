@@ -23,11 +23,13 @@ BASELINE = ("offset_mm", "tilt_x", "tilt_y")
 """Ground level around the object: integration leaves it off by tens of micrometres and tilted."""
 HUBER = 2.5
 """Residuals beyond this many sigma lose weight."""
-MODEL_ERROR = 0.0005
+MODEL_ERROR = 0.001
 """Share of the height by which the closed forms of the drape may be wrong (near corners); finer
 scales for the residual would only throw out the edges that carry the size."""
 MOST_ROUNDS = 6
 """Rounds of reweighting before a fit counts as not coming to an end."""
+CORRELATION_SIZE = 250
+"""Pixels along a side of the map that residuals are correlated on."""
 SETTLED = 0.3
 """Rounds stop when no parameter moves by more than this share of its sd."""
 
@@ -132,6 +134,7 @@ def fit_indenter(
     start: Mapping[str, float],
     *,
     edge: EdgePrior,
+    most_rounds: int = MOST_ROUNDS,
 ) -> FitResult:
     """Fit position, size, yaw, depth and drape of an indenter together.
 
@@ -148,6 +151,8 @@ def fit_indenter(
         First guess of the model's parameters except the edge's.
     edge : EdgePrior
         What is known of the object's edge.
+    most_rounds : int, optional
+        Rounds of reweighting; one is enough to see whether a shape fits at all.
     """
     chosen, density = _chosen_points(window)
     names = (*model.names, *BASELINE)
@@ -166,14 +171,12 @@ def fit_indenter(
     weight = window.weight[chosen]
     # Until the residuals are known, a twentieth of the height stands for their scale.
     sigma, together, robust = 0.05 * start["height_mm"], 30.0, np.ones(weight.shape)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(most_rounds):
         before = vector
         inflation = 1.0 + (together - 1.0) * density
         vector, jacobian, converged = _solve(problem, vector, weight * robust, sigma, inflation)
         left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
         sigma = max(_robust_scale(left * np.sqrt(weight)), MODEL_ERROR * start["height_mm"])
-        # The wall is the small part of the map that carries the size: what it leaves must count.
-        sigma = max(sigma, 0.5 * float(np.sqrt(np.mean(weight * left**2))))
         ratio = np.abs(left) * np.sqrt(weight) / (HUBER * sigma)
         robust = 1.0 / np.maximum(ratio, 1.0)
         residual = window.depth_mm - problem.depth(vector, window.x_mm, window.y_mm)
@@ -205,6 +208,9 @@ def correlated_pixels(residual_mm: Array) -> float:
     residual_mm : (rows, columns)
         Residuals; NaN where there are none.
     """
+    # A stride spares most of the time; what is correlated at all is so over many pixels.
+    stride = max(1, round(max(residual_mm.shape) / CORRELATION_SIZE))
+    residual_mm = residual_mm[::stride, ::stride]
     there = np.isfinite(residual_mm)
     values = np.where(there, residual_mm, 0.0)
     values = np.where(there, values - values.sum() / max(there.sum(), 1), 0.0)
@@ -229,7 +235,7 @@ def correlated_pixels(residual_mm: Array) -> float:
     counts = np.bincount(lag[near], minlength=reach)
     lost = np.flatnonzero(sums / np.maximum(counts, 1) < 0.05)
     end = int(lost[0]) if lost.size else reach
-    return float(max(sums[:end].sum(), 1.0))
+    return float(max(1.0 + stride**2 * (sums[:end].sum() - 1.0), 1.0))
 
 
 def _chosen_points(window: WindowData) -> tuple[Mask, float]:

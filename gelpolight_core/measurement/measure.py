@@ -102,7 +102,8 @@ def measure_object(
     window = _window(depth, x, y, weight, region, regions)
     prior = EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, window.pitch_mm)
     fit = _fit(shape, window, region, prior)
-    return _measurement(shape, fit, find_doubt(shape, fit, window, region, prior))
+    reason = find_doubt(shape, fit, window, region, prior)
+    return _measurement(shape, fit, _plateau_shift_mm(shape, fit, window), reason)
 
 
 def _checked(
@@ -230,10 +231,25 @@ def _fit(shape: str, window: WindowData, region: PressedRegion, prior: EdgePrior
     return fit_indenter(model, window, model.start(region), edge=prior)
 
 
-def _measurement(shape: str, fit: FitResult, reason: str) -> Measurement:
+def _plateau_shift_mm(shape: str, fit: FitResult, window: WindowData) -> float:
+    """Return how far the plateau's median lies above the fitted one.
+
+    The fit ties the plateau to its rim, where a reconstruction is worst; the object's height is
+    that of its face.
+    """
+    if shape == "ball":
+        return 0.0
+    sharp = {**fit.values, "blur_mm2": 0.0}
+    model = MODELS[shape].depth(sharp, window.x_mm, window.y_mm)
+    face = (model >= fit.values["height_mm"] - 1e-9) & (window.weight > 0.0)
+    return float(np.median(fit.residual_mm[face])) if face.any() else 0.0
+
+
+def _measurement(shape: str, fit: FitResult, shift_mm: float, reason: str) -> Measurement:
     values, sd = fit.values, fit.sd
     spread: dict[str, float | tuple[float, float] | None] = {
-        "height_mm": sd["height_mm"],
+        # Rim and face disagree by the shift: their height is known to no better than half of it.
+        "height_mm": math.hypot(sd["height_mm"], 0.5 * shift_mm),
         "centre_mm": (sd["x_mm"], sd["y_mm"]),
         "yaw_deg": None,
         "drape_decay_mm": sd["drape_decay_mm"],
@@ -249,7 +265,7 @@ def _measurement(shape: str, fit: FitResult, reason: str) -> Measurement:
         shape=shape,
         diameter_mm=diameter,
         side_mm=side,
-        height_mm=values["height_mm"],
+        height_mm=values["height_mm"] + shift_mm,
         centre_mm=(values["x_mm"], values["y_mm"]),
         yaw_deg=yaw,
         drape_decay_mm=values["drape_decay_mm"],

@@ -78,6 +78,14 @@ class Measurement:
         assert self.diameter_mm is not None
         return self.diameter_mm
 
+    @property
+    def size_sd_mm(self) -> float:
+        """Standard deviation of `size_mm`."""
+        if self.side_mm is not None:
+            # One baseline and one edge move both sides alike: no averaging out is claimed.
+            return float(np.mean(self.sd["side_mm"]))
+        return float(self.sd["diameter_mm"])
+
     def as_json(self, comparison: Comparison | None = None) -> dict[str, Any]:
         """Return the measurement as plain values; `comparison` adds truth and errors in percent.
 

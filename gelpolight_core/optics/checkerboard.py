@@ -115,7 +115,7 @@ class BoardView:
     homography_rms_px, homography_max_px : float
         How far the corners lie from a straight-line perspective grid; lens distortion shows here.
     grid_rms_px, grid_max_px : float
-        The same after one radial distortion coefficient: what is left is not the lens.
+        The same after two radial distortion coefficients: what is left is not the lens.
     square_px : float
         Median side of a square.
     edge_width_px : float
@@ -520,17 +520,18 @@ def _describe(
 
 
 def _grid_misfit(flat: Array, corners: Array, matrix: NDArray[Any], size: tuple[int, int]) -> Array:
-    """Return how far (N) corners lie from a perspective grid bent by one radial coefficient."""
+    """Return how far (N) corners lie from a perspective grid bent by two radial coefficients."""
     centre = 0.5 * (np.array(size) - 1.0)
     scale = 0.5 * max(size)
 
     def misfit(values: Array) -> Array:
         h = np.append(values[:8], 1.0).reshape(3, 3)
         straight = (_apply(h, flat[:, 0], flat[:, 1]) - centre) / scale
-        bent = straight * (1.0 + values[8] * np.sum(straight**2, axis=1, keepdims=True))
+        r2 = np.sum(straight**2, axis=1, keepdims=True)
+        bent = straight * (1.0 + r2 * (values[8] + r2 * values[9]))
         return np.asarray((bent * scale + centre - corners).ravel())
 
-    start = np.append(np.asarray(matrix, dtype=np.float64).ravel()[:8], 0.0)
+    start = np.append(np.asarray(matrix, dtype=np.float64).ravel()[:8], [0.0, 0.0])
     fit = least_squares(misfit, start, method="lm", x_scale=np.maximum(np.abs(start), 1e-3))
     return np.asarray(np.linalg.norm(fit.fun.reshape(-1, 2), axis=1))
 
@@ -623,7 +624,7 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
 
 
 def _size_advice() -> str:
-    return tr("Correct inner_corners in session.toml, or capture the stated board")
+    return tr("Correct inner_corners in session.toml, or show the whole of the stated board")
 
 
 def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputError:

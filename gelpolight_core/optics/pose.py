@@ -113,7 +113,8 @@ class TopPoseResult:
     decision : Decision
         How it was rejected.
     margin_sd : float
-        By how many standard deviations it was (infinite where there was none).
+        By how many standard deviations it was: at most 10 from each view, infinite where there
+        was no other pose.
     views : tuple of TopPoseView
         All pictures in the given order.
     quality : QualityTable
@@ -205,11 +206,12 @@ def _find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
     poses = []
     starts = []
     for turn, shift in zip(turns, shifts, strict=True):
+        # Before the refinement, which overwrites its start.
+        starts.append(_describe_pose(seen, camera, turn, shift))
         refined = cv2.solvePnPRefineLM(
             points, seen.corners_px, camera.matrix, distortion, turn, shift, criteria
         )
         poses.append(_describe_pose(seen, camera, refined[0], refined[1]))
-        starts.append(_describe_pose(seen, camera, turn, shift))
     poses.sort(key=lambda pose: pose.rms_px)
     best = poses[0]
     if len(poses) == 1:
@@ -286,14 +288,16 @@ def _angle_deg(plane: TopPlane, other: TopPlane) -> float:
 def _choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, float]:
     """Return a pose on the true side, and the chi-square by which the other side is worse.
 
-    Every candidate is tried as the truth: each view adds by how much worse its nearest candidate
-    fits its corners than its best one does, and how far that lies from the one tried. Where the
-    margin is too small to decide, the side that tilts less is taken: sensors are built to look at
-    their top surface squarely.
+    Every candidate is tried as the truth: each view adds by how much worse the candidate it then
+    takes fits its corners than its best one does, and how far that lies from the one tried, the
+    latter up to a bound, so that a board that does not lie flat cannot outvote the rest. Where
+    the margin is too small to decide, the side that tilts less is taken: sensors are built to
+    look at their top surface squarely.
     """
     tried = [(_cost(candidates, pose), pose) for view in candidates for pose in view]
     cost, best = min(tried, key=lambda item: item[0])
-    others = [item for item in tried if _is_other_side(candidates, item[1], best)]
+    taken = [_pick(view, best) for view in candidates]
+    others = [item for item in tried if not any(item[1] is pose for pose in taken)]
     if not others:
         return best, math.inf
     other_cost, other = min(others, key=lambda item: item[0])
@@ -304,25 +308,19 @@ def _choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, 
 
 
 def _cost(candidates: Sequence[Sequence[PlanePose]], truth: PlanePose) -> float:
-    return sum(min(_pose_cost(view, pose, truth) for pose in view) for view in candidates)
-
-
-def _pose_cost(view: Sequence[PlanePose], pose: PlanePose, truth: PlanePose) -> float:
-    freedom = max(pose.residuals_px.size - 6, 1)
-    worse = freedom * (pose.rms_px**2 / max(view[0].rms_px ** 2, 1e-12) - 1.0)
-    sd_deg = math.hypot(_FLATNESS_DEG, pose.normal_sd_deg, truth.normal_sd_deg)
-    return worse + (_angle_deg(pose.plane, truth.plane) / sd_deg) ** 2
-
-
-def _is_other_side(
-    candidates: Sequence[Sequence[PlanePose]], pose: PlanePose, best: PlanePose
-) -> bool:
-    """Whether trying `pose` would pick another pose of some view than trying `best` does."""
-    return any(_pick(view, pose) is not _pick(view, best) for view in candidates)
+    return sum(_pose_cost(view, _pick(view, truth), truth) for view in candidates)
 
 
 def _pick(view: Sequence[PlanePose], truth: PlanePose) -> PlanePose:
     return min(view, key=lambda pose: _pose_cost(view, pose, truth))
+
+
+def _pose_cost(view: Sequence[PlanePose], pose: PlanePose, truth: PlanePose) -> float:
+    best = view[0]
+    freedom = max(best.residuals_px.size - 6, 1)
+    worse = freedom * (pose.rms_px**2 / max(best.rms_px**2, 1e-12) - 1.0)
+    sd_deg = math.hypot(_FLATNESS_DEG, best.normal_sd_deg)
+    return worse + min((_angle_deg(pose.plane, truth.plane) / sd_deg) ** 2, 4.0 * SURE_MARGIN)
 
 
 def _describe(
@@ -339,7 +337,7 @@ def _describe(
             views.append(TopPoseView(picture.name, False, reason))
             continue
         poses = next(found)
-        pose = min(poses, key=lambda p: _angle_deg(p.plane, reference.plane))
+        pose = _pick(poses, reference)
         mirrored = next((p for p in poses if p is not pose), None)
         views.append(TopPoseView(picture.name, True, "", seen, pose, mirrored))
     return views

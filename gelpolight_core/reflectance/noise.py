@@ -226,7 +226,9 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
     """
     gain = np.ones(3, dtype=np.float32)
     # Broad means: a ratio of noisy pixels is neither unbiased nor a narrow peak.
-    before, after = (cv2.GaussianBlur(p, (0, 0), 3.0) for p in (background, press))
+    before, after = (
+        np.asarray(cv2.GaussianBlur(p, (0, 0), 3.0), np.float32) for p in (background, press)
+    )
     for k in range(3):
         total = before[..., k] + after[..., k]
         # Chosen by the sum: choosing by one picture's noise would bias the ratio.
@@ -292,6 +294,27 @@ def scale_difference(
         (float(gain[0]), float(gain[1]), float(gain[2])),
         (float(sigma[0]), float(sigma[1]), float(sigma[2])),
     )
+
+
+def change_where(change: ScaledDifference, background: Array, where: Mask) -> float:
+    """Return the typical change of brightness somewhere, as a share of it; 0 where it is dark.
+
+    Parameters
+    ----------
+    change : ScaledDifference
+        Of these pictures.
+    background : (rows, columns, 3)
+        Picture without contact.
+    where : (rows, columns) bool
+        Which pixels count.
+    """
+    step = change.factor
+    light = background[::step, ::step].sum(axis=2)
+    moved = cv2.GaussianBlur(change.difference, (0, 0), 2.0)[::step, ::step]
+    keep = where[::step, ::step] & (light > 3.0 * DARK)
+    if np.count_nonzero(keep) < 16:
+        return 0.0
+    return float(np.median(np.abs(moved[keep]).sum(axis=1) / light[keep]))
 
 
 def check_gain(gain: tuple[float, float, float], name: str) -> None:

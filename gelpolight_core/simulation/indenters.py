@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
     contact_radius,
@@ -17,6 +20,7 @@ from gelpolight_core.simulation.drape import (
     solve_drape,
 )
 from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -226,6 +230,48 @@ def _turned_drape(
     turned = map_coordinates(depth, place, order=3, mode="constant", cval=0.0, prefilter=True)
     touched = map_coordinates(contact.astype(np.float64), place, order=1, cval=0.0) > 0.5
     return np.clip(turned, 0.0, indenter.depth_mm), touched
+
+
+def relief_from_picture(
+    path: Path, *, width_mm: float, relief_mm: float, depth_mm: float
+) -> Relief:
+    """Read a relief from a grey picture of 8 or 16 bit; black is its base, white its highest.
+
+    Parameters
+    ----------
+    path : Path
+        PNG or TIFF.
+    width_mm : float
+        Width of the picture on the object.
+    relief_mm : float
+        Height of white above black.
+    depth_mm : float
+        How deep the highest point is pressed.
+
+    Raises
+    ------
+    InputError
+        If the file is no grey picture of 8 or 16 bit, or shows no heights.
+    """
+    data = np.frombuffer(path.read_bytes(), dtype=np.uint8) if path.is_file() else None
+    picture = None
+    if data is not None and data.size > 0:
+        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    if picture is None or picture.ndim != 2 or picture.dtype not in (np.uint8, np.uint16):
+        raise InputError(
+            tr("the file is not a grey picture of 8 or 16 bit"),
+            where=str(path),
+            advice=tr("Save the heights as a grey PNG or TIFF"),
+        )
+    if min(picture.shape) < 2 or picture.min() == picture.max():
+        raise InputError(
+            tr("the picture shows no heights"),
+            where=str(path),
+            advice=tr("Use a picture whose grey follows the height"),
+        )
+    full = 255.0 if picture.dtype == np.uint8 else 65535.0
+    height = picture.astype(np.float64) / full * relief_mm
+    return Relief(height, width_mm / (picture.shape[1] - 1), depth_mm)
 
 
 def _heights(half_mm: float, pitch_mm: float, height: Callable[[Array, Array], Array]) -> Array:

@@ -158,9 +158,10 @@ def project_through_layers(camera: CameraDesign, layers: LayerDesign, points_mm:
         beyond = radius_through_layers(layers, middle, height_mm=-points[..., 2]) > radius
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     sine = 0.5 * (low + high)
-    share = np.where(radius > 0.0, sine / np.where(radius > 0.0, radius, 1.0), 0.0)
+    away = np.maximum(radius, 1e-300)
     direction = np.stack(
-        [points[..., 0] * share, points[..., 1] * share, np.sqrt(1.0 - sine * sine)], axis=-1
+        [points[..., 0] / away * sine, points[..., 1] / away * sine, np.sqrt(1.0 - sine * sine)],
+        axis=-1,
     )
     return project_to_pixels(camera, np.asarray(direction @ sensor_axes(layers)))
 
@@ -217,8 +218,9 @@ def trace_pixels(camera: CameraDesign, layers: LayerDesign) -> RayTable:
     sideways = np.hypot(direction[..., 0], direction[..., 1])
     length = np.hypot(sideways, direction[..., 2])
     sine = np.where(direction[..., 2] > 0.0, sideways / length, np.nan)
-    share = np.where(sideways > 0.0, 1.0 / np.where(sideways > 0.0, sideways, 1.0), 0.0)
-    unit_x, unit_y = direction[..., 0] * share, direction[..., 1] * share
+    # On the axis the direction sideways is 0 / tiny = 0.
+    away = np.maximum(sideways, 1e-300)
+    unit_x, unit_y = direction[..., 0] / away, direction[..., 1] / away
     radius = radius_through_layers(layers, sine)
     inner = sine / layers.elastomer_refractive_index
     slope = inner / np.sqrt(1.0 - inner * inner)

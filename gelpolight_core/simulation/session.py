@@ -45,7 +45,7 @@ from gelpolight_core.simulation.virtual_sensor import (
 )
 from gelpolight_core.translation import tr
 
-Progress = Callable[[float, str], None]
+Progress = Callable[[str, float], None]
 
 AVERAGED = {
     "checkerboard": 8,
@@ -101,7 +101,7 @@ def simulate_session(
     scale : float, optional
         Size of the pictures; the geometry in mm stays.
     progress : callable, optional
-        Called with the share done, 0..1, and the file just written; what it raises stops the work.
+        Called with the file just written and the share done, 0..1; what it raises stops the work.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def simulate_session(
             for number, (shot, job) in enumerate(jobs, start=1):
                 job.result()
                 if progress is not None:
-                    progress(number / len(jobs), f"{shot.stage}/{shot.file}")
+                    progress(f"{shot.stage}/{shot.file}", number / len(jobs))
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

@@ -1,0 +1,391 @@
+"""The paper's evaluation (section VI-B, Fig. 13): planar and depth errors of known objects."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.measurement.truth import PressTruth, read_truth
+from gelpolight_core.translation import tr
+
+PAPER_PERCENT = {"planar": 5.0, "depth": 8.0}
+"""Mean errors that the paper reports for random regions."""
+DIRECTIONS = ("planar", "depth")
+SAME, RANDOM, ALL = "same region", "random regions", "all"
+
+Progress = Callable[[str, float], None]
+
+
+class HeightMapLike(Protocol):
+    """What the evaluation needs of a reconstruction."""
+
+    @property
+    def depth_mm(self) -> NDArray[np.float32]:
+        """(rows, columns) depth."""
+
+    @property
+    def x_mm(self) -> NDArray[np.floating]:
+        """(columns,) sensor frame."""
+
+    @property
+    def y_mm(self) -> NDArray[np.floating]:
+        """(rows,) sensor frame."""
+
+    @property
+    def flags(self) -> NDArray[np.uint8]:
+        """(rows, columns) flags."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressResult:
+    """One press: its truth, and its measurement or why there is none.
+
+    Attributes
+    ----------
+    press : PressTruth
+        The row of ``truth.csv``.
+    measurement : Measurement or None
+        None where it could not be measured.
+    failure : str
+        Why not; empty otherwise.
+    planar_percent, depth_percent : float
+        Signed errors of size and height; NaN without a measurement.
+    """
+
+    press: PressTruth
+    measurement: Measurement | None
+    failure: str
+    planar_percent: float
+    depth_percent: float
+
+    def error_percent(self, direction: str) -> float:
+        """Return the error in the ``planar`` or ``depth`` direction."""
+        return self.planar_percent if direction == "planar" else self.depth_percent
+
+
+@dataclass(frozen=True, slots=True)
+class Statistic:
+    """Errors of a group of presses.
+
+    Attributes
+    ----------
+    count : int
+        Measured presses.
+    mean_absolute_percent, mean_percent, sd_percent : float
+        NaN where there are too few.
+    lowest_percent, highest_percent : float
+        Extremes of the signed errors.
+    """
+
+    count: int
+    mean_absolute_percent: float
+    mean_percent: float
+    sd_percent: float
+    lowest_percent: float
+    highest_percent: float
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A statistic and what it is of.
+
+    Attributes
+    ----------
+    direction : str
+        ``planar`` or ``depth``.
+    shape : str
+        A shape, or ``all``.
+    dimension_mm : float or None
+        Nominal size (planar) or height (depth); None: all.
+    regions : str
+        ``same region``, ``random regions`` or ``all``.
+    statistic : Statistic
+        The errors.
+    """
+
+    direction: str
+    shape: str
+    dimension_mm: float | None
+    regions: str
+    statistic: Statistic
+
+
+@dataclass(frozen=True, slots=True)
+class Repeatability:
+    """Gauge repeatability in one direction, pooled over all objects.
+
+    Attributes
+    ----------
+    direction : str
+        ``planar`` or ``depth``.
+    within_region_mm : float
+        Standard deviation of repeats at one place; NaN without repeats.
+    between_regions_mm : float
+        Standard deviation that moving to another place adds; NaN with one place only.
+    """
+
+    direction: str
+    within_region_mm: float
+    between_regions_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """The paper's protocol on one folder of presses.
+
+    Attributes
+    ----------
+    results : tuple of PressResult
+        Every press that has a true size, measured or not.
+    groups : tuple of Group
+        Statistics by direction, shape, dimension and regions.
+    repeatability : tuple of Repeatability
+        Empty where nothing was repeated.
+    skipped : tuple of str
+        Files of shapes without a size.
+    """
+
+    results: tuple[PressResult, ...]
+    groups: tuple[Group, ...]
+    repeatability: tuple[Repeatability, ...]
+    skipped: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> tuple[PressResult, ...]:
+        """The presses that could not be measured."""
+        return tuple(result for result in self.results if result.measurement is None)
+
+    def overall(self, direction: str) -> Statistic:
+        """Return the statistic of all presses in one direction."""
+        return _statistic([r.error_percent(direction) for r in self.results])
+
+
+def evaluate_presses(
+    folder: Path,
+    reconstruct: Callable[[Path], HeightMapLike],
+    *,
+    progress: Progress | None = None,
+) -> Evaluation:
+    """Measure every press of a folder with ``truth.csv`` and compare it with the truth.
+
+    Parameters
+    ----------
+    folder : Path
+        Pictures and ``truth.csv``.
+    reconstruct : callable (picture's path) -> height map
+        The reconstruction under test.
+    progress : callable, optional
+        Told the file's name and the share done, 0..1.
+
+    Raises
+    ------
+    InputError
+        ``truth.csv`` cannot be used, or a file it names is missing. A picture that cannot be
+        reconstructed or measured is a result with its reason instead.
+    """
+    table = read_truth(folder)
+    missing = [row.file for row in table.rows if not (folder / row.file).is_file()]
+    if missing:
+        raise InputError(
+            tr("{count} of {all} pictures are missing, first {file}").format(
+                count=len(missing), all=len(table.rows), file=missing[0]
+            ),
+            where=str(folder / "truth.csv"),
+            advice=tr("Put the pictures beside truth.csv or take their rows out"),
+        )
+    outcomes: list[Measurement | str] = []
+    for k, row in enumerate(table.rows):
+        if progress is not None:
+            progress(row.file, k / len(table.rows))
+        outcomes.append(_measured(folder / row.file, row.truth.shape, reconstruct))
+    if progress is not None:
+        progress("", 1.0)
+    return evaluate(table.rows, outcomes, skipped=table.skipped)
+
+
+def evaluate(
+    rows: Sequence[PressTruth],
+    outcomes: Sequence[Measurement | str],
+    *,
+    skipped: Sequence[str] = (),
+) -> Evaluation:
+    """Compare measurements with the truth.
+
+    Parameters
+    ----------
+    rows : sequence of PressTruth
+        What was pressed.
+    outcomes : sequence of Measurement or str
+        For every row its measurement, or why there is none.
+    skipped : sequence of str, optional
+        Files without a true size, to be reported.
+    """
+    results = tuple(_result(row, outcome) for row, outcome in zip(rows, outcomes, strict=True))
+    return Evaluation(results, _groups(results), _repeatability(results), tuple(skipped))
+
+
+def _measured(
+    path: Path, shape: str, reconstruct: Callable[[Path], HeightMapLike]
+) -> Measurement | str:
+    # A press that fails is a finding of the evaluation, not its end.
+    try:
+        heights = reconstruct(path)
+        return measure_object(
+            heights.depth_mm, heights.x_mm, heights.y_mm, shape=shape, flags=heights.flags
+        )
+    except InputError as error:
+        return str(error)
+
+
+def _result(row: PressTruth, outcome: Measurement | str) -> PressResult:
+    if isinstance(outcome, str):
+        return PressResult(row, None, outcome, math.nan, math.nan)
+    comparison = compare(outcome, row.truth)
+    return PressResult(
+        row, outcome, "", comparison.size_error_percent, comparison.height_error_percent
+    )
+
+
+def _statistic(errors: Iterable[float]) -> Statistic:
+    values = np.array([error for error in errors if math.isfinite(error)])
+    if values.size == 0:
+        return Statistic(0, *([math.nan] * 5))
+    return Statistic(
+        int(values.size),
+        float(np.abs(values).mean()),
+        float(values.mean()),
+        float(values.std(ddof=1)) if values.size > 1 else math.nan,
+        float(values.min()),
+        float(values.max()),
+    )
+
+
+def dimension_mm(result: PressResult, direction: str) -> float:
+    """Return the nominal dimension that a direction's error is sorted by.
+
+    Parameters
+    ----------
+    result : PressResult
+        A press.
+    direction : str
+        ``planar``: size; ``depth``: height.
+    """
+    truth = result.press.truth
+    return truth.size_mm if direction == "planar" else truth.height_mm
+
+
+def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]:
+    """Sort presses into the paper's two series.
+
+    An object pressed several times in one region belongs to "same region" there; an object pressed
+    in several regions enters "random regions", repeats included. A region named ``same`` or
+    ``random`` is taken at its word. Without a region column there is only ``all``.
+
+    Parameters
+    ----------
+    results : sequence of PressResult
+        All presses.
+    """
+    kinds: dict[str, list[PressResult]] = {ALL: list(results)}
+    for presses in _by_object(results).values():
+        places: dict[str, list[PressResult]] = defaultdict(list)
+        for result in presses:
+            if result.press.region:
+                places[result.press.region].append(result)
+        for place, here in places.items():
+            said = place.lower()
+            if said != "random" and (said == "same" or len(here) > 1):
+                kinds.setdefault(SAME, []).extend(here)
+            if said == "random" or (said != "same" and len(places) > 1):
+                kinds.setdefault(RANDOM, []).extend(here)
+    return kinds
+
+
+def _groups(results: Sequence[PressResult]) -> tuple[Group, ...]:
+    groups: list[Group] = []
+    for regions, presses in region_kinds(results).items():
+        shapes = sorted({r.press.truth.shape for r in presses})
+        for direction in DIRECTIONS:
+            groups.append(_group(presses, direction, ALL, None, regions))
+            for shape in shapes:
+                own = [r for r in presses if r.press.truth.shape == shape]
+                groups.append(_group(own, direction, shape, None, regions))
+                for dimension in sorted({dimension_mm(r, direction) for r in own}):
+                    groups.append(_group(own, direction, shape, dimension, regions))
+    return tuple(groups)
+
+
+def _group(
+    presses: Sequence[PressResult],
+    direction: str,
+    shape: str,
+    dimension: float | None,
+    regions: str,
+) -> Group:
+    chosen = [r for r in presses if dimension is None or dimension_mm(r, direction) == dimension]
+    statistic = _statistic(r.error_percent(direction) for r in chosen)
+    return Group(direction, shape, dimension, regions, statistic)
+
+
+def _by_object(results: Sequence[PressResult]) -> dict[tuple[Any, ...], list[PressResult]]:
+    objects: dict[tuple[Any, ...], list[PressResult]] = defaultdict(list)
+    for result in results:
+        truth = result.press.truth
+        objects[truth.shape, truth.size_mm, truth.height_mm].append(result)
+    return objects
+
+
+def _repeatability(results: Sequence[PressResult]) -> tuple[Repeatability, ...]:
+    """Return one-way analysis of variance with regions as groups, pooled over the objects."""
+    found = []
+    for direction in DIRECTIONS:
+        within, between = _variances(results, direction)
+        if math.isfinite(within) or math.isfinite(between):
+            found.append(Repeatability(direction, math.sqrt(within), math.sqrt(between)))
+    return tuple(found)
+
+
+def _variances(results: Sequence[PressResult], direction: str) -> tuple[float, float]:
+    """Return the variances (mm**2) within a region and between regions."""
+    squares, freedom = 0.0, 0
+    spread: list[tuple[float, int, float]] = []
+    for presses in _by_object(results).values():
+        places: dict[str, list[float]] = defaultdict(list)
+        for result in presses:
+            value = _measured_mm(result, direction)
+            # "random" names no place: two such presses are not repeats of each other.
+            if math.isfinite(value) and result.press.region:
+                said = result.press.region
+                key = f"{said} {result.press.file}" if said.lower() == "random" else said
+                places[key].append(value)
+        for values in places.values():
+            squares += float(np.var(values)) * len(values)
+            freedom += len(values) - 1
+        if len(places) > 1:
+            means = [float(np.mean(values)) for values in places.values()]
+            share = float(np.mean([1.0 / len(values) for values in places.values()]))
+            spread.append((float(np.var(means, ddof=1)), len(means) - 1, share))
+    within = squares / freedom if freedom else math.nan
+    if not spread:
+        return within, math.nan
+    # The means of few repeats scatter by themselves; only what exceeds that is due to the place.
+    noise = 0.0 if math.isnan(within) else within
+    degrees = sum(n for _, n, _ in spread)
+    between = sum(n * (variance - share * noise) for variance, n, share in spread) / degrees
+    return within, max(between, 0.0)
+
+
+def _measured_mm(result: PressResult, direction: str) -> float:
+    if result.measurement is None:
+        return math.nan
+    return result.measurement.size_mm if direction == "planar" else result.measurement.height_mm

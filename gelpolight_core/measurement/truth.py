@@ -1,0 +1,156 @@
+"""Reading ``truth.csv``: what was pressed, where, and how often."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.measurement.result import Truth
+from gelpolight_core.translation import tr
+
+NEEDED = ("file", "shape", "height_mm")
+
+
+@dataclass(frozen=True, slots=True)
+class PressTruth:
+    """One row of ``truth.csv`` that can be measured.
+
+    Attributes
+    ----------
+    file : str
+        Picture, without its folder.
+    truth : Truth
+        Nominal sizes.
+    region, repeat : str
+        Where on the sensor, and which repeat; empty where the file does not say.
+    """
+
+    file: str
+    truth: Truth
+    region: str = ""
+    repeat: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TruthTable:
+    """The presses of a folder.
+
+    Attributes
+    ----------
+    rows : tuple of PressTruth
+        Cylinders, cuboids and balls.
+    skipped : tuple of str
+        Files of other shapes, which have no size to compare.
+    """
+
+    rows: tuple[PressTruth, ...]
+    skipped: tuple[str, ...]
+
+
+def read_truth(path: Path) -> TruthTable:
+    """Read ``truth.csv`` (file, shape, diameter_mm, side_mm, height_mm [, region, repeat]).
+
+    Parameters
+    ----------
+    path : Path
+        The file, or the folder that holds ``truth.csv``.
+
+    Raises
+    ------
+    InputError
+        No such file, not text, a missing column, a missing, bad, zero or negative number, a file
+        named twice, or no row to measure.
+    """
+    path = path / "truth.csv" if path.is_dir() else path
+    records = _records(path)
+    rows: list[PressTruth] = []
+    skipped: list[str] = []
+    seen: set[str] = set()
+    for line, record in records:
+        where = tr("{path}, line {line}").format(path=path, line=line)
+        file, shape = record.get("file", ""), record.get("shape", "").lower()
+        if not file:
+            raise InputError(
+                tr("a row names no file"), where=where, advice=tr("Name the picture of the press")
+            )
+        if file in seen:
+            raise InputError(
+                tr("{file} stands here a second time").format(file=file),
+                where=where,
+                advice=tr("Keep one row for each picture"),
+            )
+        seen.add(file)
+        if shape in MODELS:
+            rows.append(_press(file, shape, record, where))
+        else:
+            skipped.append(file)
+    if not rows:
+        raise InputError(
+            tr("no row with a cylinder, cuboid or ball"),
+            where=str(path),
+            advice=tr("Add a row for each press that has a true size"),
+        )
+    return TruthTable(tuple(rows), tuple(skipped))
+
+
+def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
+    """Return the rows with their line numbers, keys and values stripped."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        raise InputError(
+            tr("there is no such file"),
+            where=str(path),
+            advice=tr("Put a truth.csv with the columns {names} there").format(
+                names="file,shape,diameter_mm,side_mm,height_mm"
+            ),
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError(
+            tr("the file is not text in UTF-8"),
+            where=str(path),
+            advice=tr("Save it again as CSV in UTF-8"),
+        ) from error
+    reader = csv.reader(text.splitlines())
+    header = [name.strip() for name in next(reader, [])]
+    missing = [name for name in NEEDED if name not in header]
+    if not {"diameter_mm", "side_mm"} & set(header):
+        missing.append("diameter_mm")
+    if missing:
+        raise InputError(
+            tr("the column {names} is missing").format(names=", ".join(missing)),
+            where=str(path),
+            advice=tr("Write the column names in the first line, separated by commas"),
+        )
+    return [
+        (reader.line_num, dict(zip(header, (cell.strip() for cell in cells), strict=False)))
+        for cells in reader
+        if any(cell.strip() for cell in cells)
+    ]
+
+
+def _press(file: str, shape: str, record: dict[str, str], where: str) -> PressTruth:
+    key = "side_mm" if shape == "cuboid" else "diameter_mm"
+    truth = Truth(shape, _length(record, key, where), _length(record, "height_mm", where))
+    return PressTruth(file, truth, record.get("region", ""), record.get("repeat", ""))
+
+
+def _length(record: dict[str, str], key: str, where: str) -> float:
+    text = record.get(key, "")
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if math.isfinite(value) and value > 0.0:
+        return value
+    raise InputError(
+        tr("{key} is '{text}'").format(key=key, text=text)
+        if text
+        else tr("{key} is empty").format(key=key),
+        where=where,
+        advice=tr("Give a length in mm greater than zero"),
+    )

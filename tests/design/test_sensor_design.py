@@ -1,0 +1,97 @@
+"""A design file is read whole, checked, and never guessed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.design.sensor_design import SensorDesign, read_design, validate_design
+from gelpolight_core.errors import InputError
+
+TEXT = """
+serial = "bench-7"
+[camera]
+width_px = 640
+distortion = [-0.1, 0.0, 0.0, 0.0]
+[layers]
+window_thickness_mm = 0
+[membrane]
+specular_weight = 0.0
+[[leds]]
+x_mm = 12.0
+[[leds]]
+x_mm = -6.0
+y_mm = 10.4
+[[leds]]
+x_mm = -6.0
+y_mm = -10.4
+[[presses]]
+shape = "cuboid"
+size_mm = 4
+yaw_deg = 30.0
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    """Write a design file."""
+    path = folder / "design.toml"
+    path.write_text(text)
+    return path
+
+
+def test_the_default_design_holds_together() -> None:
+    assert validate_design(SensorDesign()).leds[0].power == 1.0
+
+
+def test_what_a_file_states_is_taken_and_the_rest_stays(tmp_path: Path) -> None:
+    design = read_design(write(tmp_path, TEXT))
+    assert design.serial == "bench-7"
+    assert design.camera.width_px == 640
+    assert design.camera.height_px == SensorDesign().camera.height_px
+    assert design.camera.distortion == (-0.1, 0.0, 0.0, 0.0)
+    assert design.layers.window_thickness_mm == 0.0
+    assert [led.x_mm for led in design.leds] == [12.0, -6.0, -6.0]
+    assert design.presses[0].shape == "cuboid"
+    assert design.balls == SensorDesign().balls
+
+
+@pytest.mark.parametrize(
+    "change, named",
+    [
+        ("[camera]\nfokal = 3", "fokal"),
+        ("[lens]\nfx = 3", "lens"),
+        ("[camera]\nfx = -2.0", "camera.fx"),
+        ("[camera]\nfx = nan", "camera.fx"),
+        ("[camera]\nfx = 'long'", "fx"),
+        ("[camera]\nwidth_px = 640.5", "width_px"),
+        ("[camera]\ndistortion = [1.0]", "distortion"),
+        ("[camera]\nbit_depth = 12", "bit_depth"),
+        ("[layers]\ntop_distance_mm = 10.0", "layers"),
+        ("[[leds]]\nx_mm = 1.0", "LEDs"),
+        ("[leds]\nx_mm = 1.0", "leds"),
+        ("[[presses]]\nshape = 'pyramid'", "pyramid"),
+        ("[[balls]]\nradius_mm = true", "radius_mm"),
+        ("serial = 7", "serial"),
+        ("camera = 7", "camera"),
+        ("[camera", "TOML"),
+    ],
+)
+def test_a_fault_is_named(tmp_path: Path, change: str, named: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_design(write(tmp_path, change))
+    assert named in str(caught.value)
+    assert "design.toml" in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_design(tmp_path / "nothing.toml")
+
+
+def test_half_the_pixels_see_the_same_scene() -> None:
+    small = SensorDesign().scaled(0.5).camera
+    assert (small.width_px, small.height_px) == (640, 480)
+    # The picture's left edge (-0.5) stays at the same angle.
+    full = SensorDesign().camera
+    assert (-0.5 - small.cx) / small.fx == pytest.approx((-0.5 - full.cx) / full.fx)

@@ -1,0 +1,240 @@
+"""A checkerboard is found to a few hundredths of a pixel, and nothing else passes for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.checkerboard import BoardSpec, find_board
+from gelpolight_core.session.picture import Picture
+
+Array = NDArray[np.float64]
+
+BOARD = BoardSpec((9, 6), 3.0)
+CAMERA = Camera(480, 360, 520.0, 520.0, 243.2, 176.4, (-0.12, 0.05, 0.0006, -0.0004, 0.0))
+
+
+def board_pose(
+    *,
+    tilt_deg: float = 0.0,
+    towards_deg: float = 0.0,
+    roll_deg: float = 5.0,
+    distance_mm: float = 45.0,
+    centre_mm: tuple[float, float] = (0.0, 0.0),
+    board: BoardSpec = BOARD,
+) -> tuple[Array, Array]:
+    """Return rotation and shift (mm) of a board whose middle is at a place before the camera."""
+    towards = np.radians(towards_deg)
+    axis = np.array([-np.sin(towards), np.cos(towards), 0.0]) * np.radians(tilt_deg)
+    roll = np.array([0.0, 0.0, np.radians(roll_deg)])
+    rotation = np.asarray(cv2.Rodrigues(axis)[0]) @ np.asarray(cv2.Rodrigues(roll)[0])
+    middle = board.points_mm.mean(axis=0)
+    return rotation, np.array([*centre_mm, distance_mm]) - rotation @ middle
+
+
+def true_corners(camera: Camera, pose: tuple[Array, Array], board: BoardSpec = BOARD) -> Array:
+    """Return the (N, 2) pixels of the corners of a board in a pose."""
+    return camera.project(board.points_mm @ pose[0].T + pose[1])
+
+
+def render_board(
+    camera: Camera,
+    pose: tuple[Array, Array],
+    *,
+    board: BoardSpec = BOARD,
+    name: str = "view.png",
+    blur_px: float = 0.6,
+    noise: float = 0.004,
+    fine: int = 3,
+) -> Picture:
+    """Trace fine x fine rays per pixel onto a printed board: white 0.8, black 0.05, around 0.25."""
+    u, v = np.meshgrid(np.arange(-1.0, camera.width + 1), np.arange(-1.0, camera.height + 1))
+    rays = camera.directions(np.stack([u, v], axis=-1))[..., :2]
+    # Between pixel centres the directions are linear to 1e-6: only they are traced in full.
+    place = [(np.arange(n * fine) + 0.5) / fine + 0.5 for n in (camera.width, camera.height)]
+    # Jittered within their cells: a regular grid would see edges along it a quarter pixel off.
+    rng = np.random.default_rng(7)
+    maps = [
+        (m + rng.uniform(-0.5, 0.5, m.shape) / fine).astype(np.float32) for m in np.meshgrid(*place)
+    ]
+    x, y = (cv2.remap(rays[..., k], *maps, interpolation=cv2.INTER_LINEAR) for k in (0, 1))
+    rotation, shift = pose
+    normal = rotation[:, 2]
+    scale = (normal @ shift) / (normal[0] * x + normal[1] * y + normal[2])
+    hit = [
+        (axis[0] * x + axis[1] * y + axis[2]) * scale - axis @ shift
+        for axis in (rotation[:, 0], rotation[:, 1])
+    ]
+    across, down = (np.floor(side / board.square_mm).astype(int) + 1 for side in hit)
+    squares = [n + 1 for n in board.inner_corners]
+    on_squares = (across >= 0) & (across < squares[0]) & (down >= 0) & (down < squares[1])
+    on_paper = (across >= -1) & (across <= squares[0]) & (down >= -1) & (down <= squares[1])
+    light = np.where(on_squares & ((across + down) % 2 == 0), 0.05, np.where(on_paper, 0.8, 0.25))
+    grey = light.reshape(camera.height, fine, camera.width, fine).mean(axis=(1, 3))
+    if blur_px > 0.0:
+        grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur_px))
+    rgb = grey[..., None] + rng.normal(0.0, noise, (*grey.shape, 3))
+    return Picture(name, (np.round(np.clip(rgb, 0.0, 1.0) * 255.0) / 255.0).astype(np.float32))
+
+
+def distance_to_nearest(corners: Array, truth: Array) -> Array:
+    """Return each corner's distance to the nearest true one (either end may be first)."""
+    return np.asarray(np.linalg.norm(corners[:, None] - truth[None], axis=2).min(axis=1))
+
+
+@pytest.fixture(scope="module")
+def tilted_board() -> Picture:
+    """Return a sharp view of the 9 x 6 board, tilted by 20 degrees."""
+    return render_board(CAMERA, board_pose(tilt_deg=20.0, towards_deg=30.0))
+
+
+@settings(max_examples=6, deadline=None, phases=[Phase.explicit, Phase.generate])
+@given(
+    tilt_deg=st.floats(0.0, 35.0),
+    towards_deg=st.floats(0.0, 360.0),
+    roll_deg=st.floats(-180.0, 180.0),
+    distance_mm=st.floats(45.0, 60.0),
+)
+def test_corners_are_found_in_any_pose(
+    tilt_deg: float, towards_deg: float, roll_deg: float, distance_mm: float
+) -> None:
+    """The technician may hold the board as it comes: tilted, turned, near or far."""
+    pose = board_pose(
+        tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=distance_mm
+    )
+    view = find_board(render_board(CAMERA, pose), BOARD)
+    off = distance_to_nearest(view.corners_px, true_corners(CAMERA, pose))
+    # 0.1 px on squares of 20 to 35 px is what a focal length to 0.1 % asks for; it is met twice.
+    assert np.sqrt(np.mean(off**2)) < 0.05
+    assert off.max() < 0.2
+    assert view.tilt_deg == pytest.approx(tilt_deg, abs=12.0)
+
+
+def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: Picture) -> None:
+    """An overlay draws the grid along its rows; no row is swapped or mirrored."""
+    view = find_board(tilted_board, BOARD)
+    grid = view.corners_px.reshape(6, 9, 2)
+    along, down = grid[:, 1:] - grid[:, :-1], grid[1:] - grid[:-1]
+    turn = along[:-1, :, 0] * down[:, :-1, 1] - along[:-1, :, 1] * down[:, :-1, 0]
+    assert (turn > 0.0).all()
+    size = np.linalg.norm(along, axis=-1)
+    assert size.max() < 1.6 * size.min()
+
+
+def test_the_result_tells_how_good_the_view_is(tilted_board: Picture) -> None:
+    """Sharpness, contrast, saturation and misfit are shown beside the picture."""
+    view = find_board(tilted_board, BOARD)
+    assert view.contrast == pytest.approx(0.75, abs=0.02)
+    # Blur 0.6 px with the pixel's own 0.29: 2.56 * 0.67.
+    assert view.edge_width_px == pytest.approx(1.7, abs=0.2)
+    assert view.saturated_share == 0.0
+    # k1 of -0.12 bends the grid; two radial coefficients take most of it away again.
+    assert view.grid_rms_px < 0.5 * view.homography_rms_px
+    u_min, v_min, u_max, v_max = view.bounding_box_px
+    assert 0 < u_min < u_max < 480
+    assert 0 < v_min < v_max < 360
+
+
+@pytest.mark.parametrize("stated", [(8, 5), (7, 7), (9, 7), (10, 7), (5, 4), (12, 9)])
+def test_another_board_size_is_refused_and_the_real_one_named(
+    tilted_board: Picture, stated: tuple[int, int]
+) -> None:
+    """A board of another size would give a wrong camera; the mistake is named."""
+    with pytest.raises(InputError, match=r"9 x 6 inner corners, not") as refusal:
+        find_board(tilted_board, BoardSpec(stated, 3.0))
+    assert refusal.value.where == "view.png"
+    assert "inner_corners" in refusal.value.advice
+
+
+def test_a_board_may_be_stated_lengthwise_or_crosswise(tilted_board: Picture) -> None:
+    """9 x 6 and 6 x 9 are one board."""
+    lengthwise = find_board(tilted_board, BOARD).corners_px
+    crosswise = find_board(tilted_board, BoardSpec((6, 9), 3.0)).corners_px
+    assert distance_to_nearest(crosswise, lengthwise).max() < 0.01
+
+
+def test_uneven_light_does_not_move_the_corners(tilted_board: Picture) -> None:
+    """A lamp at one side is no fault of the lens."""
+    straight = find_board(tilted_board, BOARD).corners_px
+    falloff = np.linspace(0.25, 1.2, 480, dtype=np.float32)[None, :, None]
+    shaded = Picture("shaded.png", np.clip(tilted_board.rgb * falloff, 0.0, 0.99))
+    assert distance_to_nearest(find_board(shaded, BOARD).corners_px, straight).max() < 0.1
+
+
+def flat(value: float) -> Picture:
+    """Return a picture of one value."""
+    return Picture("flat.png", np.full((360, 480, 3), value, dtype=np.float32))
+
+
+@pytest.mark.parametrize(
+    ("picture", "says"),
+    [
+        (flat(0.0), "black"),
+        (flat(0.01), "black"),
+        (flat(1.0), "saturated"),
+        (flat(0.5), "one brightness"),
+        (flat(float("nan")), "hold no number"),
+    ],
+)
+def test_a_picture_of_nothing_is_refused_by_its_reason(picture: Picture, says: str) -> None:
+    """What is wrong with the exposure decides what to do about it."""
+    with pytest.raises(InputError, match=says):
+        find_board(picture, BOARD)
+
+
+def test_noise_alone_is_no_board() -> None:
+    """A detector that says yes to everything is not believed."""
+    noise = np.random.default_rng(3).random((360, 480, 3)).astype(np.float32)
+    with pytest.raises(InputError, match="no checkerboard with 9 x 6"):
+        find_board(Picture("noise.png", noise), BOARD)
+
+
+@pytest.mark.parametrize("blur_px", [2.5, 5.0, 12.0])
+def test_a_blurred_board_is_refused_as_blurred(tilted_board: Picture, blur_px: float) -> None:
+    """Out of focus or moved: said so, not called missing."""
+    blurred = np.asarray(cv2.GaussianBlur(tilted_board.rgb, (0, 0), blur_px))
+    with pytest.raises(InputError, match="blurred: edges are"):
+        find_board(Picture("blurred.png", blurred), BOARD)
+
+
+def test_light_squares_at_the_end_of_the_scale_are_refused(tilted_board: Picture) -> None:
+    """Cut-off light squares have no level to measure an edge from."""
+    with pytest.raises(InputError, match="light squares are saturated"):
+        find_board(Picture("bright.png", np.clip(tilted_board.rgb * 1.6, 0.0, 1.0)), BOARD)
+
+
+def test_a_board_that_is_half_covered_is_not_accepted(tilted_board: Picture) -> None:
+    """Half a board is not taken for a whole one."""
+    covered = tilted_board.rgb.copy()
+    covered[:, :200] = 0.3
+    with pytest.raises(InputError):
+        find_board(Picture("covered.png", covered), BOARD)
+
+
+@pytest.mark.parametrize(
+    ("corners", "square_mm"), [((2, 6), 3.0), ((9, 6), 0.0), ((9, 6), float("nan"))]
+)
+def test_an_impossible_board_is_refused(corners: tuple[int, int], square_mm: float) -> None:
+    """A typing error in the session is found before any picture is read."""
+    with pytest.raises(InputError):
+        BoardSpec(corners, square_mm)
+
+
+@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
+def test_wrong_sizes_never_pass_on_rendered_sessions(shared_data: Path, sensor: str) -> None:
+    """The independent renderer's board is found, and only at its own size."""
+    path = shared_data / sensor / "top_pose" / "top_pose.png"
+    rgb = cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)
+    picture = Picture(path.name, rgb)
+    assert find_board(picture, BOARD).grid_rms_px < 0.1
+    for stated in [(8, 5), (7, 7), (5, 4), (3, 3), (10, 6)]:
+        with pytest.raises(InputError, match="9 x 6"):
+            find_board(picture, BoardSpec(stated, 3.0))

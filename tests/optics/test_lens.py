@@ -1,0 +1,209 @@
+"""The lens calibration finds the camera, says how sure it is, and refuses what gives no camera."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from test_checkerboard import BOARD, CAMERA, board_pose, render_board
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.lens import LensResult, calibrate_lens, find_nonsense
+from gelpolight_core.quality import Verdict
+from gelpolight_core.session.picture import Picture
+
+# Tilt, its direction, distance, and where the board's middle is: as a technician holds it.
+HELD = [
+    (5.0, 0.0, 45.0, (0.0, 0.0)),
+    (28.0, 20.0, 50.0, (-5.0, -3.0)),
+    (30.0, 95.0, 52.0, (5.0, -3.0)),
+    (25.0, 160.0, 50.0, (5.0, 3.0)),
+    (32.0, 230.0, 52.0, (-5.0, 3.0)),
+    (22.0, 300.0, 47.0, (0.0, 2.0)),
+    (35.0, 60.0, 54.0, (-2.0, -4.0)),
+    (26.0, 200.0, 48.0, (2.0, 1.0)),
+    (18.0, 340.0, 46.0, (1.0, -1.0)),
+]
+
+
+def held_view(number: int, camera: Camera = CAMERA, **changes: float) -> Picture:
+    """Return the numbered view of the board."""
+    tilt_deg, towards_deg, distance_mm, centre_mm = HELD[number]
+    pose = board_pose(
+        tilt_deg=tilt_deg,
+        towards_deg=towards_deg,
+        roll_deg=7.0 * number - 20.0,
+        distance_mm=distance_mm,
+        centre_mm=centre_mm,
+    )
+    return render_board(camera, pose, name=f"view_{number:02}.png", **changes)
+
+
+@pytest.fixture(scope="module")
+def views() -> list[Picture]:
+    """Return nine good views."""
+    return [held_view(number) for number in range(len(HELD))]
+
+
+@pytest.fixture(scope="module")
+def lens(views: list[Picture]) -> LensResult:
+    """Return the lens that the nine views give."""
+    return calibrate_lens(views, BOARD)
+
+
+def test_the_camera_is_found_within_its_stated_uncertainty(lens: LensResult) -> None:
+    """The uncertainty that is shown is the one that the figures have."""
+    camera = lens.camera
+    assert camera.fx == pytest.approx(CAMERA.fx, rel=1e-3)
+    values = np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:4]])
+    truth = np.array([CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy, *CAMERA.distortion[:4]])
+    sd = np.array([*lens.focal_sd_px, *lens.centre_sd_px, *lens.distortion_sd[:4]])
+    # Four standard deviations in eight figures: by chance alone once in two thousand.
+    assert (np.abs(values - truth) < 4.0 * sd).all()
+    assert lens.focal_sd_px[0] < 1e-3 * CAMERA.fx
+
+
+def test_square_pixels_are_kept_where_nothing_speaks_against_them(lens: LensResult) -> None:
+    """One focal length is known better than two."""
+    assert lens.square_pixels
+    assert lens.camera.fx == lens.camera.fy
+
+
+def test_pixels_that_are_not_square_are_noticed() -> None:
+    """A camera that squeezes its picture is not forced into square pixels."""
+    squeezed = Camera(480, 360, 520.0, 510.0, 243.2, 176.4)
+    lens = calibrate_lens([held_view(number, squeezed) for number in range(6)], BOARD)
+    assert not lens.square_pixels
+    assert lens.camera.fx / lens.camera.fy == pytest.approx(520.0 / 510.0, rel=1e-3)
+
+
+def test_views_held_out_are_explained_as_well_as_those_used(lens: LensResult) -> None:
+    """The error that is shown is not one of learning by heart."""
+    assert lens.rms_px < 0.06
+    assert lens.rms_px < lens.held_out_rms_px < 1.5 * lens.rms_px
+    assert all(view.held_out_rms_px >= 0.9 * view.rms_px for view in lens.views)
+
+
+def test_the_result_shows_where_corners_were_seen(lens: LensResult) -> None:
+    """An overlay can show the bare parts of the picture and each view's residuals."""
+    assert lens.coverage_map.sum() == 9 * 54
+    assert lens.coverage == np.mean(lens.coverage_map > 0)
+    for view in lens.views:
+        assert view.residuals_px is not None
+        rms = np.sqrt(np.mean(np.sum(view.residuals_px**2, axis=1)))
+        assert rms == pytest.approx(view.rms_px, rel=0.02)
+    assert lens.views[1].distance_mm < lens.views[6].distance_mm
+    assert lens.quality["views_left_out"].verdict is Verdict.PASS
+
+
+def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[Picture]) -> None:
+    """One slip of the hand costs one view, not the session."""
+    moved = Picture("moved.png", np.asarray(cv2.GaussianBlur(views[2].rgb, (0, 0), 4.0)))
+    dark = Picture("dark.png", np.zeros_like(views[0].rgb))
+    again = Picture("again.png", views[4].rgb)
+    lens = calibrate_lens([*views[:7], moved, dark, again], BOARD)
+    reasons = {view.name: view.reason for view in lens.views if not view.used}
+    assert reasons.keys() == {"moved.png", "dark.png", "again.png"}
+    assert "blurred" in reasons["moved.png"]
+    assert "black" in reasons["dark.png"]
+    assert "view_04.png" in reasons["again.png"]
+    assert lens.quality["views_left_out"].verdict is Verdict.WARN
+    assert "moved.png" in lens.quality["views_left_out"].advice
+    assert lens.camera.fx == pytest.approx(CAMERA.fx, rel=2e-3)
+
+
+def test_a_bent_board_is_left_out_by_its_error(views: list[Picture]) -> None:
+    """A view that fits no camera pulls at all figures; it is named with its error."""
+    rows, columns = np.mgrid[0:360, 0:480].astype(np.float32)
+    wavy = (columns + 0.6 * np.sin(rows / 40.0)).astype(np.float32)
+    bent = Picture("bent.png", np.asarray(cv2.remap(views[3].rgb, wavy, rows, cv2.INTER_LINEAR)))
+    lens = calibrate_lens([*views[:3], bent, *views[4:]], BOARD)
+    assert [view.name for view in lens.views if not view.used] == ["bent.png"]
+    assert "typical view" in lens.views[3].reason
+    assert lens.camera.fx == pytest.approx(CAMERA.fx, rel=2e-3)
+
+
+def test_three_views_are_not_enough(views: list[Picture]) -> None:
+    """Three views explain any camera; nothing would check it."""
+    with pytest.raises(InputError, match="3 pictures, at least 4"):
+        calibrate_lens(views[:3], BOARD)
+
+
+def test_one_view_many_times_is_one_view(views: list[Picture]) -> None:
+    """Pressing the shutter again adds no view."""
+    copies = [Picture(f"copy_{k}.png", views[1].rgb) for k in range(6)]
+    with pytest.raises(InputError, match=r"1 of 6 views.*just as copy_0\.png"):
+        calibrate_lens(copies, BOARD)
+
+
+def test_a_session_of_another_board_says_which(views: list[Picture]) -> None:
+    """The refusal names the size once, not once per file."""
+    smaller = type(BOARD)((8, 6), 3.0)
+    with pytest.raises(InputError, match="9 x 6 inner corners, not 8 x 6") as refusal:
+        calibrate_lens(views[:4], smaller)
+    assert str(refusal.value).count("9 x 6") == 1
+
+
+def test_parallel_views_are_refused_for_want_of_a_focal_length() -> None:
+    """Moving the board without tilting it shows the same at any focal length."""
+    pictures = [
+        render_board(CAMERA, board_pose(tilt_deg=1.0, towards_deg=90.0 * k, distance_mm=44.0 + k))
+        for k in range(4)
+    ]
+    with pytest.raises(InputError, match="too nearly parallel"):
+        calibrate_lens(pictures, BOARD)
+
+
+def test_pictures_of_two_sizes_are_refused(views: list[Picture]) -> None:
+    """Two sizes are two cameras."""
+    cropped = Picture("cropped.png", views[3].rgb[:300])
+    with pytest.raises(InputError, match="480 x 300") as refusal:
+        calibrate_lens([*views[:3], cropped], BOARD)
+    assert refusal.value.where == "cropped.png"
+
+
+@pytest.mark.parametrize(
+    ("camera", "says"),
+    [
+        (Camera(640, 480, 5115.0, 6346.0, 320.0, 240.0, (0.0, -50494.0, 0.0, 0.0, 0.0)), "10 %"),
+        (Camera(640, 480, 5115.0, 5115.0, 320.0, 240.0, (0.0, -50494.0, 0.0, 0.0, 0.0)), "folds"),
+        (Camera(640, 480, 700.0, 700.0, 900.0, 240.0), "principal point"),
+        (Camera(640, 480, 20.0, 20.0, 320.0, 240.0), "do not suit"),
+        (Camera(640, 480, float("nan"), 700.0, 320.0, 240.0), "not numbers"),
+    ],
+)
+def test_intrinsics_that_no_camera_has_are_recognised(camera: Camera, says: str) -> None:
+    """The first is a shipped calibration of another project."""
+    nonsense = find_nonsense(camera)
+    assert nonsense is not None
+    assert says in nonsense
+
+
+def test_cameras_of_sensors_are_not_nonsense() -> None:
+    """Neither a plain lens nor a wide one with barrel distortion is turned away."""
+    assert find_nonsense(CAMERA) is None
+    wide = Camera(1280, 960, 700.0, 700.0, 650.0, 470.0, (-0.25, 0.06, 0.0, 0.0, 0.0))
+    assert find_nonsense(wide) is None
+
+
+@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
+def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
+    shared_data: Path, sensor: str
+) -> None:
+    """Every length of the sensor rests on this one."""
+    truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["camera"]
+    pictures = [
+        Picture(path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255))
+        for path in sorted((shared_data / sensor / "checkerboard").glob("*.png"))
+    ]
+    lens = calibrate_lens(pictures, BOARD)
+    assert lens.camera.fx == pytest.approx(truth["fx"], rel=1e-3)
+    assert lens.camera.fy == pytest.approx(truth["fy"], rel=1e-3)
+    # 1 px of the principal point is 0.03 mm on the membrane, and the pose takes most of it up.
+    assert np.hypot(lens.camera.cx - truth["cx"], lens.camera.cy - truth["cy"]) < 1.0
+    assert lens.held_out_rms_px < 0.1
+    assert lens.quality.verdict is Verdict.PASS

@@ -1,0 +1,200 @@
+"""The top surface is found from a board that lies on it, and its mirrored twin is turned down."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+from test_checkerboard import CAMERA, board_pose, render_board
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.lens import calibrate_lens
+from gelpolight_core.optics.pose import Decision, estimate_top_pose
+from gelpolight_core.quality import Verdict
+from gelpolight_core.session.picture import Picture
+
+BOARD = BoardSpec((9, 6), 2.0)
+
+
+def lying_board(
+    *,
+    tilt_deg: float = 1.5,
+    towards_deg: float = 40.0,
+    roll_deg: float = 8.0,
+    distance_mm: float = 39.0,
+    centre_mm: tuple[float, float] = (0.3, -0.2),
+    camera: Camera = CAMERA,
+    name: str = "top.png",
+    noise: float = 0.004,
+    blur_px: float = 0.6,
+) -> tuple[Picture, TopPlane]:
+    """Return the picture of a board and the plane in which it lies."""
+    rotation, shift = board_pose(
+        tilt_deg=tilt_deg,
+        towards_deg=towards_deg,
+        roll_deg=roll_deg,
+        distance_mm=distance_mm,
+        centre_mm=centre_mm,
+        board=BOARD,
+    )
+    picture = render_board(
+        camera, (rotation, shift), board=BOARD, name=name, noise=noise, blur_px=blur_px
+    )
+    x, y, z = (float(n) for n in rotation[:, 2])
+    return picture, TopPlane((x, y, z), float(rotation[:, 2] @ shift))
+
+
+def angle_deg(plane: TopPlane, other: TopPlane) -> float:
+    """Return the angle between two planes."""
+    across = np.cross(plane.normal_camera, other.normal_camera)
+    return float(np.degrees(np.arcsin(np.linalg.norm(across))))
+
+
+@settings(max_examples=6, deadline=None, phases=[Phase.explicit, Phase.generate])
+@given(
+    tilt_deg=st.floats(0.0, 8.0),
+    towards_deg=st.floats(0.0, 360.0),
+    roll_deg=st.floats(-180.0, 180.0),
+    distance_mm=st.floats(32.0, 55.0),
+)
+def test_the_surface_is_found_however_it_is_mounted(
+    tilt_deg: float, towards_deg: float, roll_deg: float, distance_mm: float
+) -> None:
+    """Distance to 0.1 %, normal to 0.1 degrees, and both within what the result says of itself."""
+    picture, truth = lying_board(
+        tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=distance_mm
+    )
+    result = estimate_top_pose([picture], BOARD, CAMERA)
+    assert result.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
+    # Squares of 19 px at 55 mm carry a third of what the rendered sessions' do.
+    assert angle_deg(result.plane, truth) < 0.2
+    assert angle_deg(result.plane, truth) < 5.0 * result.normal_sd_deg
+    assert abs(result.plane.distance_mm - truth.distance_mm) < 5.0 * result.distance_sd_mm
+    assert result.plane.normal_camera[2] > 0.9
+
+
+def test_the_mirrored_pose_is_rejected_and_shown() -> None:
+    """Both poses of a flat board are on the table, with what speaks against the wrong one."""
+    picture, truth = lying_board(tilt_deg=6.0)
+    result = estimate_top_pose([picture], BOARD, CAMERA)
+    assert result.decision is Decision.EVIDENCE
+    assert result.mirrored is not None
+    assert angle_deg(result.plane, truth) < 0.1
+    assert angle_deg(result.mirrored.plane, truth) > 3.0
+    assert result.mirrored.rms_px > 3.0 * result.rms_px
+    assert result.margin_sd > 5.0
+    assert result.quality["mirrored_margin"].verdict is Verdict.PASS
+
+
+def far_camera() -> Camera:
+    """Return a long lens: from far away a board has hardly any perspective."""
+    return Camera(320, 240, 120000.0, 120000.0, 160.0, 120.0)
+
+
+def test_two_poses_that_fit_equally_well_are_told_of() -> None:
+    """Seen from afar in noise nothing tells the two apart; the result does not pretend."""
+    picture, truth = lying_board(
+        tilt_deg=6.0, distance_mm=10000.0, camera=far_camera(), noise=0.03, blur_px=1.0
+    )
+    result = estimate_top_pose([picture], BOARD, far_camera())
+    assert result.decision is Decision.TILT
+    assert result.quality["mirrored_margin"].verdict is Verdict.WARN
+    assert result.mirrored is not None
+    assert result.tilt_deg <= result.mirrored.tilt_deg
+    nearest = min(angle_deg(plane, truth) for plane in (result.plane, result.mirrored.plane))
+    assert nearest < 2.0
+
+
+def test_several_views_are_averaged() -> None:
+    """Turning the board on the surface and capturing again makes the answer surer."""
+    laid = [
+        lying_board(roll_deg=roll, centre_mm=(0.0, 0.0), name=f"top_{roll:.0f}.png")
+        for roll in (-60.0, 5.0, 95.0)
+    ]
+    truth = laid[0][1]
+    one = estimate_top_pose([laid[0][0]], BOARD, CAMERA)
+    all_three = estimate_top_pose([picture for picture, _ in laid], BOARD, CAMERA)
+    assert all(view.used for view in all_three.views)
+    assert all_three.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
+    assert angle_deg(all_three.plane, truth) < 0.1
+    assert all_three.distance_sd_mm < one.distance_sd_mm
+
+
+def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
+    """A crumb under one of three boards does not tilt the sensor."""
+    flat = [lying_board(roll_deg=roll, name=f"flat_{roll:.0f}.png") for roll in (-40.0, 10.0, 70.0)]
+    propped, _ = lying_board(tilt_deg=4.0, towards_deg=200.0, name="propped.png")
+    result = estimate_top_pose([*(picture for picture, _ in flat), propped], BOARD, CAMERA)
+    assert [view.name for view in result.views if not view.used] == ["propped.png"]
+    assert "propped.png" in result.quality["views_left_out"].advice
+    assert angle_deg(result.plane, flat[0][1]) < 0.1
+
+
+def test_a_failed_picture_among_good_ones_is_left_out_and_named() -> None:
+    """A black frame among the views is named, not fatal."""
+    picture, truth = lying_board()
+    black = Picture("black.png", np.zeros_like(picture.rgb))
+    result = estimate_top_pose([black, picture], BOARD, CAMERA)
+    assert [view.used for view in result.views] == [False, True]
+    assert "black" in result.views[0].reason
+    assert result.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
+
+
+def test_the_focal_length_s_uncertainty_reaches_the_distance() -> None:
+    """A distance is not known better than the focal length it is measured with."""
+    picture, _ = lying_board()
+    result = estimate_top_pose([picture], BOARD, CAMERA, focal_sd_px=0.01 * CAMERA.fx)
+    assert result.distance_sd_mm >= 0.01 * result.plane.distance_mm
+    assert result.quality["distance_sd"].verdict is not Verdict.PASS
+
+
+def test_without_a_usable_picture_the_reason_is_given() -> None:
+    """The one picture's fault is the stage's fault."""
+    picture, _ = lying_board()
+    with pytest.raises(InputError, match="no picture"):
+        estimate_top_pose([], BOARD, CAMERA)
+    black = Picture("top_pose.png", np.zeros_like(picture.rgb))
+    with pytest.raises(InputError, match="black") as refusal:
+        estimate_top_pose([black], BOARD, CAMERA)
+    assert refusal.value.where == "top_pose.png"
+    with pytest.raises(InputError, match="480 x 200"):
+        estimate_top_pose([Picture("cut.png", picture.rgb[:200])], BOARD, CAMERA)
+
+
+def read(path: Path) -> Picture:
+    """Return an 8-bit picture file."""
+    return Picture(
+        path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)
+    )
+
+
+@pytest.mark.parametrize(("sensor", "normal_deg"), [("sensor-A", 0.05), ("sensor-B", 0.1)])
+def test_rendered_sessions_give_the_surface_with_our_own_lens(
+    shared_data: Path, sensor: str, normal_deg: float
+) -> None:
+    """0.1 % of the distance is 0.1 % of every length; 0.1 degrees moves a light by 0.1 mm."""
+    folder = shared_data / sensor
+    truth = json.loads((folder / "truth.json").read_text("utf-8"))["top_plane"]
+    lens = calibrate_lens(
+        [read(path) for path in sorted((folder / "checkerboard").glob("*.png"))],
+        BoardSpec((9, 6), 3.0),
+    )
+    result = estimate_top_pose(
+        [read(folder / "top_pose" / "top_pose.png")],
+        BOARD,
+        lens.camera,
+        focal_sd_px=lens.focal_sd_px[0],
+    )
+    x, y, z = truth["normal_camera"]
+    plane = TopPlane((x, y, z), truth["offset_mm"])
+    assert result.plane.distance_mm == pytest.approx(plane.distance_mm, rel=1e-3)
+    assert angle_deg(result.plane, plane) < normal_deg
+    assert result.quality.verdict is Verdict.PASS

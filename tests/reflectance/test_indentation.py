@@ -1,0 +1,436 @@
+"""A ball's indentation is found by itself, or refused with a reason a person can act on."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.refraction import (
+    build_stack,
+    camera_to_membrane,
+    membrane_to_camera,
+)
+from gelpolight_core.quality import Verdict
+from gelpolight_core.reflectance.indentation import Indentation, find_indentation
+from gelpolight_core.reflectance.noise import match_gain, pixel_noise
+
+Pictures = tuple[NDArray[np.float32], NDArray[np.float32]]
+Array = NDArray[np.float64]
+WIDTH, HEIGHT = 320, 240
+
+
+def surface(
+    presses: list[tuple[float, float, float]], *, drape_px: float, contact_over_ball: float
+) -> tuple[NDArray[np.float64], ...]:
+    """Return depth and slopes of balls that the membrane leaves along a tangent."""
+    y, x = np.indices((HEIGHT, WIDTH), dtype=np.float64)
+    depth, slope_x, slope_y = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    for cx, cy, contact in presses:
+        ball = contact / contact_over_ball
+        r = np.hypot(x - cx, y - cy)
+        edge_height = np.sqrt(ball**2 - contact**2)
+        fall = np.exp(-np.maximum(r - contact, 0.0) / drape_px)
+        ball_height = np.sqrt(np.maximum(ball**2 - np.minimum(r, contact) ** 2, 0.0))
+        slope = np.where(r < contact, r / ball_height, contact / edge_height * fall)
+        depth += contact / edge_height * drape_px * fall + ball_height - edge_height
+        slope_x -= slope * (x - cx) / np.maximum(r, 1e-9)
+        slope_y -= slope * (y - cy) / np.maximum(r, 1e-9)
+    return depth, slope_x, slope_y
+
+
+def shade(
+    depth: NDArray[np.float64], slope_x: NDArray[np.float64], slope_y: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return a Lambertian membrane under three point lights, one per channel, with shadows."""
+    y, x = np.indices(depth.shape, dtype=np.float64)
+    steep = np.sqrt(1.0 + slope_x**2 + slope_y**2)
+    height = 140.0
+    light = []
+    for angle in np.deg2rad([90.0, 210.0, 330.0]):
+        dx = WIDTH / 2 + 140.0 * np.cos(angle) - x
+        dy = HEIGHT / 2 + 140.0 * np.sin(angle) - y
+        dz = height - depth
+        distance = np.sqrt(dx**2 + dy**2 + dz**2)
+        cosine = np.maximum(dz - slope_x * dx - slope_y * dy, 0.0) / (steep * distance)
+        lit = np.ones_like(depth)
+        for step in np.linspace(0.02, 0.3, 15):
+            over = cv2.remap(
+                depth.astype(np.float32),
+                (x + step * dx).astype(np.float32),
+                (y + step * dy).astype(np.float32),
+                cv2.INTER_LINEAR,
+            )
+            lit *= over <= depth + step * dz + 0.1
+        light.append(cosine * (height / distance) ** 2 * cv2.GaussianBlur(lit, (0, 0), 0.7))
+    return np.stack(light, axis=2)
+
+
+def scene(
+    *presses: tuple[float, float, float],
+    noise: float = 0.003,
+    seed: int = 0,
+    drape_px: float = 12.0,
+    contact_over_ball: float = 0.55,
+    gain: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    reflectance: NDArray[np.floating] | float = 1.0,
+) -> Pictures:
+    """Return an 8-bit picture of presses (x, y, contact radius), and its background."""
+    rng = np.random.default_rng(seed)
+    flat = np.zeros((HEIGHT, WIDTH))
+    factor = np.broadcast_to(np.asarray(reflectance), flat.shape)[..., None]
+    background = shade(flat, flat, flat)
+    exposure = 0.8 / background.max()
+    form = surface(list(presses), drape_px=drape_px, contact_over_ball=contact_over_ball)
+    pressed = shade(*form) * np.array(gain)
+    taken = []
+    for picture in (pressed, background):
+        signal = exposure * picture * factor + noise * rng.standard_normal(picture.shape)
+        taken.append((np.rint(255.0 * np.clip(signal, 0.0, 1.0)) / 255.0).astype(np.float32))
+    return taken[0], taken[1]
+
+
+def off_by(found: Indentation, x: float, y: float) -> float:
+    return float(np.hypot(found.centre[0] - x, found.centre[1] - y))
+
+
+def refusal(press: NDArray[np.float32], background: NDArray[np.float32]) -> InputError:
+    with pytest.raises(InputError) as caught:
+        find_indentation(press, background, name="ball_07.png", background_name="background.png")
+    assert "ball_07.png" in caught.value.where
+    assert caught.value.advice
+    return caught.value
+
+
+# -- what is found ------------------------------------------------------------------------------
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    x=st.floats(75.0, 245.0),
+    y=st.floats(75.0, 165.0),
+    radius=st.floats(12.0, 65.0),
+    noise=st.sampled_from([0.003, 0.01]),
+    seed=st.integers(0, 1000),
+)
+def test_centre_and_radius_of_any_clear_press(
+    x: float, y: float, radius: float, noise: float, seed: int
+) -> None:
+    found = find_indentation(*scene((x, y, radius), noise=noise, seed=seed))
+    # 1.5 px of a contact of 30 px is 1.6 degrees of slope at 0.55: what the shading refines.
+    assert off_by(found, x, y) < 1.5
+    assert found.contact_radius_px == pytest.approx(radius, abs=1.5)
+    assert found.quality.verdict is not Verdict.FAIL
+
+
+def test_quiet_picture_gives_a_tenth_of_a_pixel() -> None:
+    found = find_indentation(*scene((141.3, 118.8, 40.0)))
+    assert off_by(found, 141.3, 118.8) < 0.25
+    assert found.contact_radius_px == pytest.approx(40.0, abs=0.4)
+    assert found.centre_sd_px < 0.25
+    assert found.coverage > 0.9
+    assert found.axis_ratio > 0.97
+
+
+def test_contour_is_what_the_circle_goes_through() -> None:
+    found = find_indentation(*scene((160.0, 120.0, 40.0)))
+    distance = np.hypot(*(found.contour - found.centre).T)
+    assert found.contour.shape[1] == 2
+    assert np.median(np.abs(distance - found.contact_radius_px)) < 0.5
+
+
+def test_contact_of_half_the_field_is_found() -> None:
+    found = find_indentation(*scene((160.0, 120.0, 85.0)))
+    assert off_by(found, 160.0, 120.0) < 1.0
+    assert found.gain == pytest.approx((1.0, 1.0, 1.0), abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_heavy_noise_still_gives_the_place_and_admits_doubt(seed: int) -> None:
+    clear = find_indentation(*scene((150.0, 110.0, 45.0), seed=seed))
+    noisy = find_indentation(*scene((150.0, 110.0, 45.0), noise=0.0316, seed=seed))
+    # 30 dB: a twentieth of the radius is what the refinement on the shading can start from.
+    assert off_by(noisy, 150.0, 110.0) < 4.5
+    assert noisy.centre_sd_px > clear.centre_sd_px
+    assert noisy.noise == pytest.approx((0.0447,) * 3, rel=0.15)
+    assert noisy.signal_to_noise < clear.signal_to_noise
+
+
+def test_specks_and_texture_of_the_membrane_do_not_move_the_circle() -> None:
+    rng = np.random.default_rng(3)
+    factor = 1.0 + 0.5 * cv2.GaussianBlur(rng.standard_normal((HEIGHT, WIDTH)), (0, 0), 2.0)
+    for x, y in rng.integers(5, 235, (60, 2)):
+        cv2.circle(factor, (int(x), int(y)), 2, 0.3, -1)
+    found = find_indentation(*scene((130.0, 120.0, 40.0), reflectance=factor))
+    assert off_by(found, 130.0, 120.0) < 1.0
+
+
+def test_dust_that_came_with_the_press_does_not_move_the_circle() -> None:
+    press, background = scene((130.0, 120.0, 40.0))
+    for x, y in np.random.default_rng(4).integers(5, 235, (60, 2)):
+        cv2.circle(press, (int(x), int(y)), 1, (0.0, 0.0, 0.0), -1)
+    assert off_by(find_indentation(press, background), 130.0, 120.0) < 1.0
+
+
+@settings(max_examples=5, deadline=None)
+@given(gains=st.tuples(*[st.floats(0.9, 1.1)] * 3))
+def test_small_changes_of_the_light_are_measured_and_taken_out(
+    gains: tuple[float, float, float],
+) -> None:
+    found = find_indentation(*scene((150.0, 120.0, 35.0), gain=gains))
+    assert off_by(found, 150.0, 120.0) < 0.5
+    assert found.gain == pytest.approx(gains, abs=0.01)
+
+
+def test_pixels_that_are_not_numbers_are_left_out() -> None:
+    press, background = scene((150.0, 120.0, 35.0))
+    press[:, :20] = np.nan
+    background[:10] = np.inf
+    press[:10] = -np.inf
+    assert off_by(find_indentation(press, background), 150.0, 120.0) < 0.5
+
+
+def test_inputs_are_not_changed() -> None:
+    press, background = scene((150.0, 120.0, 35.0))
+    before = press.copy(), background.copy()
+    find_indentation(press, background)
+    np.testing.assert_array_equal(press, before[0])
+    np.testing.assert_array_equal(background, before[1])
+
+
+def test_drape_that_reaches_the_border_is_told() -> None:
+    near = find_indentation(*scene((42.0, 120.0, 35.0)))
+    assert near.touches_border
+    assert off_by(near, 42.0, 120.0) < 1.5
+    assert not find_indentation(*scene((150.0, 120.0, 30.0))).touches_border
+
+
+def test_disturbed_region_holds_the_contact_and_its_drape() -> None:
+    found = find_indentation(*scene((150.0, 120.0, 35.0)))
+    y, x = np.indices((HEIGHT, WIDTH))
+    distance = np.hypot(x - 150.0, y - 120.0)
+    edge = np.abs(distance - 35.0) < 3.0
+    assert found.disturbed[edge].mean() > 0.95
+    assert found.disturbed[distance > 110.0].mean() < 0.01
+    assert found.disturbed_area_px == np.count_nonzero(found.disturbed)
+
+
+# -- what is refused ----------------------------------------------------------------------------
+
+
+@settings(max_examples=8, deadline=None)
+@given(noise=st.sampled_from([0.0, 0.003, 0.01, 0.0316]), seed=st.integers(0, 1000))
+def test_untouched_membrane_has_no_indentation(noise: float, seed: int) -> None:
+    assert "no indentation" in refusal(*scene(noise=noise, seed=seed)).found
+
+
+def test_two_presses_are_refused() -> None:
+    error = refusal(*scene((90.0, 100.0, 30.0), (220.0, 140.0, 30.0)))
+    assert "more than one" in error.found
+    assert "one ball at a time" in error.advice
+
+
+@pytest.mark.parametrize(("x", "y"), [(10.0, 120.0), (150.0, 225.0), (310.0, 20.0), (300.0, 120.0)])
+def test_contact_cut_by_the_picture_is_refused(x: float, y: float) -> None:
+    assert "border cuts" in refusal(*scene((x, y, 35.0))).found
+
+
+def test_contact_cut_by_the_working_area_is_refused() -> None:
+    press, background = scene((120.0, 120.0, 35.0))
+    rows, columns = np.indices((HEIGHT, WIDTH))
+    disc = np.hypot(columns - 190.0, rows - 120.0) < 80.0
+    with pytest.raises(InputError, match="border cuts"):
+        find_indentation(press, background, valid=disc)
+    dark = np.where(disc[..., None], press, 0.0), np.where(disc[..., None], background, 0.0)
+    with pytest.raises(InputError, match="border cuts"):
+        find_indentation(*dark)
+
+
+def test_swapped_pictures_are_refused() -> None:
+    press, background = scene((150.0, 120.0, 35.0))
+    error = refusal(background, press)
+    assert "in the background" in error.found
+    assert "background.png" in error.where
+
+
+@pytest.mark.parametrize("gain", [(0.6, 0.6, 0.6), (1.0, 1.0, 0.02), (1.0, 1.4, 1.0)])
+def test_large_changes_of_the_light_are_refused(gain: tuple[float, float, float]) -> None:
+    assert "times as bright" in refusal(*scene((150.0, 120.0, 35.0), gain=gain)).found
+
+
+def test_colours_in_another_order_are_refused() -> None:
+    press, background = scene((150.0, 120.0, 35.0))
+    error = refusal(np.ascontiguousarray(press[..., ::-1]), background)
+    assert "bright" in error.found or "light changed" in error.found
+
+
+def test_black_and_saturated_pictures_are_refused() -> None:
+    press, background = scene((150.0, 120.0, 35.0))
+    assert "black" in refusal(np.zeros_like(press), background).found
+    assert "saturated" in refusal(np.ones_like(press), background).found
+    with pytest.raises(InputError) as caught:
+        find_indentation(press, np.zeros_like(press), background_name="background.png")
+    assert caught.value.where == "background.png"
+
+
+def test_different_sizes_are_refused_with_both_sizes() -> None:
+    press, background = scene((150.0, 120.0, 35.0))
+    error = refusal(press, background[:, :300])
+    assert "320x240" in error.found
+    assert "300x240" in error.found
+    assert "shape" in refusal(press[..., 0], background).found
+    with pytest.raises(InputError, match="working area"):
+        find_indentation(press, background, valid=np.ones((5, 5), dtype=np.bool_))
+    with pytest.raises(InputError, match="empty"):
+        find_indentation(press, background, valid=np.zeros((HEIGHT, WIDTH), dtype=np.bool_))
+
+
+def stretched(pictures: Pictures, factor: float) -> Pictures:
+    """Return pictures whose height is stretched about the middle."""
+    move = np.array([[1.0, 0.0, 0.0], [0.0, factor, HEIGHT / 2 * (1.0 - factor)]])
+    border = cv2.BORDER_REPLICATE
+    press, background = (
+        cv2.warpAffine(p, move, (WIDTH, HEIGHT), borderMode=border).astype(np.float32)
+        for p in pictures
+    )
+    return press, background
+
+
+def test_oval_contact_is_refused_and_a_slightly_oval_one_is_not() -> None:
+    pictures = scene((160.0, 120.0, 40.0))
+    assert "round" in refusal(*stretched(pictures, 1.45)).found
+    found = find_indentation(*stretched(pictures, 1.1))
+    assert found.axis_ratio == pytest.approx(1.0 / 1.1, abs=0.03)
+
+
+def test_flat_punch_is_refused() -> None:
+    y, x = np.indices((HEIGHT, WIDTH), dtype=np.float64)
+    r = np.hypot(x - 150.0, y - 120.0)
+    slope = np.where(r < 40.0, 0.0, np.exp(-(r - 40.0) / 8.0))
+    depth = 8.0 * np.where(r < 40.0, 1.0, slope)
+    flat = np.zeros_like(depth)
+    pressed = shade(depth, -slope * (x - 150.0) / r.clip(1.0), -slope * (y - 120.0) / r.clip(1.0))
+    background = shade(flat, flat, flat)
+    taken = [(0.8 * p / background.max()).astype(np.float32) for p in (pressed, background)]
+    assert "flat" in refusal(*taken).found
+
+
+# -- noise --------------------------------------------------------------------------------------
+
+
+@given(sigma=st.floats(0.005, 0.05), seed=st.integers(0, 100))
+@settings(max_examples=10, deadline=None)
+def test_noise_is_measured_through_shading_and_edges(sigma: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    y, x = np.indices((200, 200)) / 200.0
+    picture = np.stack([x, x * y, np.where(x > 0.5, 1.0, 0.0)], axis=2)
+    noisy = (picture + sigma * rng.standard_normal(picture.shape)).astype(np.float32)
+    everywhere = np.ones((200, 200), dtype=np.bool_)
+    # The median of 20 000 blocks is known to 1 %.
+    assert pixel_noise(noisy, everywhere) == pytest.approx((sigma,) * 3, rel=0.05)
+
+
+def test_gain_is_that_of_the_membrane_though_most_of_it_is_pressed() -> None:
+    background = np.full((100, 100, 3), 0.5, dtype=np.float32)
+    press = 1.05 * background
+    press[:, :60] *= np.linspace(0.3, 1.5, 60, dtype=np.float32)[:, None]
+    gain = match_gain(press, background, np.ones((100, 100), dtype=np.bool_))
+    assert gain == pytest.approx((1.05,) * 3, abs=0.005)
+
+
+# -- pictures of others -------------------------------------------------------------------------
+
+
+def read_rgb(path: Path) -> NDArray[np.float32]:
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    assert picture is not None, path
+    return np.ascontiguousarray(picture[..., ::-1], dtype=np.float32) / np.float32(255.0)
+
+
+# Contact's edge by eye, on enlarged differences: these run out of the picture or along its border.
+CUT = {0, 6, 11, 12, 17, 22, 23, 28, 33, 38}
+
+
+@pytest.mark.parametrize("number", range(44))
+def test_real_ball_presses_are_found_unless_cut(shared_data: Path, number: int) -> None:
+    folder = shared_data / "real" / "gelsight-mini-balls"
+    background = read_rgb(folder / "background.png")
+    press = read_rgb(folder / f"press_{number:02d}.png")
+    if number in CUT:
+        with pytest.raises(InputError, match="border cuts"):
+            find_indentation(press, background)
+        return
+    found = find_indentation(press, background)
+    x, y = found.centre
+    radius = found.contact_radius_px
+    # One ball of 49.8 px radius pressed with about the same force each time.
+    assert 23.0 < radius < 36.0
+    assert radius < x < press.shape[1] - radius
+    assert radius < y < press.shape[0] - radius
+
+
+def true_edge_centre(truth: dict[str, Any], session: dict[str, Any], ball: int) -> Array:
+    """Return where the camera sees the centre of a rendered ball's contact edge, pixels."""
+    lens, plane, sensor = truth["camera"], truth["top_plane"], session["sensor"]
+    k1, k2, p1, p2 = lens["k1_k2_p1_p2"]
+    camera = Camera(
+        1280, 960, lens["fx"], lens["fy"], lens["cx"], lens["cy"], (k1, k2, p1, p2, 0.0)
+    )
+    top = TopPlane(tuple(plane["normal_camera"]), plane["offset_mm"])
+    stack = build_stack(
+        top.distance_mm,
+        elastomer_thickness_mm=sensor["elastomer_thickness_mm"],
+        elastomer_index=sensor["elastomer_refractive_index"],
+        window_thickness_mm=sensor["window_thickness_mm"],
+        window_index=sensor["window_refractive_index"],
+    )
+    press = truth["balls"][ball]
+    centre = np.array([press["centre_sensor_xy_mm"]])
+    radius, contact = press["radius_mm"], press["contact_radius_mm"]
+    edge_depth = press["depth_mm"] - (radius - np.sqrt(radius**2 - contact**2))
+    on_top = centre
+    for _ in range(20):
+        directions = membrane_to_camera(on_top, top, stack)
+        _, drift = camera_to_membrane(directions, top, stack)
+        on_top = centre - edge_depth * drift
+    return np.asarray(camera.project(membrane_to_camera(on_top, top, stack))[0])
+
+
+@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
+def test_rendered_balls_are_found_where_they_are(shared_data: Path, sensor: str) -> None:
+    folder = shared_data / sensor
+    background = read_rgb(folder / "background" / "background.png")
+    session = tomllib.loads((folder / "session.toml").read_text(encoding="utf-8"))
+    truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))
+    for ball in range(0, len(truth["balls"]), 3):
+        name = truth["balls"][ball]["file"]
+        found = find_indentation(read_rgb(folder / "balls" / name), background, name=name)
+        # Best public detectors: 2.4 px median at a quarter of this resolution.
+        assert off_by(found, *true_edge_centre(truth, session, ball)) < 0.6, name
+        assert found.quality.verdict is Verdict.PASS, name
+
+
+@pytest.mark.parametrize("sensor", ["sensor1", "sensor2"])
+def test_sensor_that_measures_by_darkness_is_answered(shared_data: Path, sensor: str) -> None:
+    folder = shared_data / "real" / "9dtact"
+    background = read_rgb(folder / f"{sensor}_depth_calibration_ref.png")
+    found = find_indentation(
+        read_rgb(folder / f"{sensor}_depth_calibration_sample.png"), background
+    )
+    assert found.axis_ratio > 0.9
+    with pytest.raises(InputError, match="more than one"):
+        find_indentation(
+            read_rgb(folder / f"{sensor}_camera_calibration_sample.png"),
+            read_rgb(folder / f"{sensor}_camera_calibration_ref.png"),
+        )

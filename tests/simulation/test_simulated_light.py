@@ -1,0 +1,266 @@
+"""The virtual sensor's light, rays and shadows against closed formulas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.design.parts import CameraDesign, LayerDesign, LedDesign, MembraneDesign
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.simulation.exposure import exposed
+from gelpolight_core.simulation.indenters import Cylinder, press
+from gelpolight_core.simulation.lamps import ParallelLamp, PointLamp, lamp_table
+from gelpolight_core.simulation.occlusion import lit_share, visible_depth
+from gelpolight_core.simulation.rays import (
+    pixel_directions,
+    project_through_layers,
+    project_to_pixels,
+    trace_pixels,
+)
+from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.virtual_sensor import (
+    BareMembrane,
+    Mirror,
+    PressedMembrane,
+    VirtualSensor,
+    Whiteboard,
+)
+
+QUIET = CameraDesign(shot_variance=0.0, read_sd=0.0, blur_sigma_px=0.0)
+PLAIN = MembraneDesign(specular_weight=0.0, variation=0.0, speck_count=0)
+
+
+def small_design(**changes: object) -> SensorDesign:
+    """Return the default sensor with a quiet camera of 160 x 120 pixels."""
+    return replace(SensorDesign(camera=QUIET, membrane=PLAIN), **changes).scaled(0.125)
+
+
+def straight_stack(distance: float = 39.0) -> LayerDesign:
+    return LayerDesign(
+        top_distance_mm=distance, tilt_deg=0.0, tilt_azimuth_deg=0.0, window_thickness_mm=0.0
+    )
+
+
+def step_surface(height: float = 1.0, *, pitch: float = 0.02, edge_mm: float = 0.0):
+    """Return a surface that is `height` deep left of x = edge and flat right of it."""
+    x = pitch * np.arange(-250, 251)
+    depth = np.where(x <= edge_mm, height, 0.0) * np.ones((201, 1))
+    return PressedSurface(depth, depth > 0, float(x[0]), -100 * pitch, pitch)
+
+
+def test_whiteboard_brightness_follows_the_near_light_formula() -> None:
+    sensor = VirtualSensor(small_design(layers=straight_stack()))
+    light = np.linalg.solve(
+        np.array(sensor.design.photometry.crosstalk),
+        sensor.brightness(Whiteboard()).reshape(-1, 3).T,
+    ).T.reshape(120, 160, 3)
+    rays = sensor.rays
+    inside = np.hypot(rays.x_mm, rays.y_mm) < 12.5
+    for k, led in enumerate(sensor.design.leds):
+        away = (led.x_mm - rays.x_mm) ** 2 + (led.y_mm - rays.y_mm) ** 2
+        r2 = away + led.height_mm**2
+        expected = led.power * (led.height_mm**2 / r2) / r2 * rays.transmission
+        ratio = light[..., k][inside] / expected[inside]
+        assert np.ptp(ratio) / ratio.mean() < 1e-9
+
+
+def test_whiteboard_peak_is_the_one_asked_for() -> None:
+    sensor = VirtualSensor(small_design())
+    assert sensor.brightness(Whiteboard()).max() == pytest.approx(0.94, rel=2e-3)
+
+
+@given(st.floats(0.0, 600.0), st.floats(10.0, 80.0), st.floats(0.5, 30.0))
+@settings(max_examples=50, deadline=None)
+def test_straight_stack_bends_rays_as_equation_3_says(d: float, z2: float, z1: float) -> None:
+    f, n = 1385.6, 1.41
+    camera = CameraDesign(
+        width_px=16, height_px=16, fx=f, fy=f, cx=-d, cy=7.0, distortion=(0.0, 0.0, 0.0, 0.0)
+    )
+    layers = replace(straight_stack(z1 + z2), elastomer_thickness_mm=z1)
+    alpha = math.atan(d / f)
+    beta = math.asin(math.sin(alpha) / n)
+    on_top = z2 * math.tan(alpha) + z1 * math.tan(beta)
+    assert trace_pixels(camera, layers).x_mm[7, 0] == pytest.approx(on_top, abs=1e-9)
+
+
+@given(st.floats(-10, 10), st.floats(-10, 10), st.floats(-8, 0), st.floats(0, 5))
+@settings(max_examples=40, deadline=None)
+def test_a_point_projected_through_the_layers_lies_on_its_pixels_ray(
+    x: float, y: float, z: float, tilt: float
+) -> None:
+    layers = LayerDesign(tilt_deg=tilt)
+    camera = CameraDesign()
+    u, v = project_through_layers(camera, layers, np.array([x, y, z]))
+    one = replace(camera, width_px=16, height_px=16, cx=camera.cx - u, cy=camera.cy - v)
+    rays = trace_pixels(one, layers)
+    seen_x = rays.x_mm[0, 0] + z * rays.slope_x[0, 0]
+    seen_y = rays.y_mm[0, 0] + z * rays.slope_y[0, 0]
+    assert math.hypot(seen_x - x, seen_y - y) < 1e-8
+
+
+@given(st.floats(0, 1279), st.floats(0, 959))
+@settings(max_examples=30, deadline=None)
+def test_lens_distortion_is_undone_exactly(u: float, v: float) -> None:
+    camera = CameraDesign()
+    back = project_to_pixels(camera, pixel_directions(camera, np.array(u), np.array(v)))
+    assert np.allclose(back, (u, v), atol=1e-8)
+
+
+def test_mirror_spots_stand_at_the_mirror_twins() -> None:
+    design = replace(SensorDesign(camera=replace(QUIET, distortion=(0.0, 0.0, 0.0, 0.0))))
+    picture = np.linalg.solve(
+        np.array(design.photometry.crosstalk),
+        VirtualSensor(design).brightness(Mirror()).reshape(-1, 3).T,
+    ).T.reshape(960, 1280, 3)
+    layers, camera = design.layers, design.camera
+    normal = layers.normal_camera
+    across = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+    across /= np.linalg.norm(across)
+    v, u = np.mgrid[:960, :1280]
+    for k, led in enumerate(design.leds):
+        lamp = (
+            (layers.top_distance_mm - led.height_mm) * normal
+            + led.x_mm * across
+            + led.y_mm * np.cross(normal, across)
+        )
+        twin = lamp + 2.0 * (layers.top_distance_mm - normal @ lamp) * normal
+        weight = picture[..., k]
+        spot = np.array([(u * weight).sum(), (v * weight).sum()]) / weight.sum()
+        expected = camera.fx * twin[:2] / twin[2] + (camera.cx, camera.cy)
+        # 8 x 8 rays per pixel place the centroid of a 5 px disc to a few hundredths.
+        assert np.allclose(spot, expected, atol=0.03)
+
+
+@pytest.mark.parametrize("elevation", [20.0, 35.0, 50.0])
+def test_step_throws_a_shadow_of_its_height_over_the_tangent(elevation: float) -> None:
+    surface = step_surface(1.0)
+    lamp = ParallelLamp(180.0, elevation)
+    share = lit_share(
+        surface.depth_mm,
+        surface.tile_max,
+        (surface.x0_mm, surface.y0_mm, surface.pitch_mm, 1.0),
+        (surface.slope_x, surface.slope_y),
+        lamp_table((lamp,)),
+    )[100, :, 0]
+    length = (share[surface.x_mm > 0.02] < 0.5).sum() * surface.pitch_mm
+    # Two cells: the step itself lies between two cells, and the march goes by 0.7 cells.
+    assert length == pytest.approx(1.0 / math.tan(math.radians(elevation)), abs=0.04)
+
+
+def test_near_lamp_throws_a_shadow_by_similar_triangles_with_a_soft_edge() -> None:
+    surface = step_surface(1.0)
+    lamp = PointLamp(-3.0, 0.0, 9.0, diameter_mm=1.0)
+    share = lit_share(
+        surface.depth_mm,
+        surface.tile_max,
+        (surface.x0_mm, surface.y0_mm, surface.pitch_mm, 1.0),
+        (surface.slope_x, surface.slope_y),
+        lamp_table((lamp,)),
+    )[100, :, 0]
+    right = surface.x_mm > 0.02
+    x = surface.x_mm[right]
+    # The edge (0, 1) as seen from the disc's ends -3.5, -3, -2.5 at height 9.
+    full, middle, none = (reach / 8.0 for reach in (2.5, 3.0, 3.5))
+    assert x[np.argmax(share[right] >= 0.5)] == pytest.approx(middle, abs=0.05)
+    assert x[np.argmax(share[right] > 0.01)] == pytest.approx(full, abs=0.05)
+    assert x[np.argmax(share[right] > 0.99)] == pytest.approx(none, abs=0.06)
+
+
+def test_a_wall_turned_from_the_camera_is_hidden_behind_the_plateau() -> None:
+    surface = step_surface(1.0)
+    parts = (surface.depth_mm, surface.tile_max, surface.tile_min, 1.0)
+    middle = (0.0 - surface.y0_mm) / surface.pitch_mm
+
+    def depth_seen(x_on_top: float) -> float:
+        # The camera stands at the left: its ray goes right by 0.5 mm per mm towards the membrane.
+        cell = ((x_on_top - surface.x0_mm) / surface.pitch_mm, middle)
+        return visible_depth(*parts, cell, (-0.5 / surface.pitch_mm, 0.0))
+
+    # The ray over the step's edge meets the flat part 0.5 mm further right: nothing before is seen.
+    assert depth_seen(0.45) == pytest.approx(1.0, abs=1e-6)
+    assert depth_seen(0.56) == pytest.approx(0.0, abs=1e-6)
+    seen = np.array([depth_seen(x) for x in np.linspace(-1.0, 2.0, 400)])
+    assert ((seen > 0.05) & (seen < 0.95)).sum() <= 4
+
+
+def test_camera_sees_a_pressed_rim_where_the_projection_puts_it() -> None:
+    design = SensorDesign(camera=QUIET, membrane=PLAIN)
+    sensor = VirtualSensor(design)
+    surface = press(Cylinder(5.0, 1.0, 0.0), x_mm=4.0, y_mm=3.0)
+    flat = sensor.brightness(PressedMembrane(surface), samples=1).sum(axis=2)
+    for way in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)):
+        along = np.arange(1.5, 3.2, 0.01)[:, None]
+        points = np.hstack([(4.0, 3.0) + along * way, np.full_like(along, -1.0)])
+        u, v = np.rint(project_through_layers(design.camera, design.layers, points)).T.astype(int)
+        change = np.abs(np.gradient(flat[v, u]))
+        # The face's brightness breaks off at its rim, 2.5 mm from its middle, to a pixel.
+        assert along[np.argmax(change > 10.0 * np.median(change[:50]) + 0.01), 0] == pytest.approx(
+            2.5, abs=0.06
+        )
+
+
+def test_a_flat_press_of_no_depth_changes_nothing() -> None:
+    sensor = VirtualSensor(small_design())
+    flat = PressedSurface(np.zeros((40, 40)), np.zeros((40, 40), bool), -1.0, -1.0, 0.05)
+    bare = sensor.brightness(BareMembrane())
+    assert np.array_equal(sensor.brightness(PressedMembrane(flat)), bare)
+
+
+def test_shading_with_a_gentle_press_joins_the_bare_membrane_smoothly() -> None:
+    sensor = VirtualSensor(small_design())
+    surface = press(Cylinder(4.0, 1e-7))
+    change = sensor.brightness(PressedMembrane(surface)) - sensor.brightness(BareMembrane())
+    assert np.abs(change).max() < 1e-4
+
+
+def test_noise_has_the_stated_variance() -> None:
+    camera = CameraDesign(bit_depth=16, shot_variance=4e-4, read_sd=0.004)
+    signal = np.full((500, 500), 0.4)
+    frame = exposed(signal, camera, np.random.default_rng(3)) / 65535.0
+    single = 4e-4 * 0.4 + 0.004**2
+    # The relative sd of a variance of N = 250000 values is sqrt(2 / N) = 0.3 %.
+    assert frame.var() == pytest.approx(single, rel=0.015)
+    mean = exposed(signal, camera, np.random.default_rng(3), averaged=8) / 65535.0
+    assert mean.var() == pytest.approx(single / 8.0, rel=0.015)
+
+
+def test_bright_light_saturates() -> None:
+    frame = exposed(np.full((4, 4), 1.7), CameraDesign(), np.random.default_rng(0))
+    assert frame.dtype == np.uint8
+    assert (frame == 255).all()
+
+
+def test_one_seed_gives_one_sequence_of_bytes() -> None:
+    design = small_design(camera=replace(QUIET, read_sd=0.01), membrane=MembraneDesign())
+    first, second = VirtualSensor(design, 5), VirtualSensor(design, 5)
+    frames = [first.frame(BareMembrane()) for _ in range(2)]
+    assert np.array_equal(frames[0], second.frame(BareMembrane()))
+    assert np.array_equal(frames[1], second.frame(BareMembrane()))
+    assert not np.array_equal(frames[0], frames[1])
+    assert not np.array_equal(frames[0], VirtualSensor(design, 6).frame(BareMembrane()))
+
+
+def test_crosstalk_mixes_the_lamps_as_the_matrix_says() -> None:
+    design = small_design(
+        leds=tuple(
+            LedDesign(led.x_mm, led.y_mm, led.height_mm, power)
+            for led, power in zip(SensorDesign().leds, (1.0, 0.0, 0.0), strict=True)
+        )
+    )
+    seen = VirtualSensor(design).brightness(Whiteboard()).sum(axis=(0, 1))
+    assert np.allclose(seen / seen[0], np.array(design.photometry.crosstalk)[:, 0])
+
+
+def test_a_metallic_membrane_looks_different_from_another_side() -> None:
+    design = small_design(membrane=replace(PLAIN, specular_weight=0.5))
+    dull = VirtualSensor(small_design()).brightness(BareMembrane())
+    shiny = VirtualSensor(design).brightness(BareMembrane())
+    rays = VirtualSensor(design).rays
+    inside = np.hypot(rays.x_mm, rays.y_mm) < 12.0
+    ratio = shiny[..., 0][inside] / dull[..., 0][inside]
+    assert np.percentile(ratio, 95) > 1.2 * np.percentile(ratio, 5)

@@ -1,0 +1,143 @@
+"""A simulated session is a complete session folder, the same for the same seed."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gelpolight_core.design.parts import BallPress, Press
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.simulation.boards import board_views
+from gelpolight_core.simulation.session import press_names, simulate_session
+
+SCALE = 0.25
+DESIGN = replace(
+    SensorDesign(),
+    balls=(BallPress(3.0, 1.0, -2.0, 1.0), BallPress(4.0, 0.8, 3.0, -2.0)),
+    presses=(Press("cylinder", 5.0, 1.0, 2.0, 1.0), Press("nut", 5.5, 0.8, -2.0, -1.0, 10.0)),
+)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a small simulated session."""
+    out = tmp_path_factory.mktemp("virtual") / "session"
+    simulate_session(DESIGN, out, seed=3, scale=SCALE)
+    return out
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Return the hash of every picture."""
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*.png"))
+    }
+
+
+def test_every_stage_has_its_pictures(session: Path) -> None:
+    counts = {p.name: len(list(p.glob("*.png"))) for p in session.iterdir() if p.is_dir()}
+    assert counts == {
+        "checkerboard": 16,
+        "top_pose": 1,
+        "mirror": 1,
+        "whiteboard": 1,
+        "background": 1,
+        "balls": 2,
+        "presses": 2,
+        "truth": 0,
+    }
+
+
+def test_pictures_are_colour_and_boards_are_grey(session: Path) -> None:
+    for path in session.rglob("*.png"):
+        picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        grey = path.parent.name in ("checkerboard", "top_pose")
+        assert picture.shape == ((240, 320) if grey else (240, 320, 3))
+
+
+def test_description_and_truth_say_what_was_simulated(session: Path) -> None:
+    text = tomllib.loads((session / "session.toml").read_text())
+    assert text["sensor"]["elastomer_refractive_index"] == 1.41
+    assert text["balls"] == {"ball_00.png": 3.0, "ball_01.png": 4.0}
+    truth = json.loads((session / "truth.json").read_text())
+    assert truth["camera"]["fx"] == pytest.approx(1385.6 * SCALE)
+    # An LED's place in the camera frame keeps its height below the plane.
+    normal, offset = np.array(truth["top_plane"]["normal_camera"]), truth["top_plane"]["offset_mm"]
+    for led, design in zip(truth["leds"].values(), DESIGN.leds, strict=True):
+        assert offset - normal @ led["camera_mm"] == pytest.approx(design.height_mm)
+    assert truth["balls"][0]["contact_radius_mm"] == pytest.approx(1.7611, abs=1e-3)
+
+
+def test_truth_of_a_press_is_its_depth_on_a_metric_grid(session: Path) -> None:
+    with (session / "presses" / "truth.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["file"] for row in rows] == ["cylinder_s5_d100.png"]
+    with np.load(session / "truth" / "cylinder_s5_d100.npz") as truth:
+        depth, pitch = truth["depth_mm"], float(truth["pitch_mm"])
+        x = float(truth["x0_mm"]) + pitch * np.arange(depth.shape[1])
+        y = float(truth["y0_mm"]) + pitch * np.arange(depth.shape[0])
+        assert truth["contact"].shape == depth.shape
+    # Two cells of the quarter-size session inside the rounded edge.
+    face = np.hypot(*np.meshgrid(x - 2.0, y - 1.0)) < 2.45 - 0.2
+    assert depth.dtype == np.float32
+    assert np.allclose(depth[face], 1.0, atol=1e-6)
+    assert (session / "truth" / "object_nut.npz").exists()
+
+
+def test_boards_are_found_where_they_were_put(session: Path) -> None:
+    poses = board_views(DESIGN.scaled(SCALE).camera, np.random.default_rng([3, 2]))
+    camera = DESIGN.scaled(SCALE).camera
+    matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
+    for number in (0, 5, 10, 15):
+        picture = cv2.imread(str(session / f"checkerboard/view_{number:02d}.png"), 0)
+        found, corners = cv2.findChessboardCornersSB(picture, (9, 6), None, cv2.CALIB_CB_ACCURACY)
+        assert found
+        expected, _ = cv2.projectPoints(
+            poses[number].corners_mm(),
+            np.zeros(3),
+            np.zeros(3),
+            matrix,
+            np.array(camera.distortion),
+        )
+        gaps = np.linalg.norm(corners.reshape(-1, 1, 2) - expected.reshape(1, -1, 2), axis=2)
+        # A square is about ten pixels wide here: the finder is good to a tenth of a pixel.
+        assert gaps.min(axis=1).mean() < 0.15
+
+
+def test_the_same_seed_gives_the_same_pictures(session: Path, tmp_path: Path) -> None:
+    simulate_session(DESIGN, tmp_path / "again", seed=3, scale=SCALE)
+    simulate_session(replace(DESIGN, balls=(), presses=()), tmp_path / "other", seed=4, scale=SCALE)
+    assert digests(tmp_path / "again") == digests(session)
+    other = digests(tmp_path / "other")
+    assert all(digest != digests(session)[name] for name, digest in other.items())
+
+
+def test_a_folder_that_holds_files_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("keep")
+    with pytest.raises(InputError, match="files already"):
+        simulate_session(DESIGN, tmp_path, scale=SCALE)
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_progress_can_stop_the_work(tmp_path: Path) -> None:
+    def stop(name: str, share: float) -> None:
+        assert 0.0 < share <= 1.0 and name
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate_session(DESIGN, tmp_path / "out", scale=SCALE, progress=stop)
+    assert len(list((tmp_path / "out").rglob("*.png"))) < 24
+
+
+def test_repeated_presses_get_names_of_their_own() -> None:
+    presses = (Press("cylinder", 5.0, 1.0), Press("cylinder", 5.0, 1.0), Press("coin", 8.0, 0.6))
+    assert press_names(presses) == ("cylinder_s5_d100", "cylinder_s5_d100_r2", "object_coin")
