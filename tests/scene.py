@@ -72,9 +72,7 @@ def raw_picture(slopes: np.ndarray, cal: Calibration) -> np.ndarray:
     from gelpolight_core.optics.refraction import camera_to_membrane
 
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width].astype(float)
-    points, _ = camera_to_membrane(
-        CAMERA.directions(np.stack([u, v], axis=-1)), PLANE, cal.stack
-    )
+    points, _ = camera_to_membrane(CAMERA.directions(np.stack([u, v], axis=-1)), PLANE, cal.stack)
     _, radiance = flat_light(points)
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
     light, _ = light_directions(LEDS, at_top)

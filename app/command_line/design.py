@@ -6,9 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.design.check import check_design
-
 from app.command_line.common import quality_lines
+from gelpolight_core.design.check import check_design
 from gelpolight_core.design.sensor_design import read_design
 from gelpolight_core.translation import tr
 

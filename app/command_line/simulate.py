@@ -6,10 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.simulation.session import simulate_session
-
 from app.command_line.common import StageProgress
 from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.translation import tr
 
 

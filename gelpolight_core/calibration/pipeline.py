@@ -17,7 +17,6 @@ from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import LightResult, locate_leds
-from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.optics.lens import LensResult, calibrate_lens
 from gelpolight_core.optics.pose import TopPoseResult, estimate_top_pose
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
@@ -27,7 +26,6 @@ from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_refle
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.session import (
     ONE_IMAGE_STAGES,
-    Board,
     Session,
     file_hash,
     read_picture,
@@ -76,11 +74,13 @@ def calibrate_session(
     for stage in STAGES:
         session.files(stage)
     tell(tr("lens"), 0.0)
-    lens = calibrate_lens(session.pictures("checkerboard"), _spec(session.checkerboard))
+    lens = calibrate_lens(session.pictures("checkerboard"), session.checkerboard)
     tell(tr("top surface"), 0.3)
     pose_pictures = session.pictures("top_pose")
     _same_size(pose_pictures[0], lens.camera.width, lens.camera.height, "top_pose")
-    pose = estimate_top_pose(pose_pictures, _spec(session.top_pose), lens.camera)
+    pose = estimate_top_pose(
+        pose_pictures, session.top_pose, lens.camera, focal_sd_px=lens.focal_sd_px[0]
+    )
     table = build_resampling_table(
         lens.camera,
         pose.plane,
@@ -216,10 +216,6 @@ def _refuse_unlit(picture: Picture) -> None:
             where=f"background/{picture.name}",
             advice=tr("Shorten the exposure"),
         )
-
-
-def _spec(board: Board) -> BoardSpec:
-    return BoardSpec(board.inner_corners, board.square_mm)
 
 
 def _provenance(session: Session) -> Provenance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -132,7 +133,7 @@ def _refuse_hopeless(brightest: Array, where: str) -> None:
 def _noise(rgb: Array) -> float:
     """Return the noise of the dark part, never less than an 8-bit step's rounding."""
     deviation = np.abs(rgb - np.median(rgb, axis=(0, 1)))
-    return max(1.4826 * float(np.median(deviation)), 1.0 / 255.0 / np.sqrt(12.0))
+    return max(1.4826 * float(np.median(deviation)), 1.0 / 255.0 / math.sqrt(12.0))
 
 
 def _find_candidates(rgb: Array, noise: float) -> list[Spot]:

@@ -9,8 +9,10 @@ from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.segmentation import PressedRegion
 from gelpolight_core.translation import tr
 
-GOOD_RESIDUAL = 0.02
+GOOD_RESIDUAL = 0.005
 """Residual, as a share of the height, up to which no other shape is tried."""
+EDGED_RESIDUAL = 0.02
+"""The same for a cuboid as the other shape: its corners alone leave several times as much."""
 POOR_RESIDUAL = 0.06
 """Residual, as a share of the height, beyond which the map is not this object: a wall that is
 moved by a tenth of the decay length over its whole length leaves as much."""
@@ -68,11 +70,12 @@ def _wrong_shape(
     share = fit.residual_rms_mm / fit.values["height_mm"]
     if share <= GOOD_RESIDUAL:
         return ""
+    tried = [name for name in MODELS if name != "cuboid" or share > EDGED_RESIDUAL]
     rivals = {
         name: fit_indenter(
-            model, window, model.start(region), edge=edge, most_rounds=1
+            MODELS[name], window, MODELS[name].start(region), edge=edge, most_rounds=1
         ).residual_rms_mm
-        for name, model in MODELS.items()
+        for name in tried
         if name != shape
     }
     best = min(rivals, key=lambda name: rivals[name])

@@ -15,10 +15,12 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import brentq
 from scipy.special import k0e, k1e
 
-from gelpolight_core.measurement.corner import corner_drape, corner_rounding
+from gelpolight_core.measurement.corner import corner_drape
 
 Array = NDArray[np.float64]
 
+FAR_CORNER = 9.0
+"""Decay lengths beyond which a corner is not felt: exp(-9) is 1e-4 of the height."""
 SMALL_BLUR_MM = 0.005
 """Blur below which its effect is taken as its square times that of this blur: it is linear in the
 variance there, and a finer filter would cost time for nothing."""
@@ -220,11 +222,10 @@ def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:
 def _rectangle_drape(x: Array, y: Array, half: tuple[float, float], edge: float) -> Array:
     """Return the drape outside a rectangle for x, y >= 0; lengths in decay lengths."""
     dx, dy = x - half[0], y - half[1]
-    drape = corner_drape(dx, dy)
-    if edge > 0.0:
-        drape = drape - corner_rounding(dx, dy, edge)
+    drape = corner_drape(dx, dy, edge=edge)
     # What the corners at the far ends of the two edges take away; nothing beside the edge itself.
-    above, beside = dy > 0.0, dx > 0.0
+    above = (dy > 0.0) & (x + half[0] < FAR_CORNER)
+    beside = (dx > 0.0) & (y + half[1] < FAR_CORNER)
     far_x = corner_drape(-x[above] - half[0], dy[above]) - np.exp(-dy[above])
     far_y = corner_drape(dx[beside], -y[beside] - half[1]) - np.exp(-dx[beside])
     drape[above] += far_x

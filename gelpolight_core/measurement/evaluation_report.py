@@ -149,6 +149,12 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
         for axes, direction in zip(row, DIRECTIONS, strict=True):
             _panel(axes, kinds[name], direction, name)
     handles, labels = panels[0][0].get_legend_handles_labels()
+    note = tr("bars: mean, whiskers: one standard deviation, dots: presses")
+    if evaluation.failed:
+        note += "; " + tr("{failed} of {all} presses could not be measured").format(
+            failed=len(evaluation.failed), all=len(evaluation.results)
+        )
+    figure.supxlabel(note, fontsize=9, color="0.35")
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
     return figure
 
@@ -296,7 +302,7 @@ def _panel(axes: Axes, results: Sequence[PressResult], direction: str, regions: 
         color="0.25",
         linestyle="--",
         linewidth=1.0,
-        label=tr("the paper's mean"),
+        label=tr("the paper's mean (5 % / 8 %)"),
     )
     axes.set_ylim(0.0, 1.15 * top)
     axes.set_xlim(-0.6, len(dimensions) - 0.4)

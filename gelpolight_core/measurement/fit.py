@@ -298,7 +298,9 @@ def _solve(
     solution = least_squares(
         residuals, inside, bounds=(low, high), x_scale="jac", ftol=1e-4, xtol=1e-7, max_nfev=15
     )
-    return solution.x, solution.jac, bool(solution.status > 0)
+    jacobian = solution.jac
+    assert isinstance(jacobian, np.ndarray), "the residuals' Jacobian is dense"
+    return solution.x, jacobian, bool(solution.status > 0)
 
 
 def _covariance(jacobian: Array, used: float, actual: float, priors: int) -> Array:

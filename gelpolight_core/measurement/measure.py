@@ -129,6 +129,12 @@ def _checked(
     if flags is not None:
         weight[(flags & OUTSIDE_FLAG) != 0] = 0.0
         weight[(flags & ~np.uint8(OUTSIDE_FLAG)) != 0] *= DOUBTFUL_WEIGHT
+    if not weight.any():
+        raise InputError(
+            tr("no pixel is usable"),
+            where=tr("depth map"),
+            advice=tr("Check the picture and the working area"),
+        )
     if isinstance(depth_sd_mm, np.ndarray) and depth_sd_mm.ndim == 2:
         usable = (weight > 0.0) & np.isfinite(depth_sd_mm) & (depth_sd_mm > 0.0)
         typical = float(np.median(depth_sd_mm[usable])) if usable.any() else 1.0

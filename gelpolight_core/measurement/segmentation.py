@@ -86,8 +86,10 @@ def find_pressed_regions(
     """
     pitch = _pitch_mm(x_mm, y_mm)
     # Smoothing over a tenth of a millimetre takes the pixel noise away and no object with it.
-    smooth = ndimage.gaussian_filter(np.where(valid, depth_mm, 0.0), 0.1 / pitch)
+    smooth = _smoothed_over_gaps(depth_mm, valid, 0.1 / pitch)
     level, scatter = ground_level_mm(smooth, valid)
+    # Missing pixels within the map are gaps, not its border.
+    valid = ndimage.binary_fill_holes(valid)
     lift = np.where(valid, smooth - level, 0.0)
     peak = float(lift.max())
     least = NOISE_FACTOR * scatter
@@ -101,6 +103,13 @@ def find_pressed_regions(
         if (region := _describe(core, lift, x_mm, y_mm, inner)).height_mm > least
     ]
     return sorted(regions, key=lambda r: -r.height_mm)
+
+
+def _smoothed_over_gaps(depth_mm: Array, valid: Mask, sigma_px: float) -> Array:
+    """Return the map smoothed by a Gaussian that leaves out what is not valid."""
+    share = ndimage.gaussian_filter(valid.astype(np.float64), sigma_px)
+    total = ndimage.gaussian_filter(np.where(valid, depth_mm, 0.0), sigma_px)
+    return np.asarray(np.divide(total, share, out=np.zeros_like(total), where=share > 1e-6))
 
 
 def _half_height_cores(lift: Array, threshold: float, least_pixels: float) -> list[Mask]:

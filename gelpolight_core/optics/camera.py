@@ -53,9 +53,7 @@ class Camera:
         """
         flat = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-14)
-        ideal = cv2.undistortPoints(
-            flat, self.matrix, np.array(self.distortion), criteria=criteria
-        )
+        ideal = cv2.undistortPoints(flat, self.matrix, np.array(self.distortion), criteria=criteria)
         ideal = np.asarray(ideal, dtype=np.float64).reshape(*np.shape(pixels)[:-1], 2)
         return np.concatenate([ideal, np.ones_like(ideal[..., :1])], axis=-1)
 

@@ -200,13 +200,7 @@ def find_board(picture: Picture, board: BoardSpec) -> BoardView:
         raise _absent(grey, board, picture.name)
     if _goes_on(grey, grid):
         _refuse_other_size(grey, board, picture.name)
-        raise InputError(
-            tr("the board has more than {w} x {h} inner corners").format(
-                w=board.inner_corners[0], h=board.inner_corners[1]
-            ),
-            where=picture.name,
-            advice=_size_advice(),
-        )
+        raise _larger(board, picture.name)
     view = _describe(picture, grey, board, grid)
     _check_view(view)
     return view
@@ -617,6 +611,16 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
             b=min(rough.shape[:2]),
             w=board.inner_corners[0],
             h=board.inner_corners[1],
+        ),
+        where=name,
+        advice=_size_advice(),
+    )
+
+
+def _larger(board: BoardSpec, name: str) -> InputError:
+    return InputError(
+        tr("the board has more than {w} x {h} inner corners").format(
+            w=board.inner_corners[0], h=board.inner_corners[1]
         ),
         where=name,
         advice=_size_advice(),

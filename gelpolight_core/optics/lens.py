@@ -54,6 +54,8 @@ class LensView:
         Whether it took part in the calibration.
     reason : str
         Why not; empty when it did.
+    advice : str
+        What to do about it.
     board : BoardView or None
         The corners, where they were found.
     residuals_px : (N, 2) or None
@@ -69,6 +71,7 @@ class LensView:
     name: str
     used: bool
     reason: str
+    advice: str = ""
     board: BoardView | None = None
     residuals_px: Array | None = None
     rms_px: float = math.nan
@@ -271,9 +274,9 @@ def _more_views() -> str:
 
 def _look(picture: Picture, board: BoardSpec) -> LensView:
     try:
-        return LensView(picture.name, True, "", find_board(picture, board))
+        return LensView(picture.name, True, "", board=find_board(picture, board))
     except InputError as refusal:
-        return LensView(picture.name, False, refusal.found)
+        return LensView(picture.name, False, refusal.found, refusal.advice)
 
 
 def _leave_out_duplicates(views: list[LensView]) -> list[LensView]:
@@ -298,18 +301,27 @@ def _require_views(views: Sequence[LensView]) -> None:
     used = sum(view.used for view in views)
     if used >= MIN_VIEWS:
         return
-    reasons = [view.reason for view in views if not view.used]
-    commonest = max(set(reasons), key=reasons.count)
-    refused = [f"{v.name}: {v.reason}" for v in views if v.reason != commonest and v.reason]
-    named = [v.name for v in views if v.reason == commonest]
-    first = f"{', '.join(named)}: {commonest}"
+    refused: dict[str, list[LensView]] = {}
+    for view in views:
+        if not view.used:
+            refused.setdefault(view.reason, []).append(view)
+    groups = sorted(refused.values(), key=len, reverse=True)
     raise InputError(
         tr("{n} of {m} views can be used, at least {k} are needed ({why})").format(
-            n=used, m=len(views), k=MIN_VIEWS, why="; ".join([first, *refused])
+            n=used,
+            m=len(views),
+            k=MIN_VIEWS,
+            why="; ".join(f"{_names(group)}: {group[0].reason}" for group in groups),
         ),
         where=tr("checkerboard"),
-        advice=_more_views(),
+        advice=groups[0][0].advice or _more_views(),
     )
+
+
+def _names(views: Sequence[LensView]) -> str:
+    if len(views) <= 4:
+        return ", ".join(view.name for view in views)
+    return tr("{first} and {n} others").format(first=views[0].name, n=len(views) - 1)
 
 
 def _solve_without_outliers(

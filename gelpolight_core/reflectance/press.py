@@ -24,7 +24,7 @@ Map = NDArray[np.float32]
 INSIDE = 0.9
 LEAST_VALUE = 0.02
 SATURATED = 0.99
-MAX_SHADED_PIXELS = 8_000
+MAX_SHADED_PIXELS = 3_000
 GAIN_NOISE = 0.02
 VALUE_NOISE = 0.003
 
@@ -65,7 +65,8 @@ class BallPress:
         The rays meet the contact ring below the surface and further in, by `drift` per mm.
         """
         sagitta = self.pose.radius_mm - np.sqrt(self.pose.radius_mm**2 - self.contact_radius_mm**2)
-        return np.asarray(self.pose.centre_mm) - (self.pose.depth_mm - sagitta) * drift
+        centre: Array = np.asarray(self.pose.centre_mm, np.float64)
+        return centre - float(self.pose.depth_mm - sagitta) * drift
 
 
 def find_ball(

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.translation import tr
 
@@ -22,14 +23,6 @@ VERSION = 1
 SUFFIXES = (".png", ".tif", ".tiff")
 MAX_PIXELS = 64_000_000
 ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
-
-
-@dataclass(frozen=True, slots=True)
-class Board:
-    """A checkerboard as session.toml states it."""
-
-    inner_corners: tuple[int, int]
-    square_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +44,8 @@ class Session:
 
     folder: Path
     sensor: SensorData
-    checkerboard: Board
-    top_pose: Board
+    checkerboard: BoardSpec
+    top_pose: BoardSpec
     ball_radii_mm: Mapping[str, float] = field(default_factory=dict)
     ball_default_radius_mm: float | None = None
 
@@ -110,7 +103,7 @@ def average(pictures: Sequence[Picture], *, name: str) -> Picture:
     """Average frames of one view; a lone frame is passed on."""
     if len(pictures) == 1:
         return pictures[0]
-    mean = np.mean([p.rgb for p in pictures], axis=0, dtype=np.float64).astype(np.float32)
+    mean = np.asarray(np.mean([p.rgb for p in pictures], axis=0, dtype=np.float64), np.float32)
     return Picture(
         name,
         mean,
@@ -261,7 +254,7 @@ def _parse_sensor(table: _Table) -> SensorData:
     return sensor
 
 
-def _parse_board(table: _Table) -> Board:
+def _parse_board(table: _Table) -> BoardSpec:
     corners = table.content.get("inner_corners")
     whole = isinstance(corners, list) and len(corners) == 2
     if not whole or not all(type(n) is int and 3 <= n <= 100 for n in corners or ()):
@@ -269,7 +262,7 @@ def _parse_board(table: _Table) -> Board:
     assert corners is not None
     square = table.number("square_mm", 0.05, 500.0)
     table.no_more("inner_corners", "square_mm")
-    return Board((corners[0], corners[1]), square)
+    return BoardSpec((corners[0], corners[1]), square)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,9 @@ def test_a_faint_reflection_of_a_reflection_is_set_aside_with_its_reason() -> No
         (mirror_picture(np.array([[320.0, 400.0], [180.0, 160.0], [638.0, 150.0]])), "border"),
     ],
 )
-def test_a_mirror_picture_that_cannot_be_used_says_what_is_wrong(rgb: np.ndarray, what: str) -> None:
+def test_a_mirror_picture_that_cannot_be_used_says_what_is_wrong(
+    rgb: np.ndarray, what: str
+) -> None:
     with pytest.raises(InputError, match=what) as refusal:
         find_mirror_spots(Picture("mirror_0.png", rgb))
     assert refusal.value.where == "mirror_0.png"

@@ -95,8 +95,8 @@ def test_the_corner_obeys_its_equation_and_meets_both_faces() -> None:
     left = laplacian(drape, pitch) - drape[1:-1, 1:-1]
     x, y = x[1:-1, 1:-1], y[1:-1, 1:-1]
     away = (np.maximum(x, y) > 2 * pitch) & (np.hypot(x, y) > 0.8)
-    # The differences themselves are wrong by pitch**2 / 12 of the fourth derivative.
-    assert np.abs(left[away]).max() < 0.005
+    # The table is right to 2e-5 of the height, which the differences divide by pitch**2.
+    assert np.abs(left[away]).max() < 0.01
     face = corner_drape(np.full(50, 1e-9), np.linspace(-3.0, -0.1, 50))
     np.testing.assert_allclose(face, 1.0, atol=2e-4)
 

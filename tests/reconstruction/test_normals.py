@@ -58,7 +58,11 @@ def test_eight_and_sixteen_bit_and_float_pictures_agree() -> None:
     raw = np.clip(scene.raw_picture(lopsided, CALIBRATION), 0, 1)
     fields = [
         solve_slopes(picture, MAPS)
-        for picture in (raw, np.round(raw * 255).astype(np.uint8), np.round(raw * 65535).astype("u2"))
+        for picture in (
+            raw,
+            np.round(raw * 255).astype(np.uint8),
+            np.round(raw * 65535).astype("u2"),
+        )
     ]
     seen = fields[0].flags & int(Flag.OUTSIDE) == 0
     assert np.abs(fields[0].slope_x - fields[2].slope_x)[seen].max() < 1e-3

@@ -86,7 +86,9 @@ def test_the_shading_pulls_a_wrong_centre_to_the_right_place(
     x: float, y: float, off_x: float, off_y: float, exponent: float
 ) -> None:
     pixels = shaded(BallPose((x, y), 3.0, 0.9), 0.0, exponent)
-    found, misfit, sd = refine_centre(pixels, BallPose((x + off_x, y + off_y), 3.0, 0.9), scene.LEDS)
+    found, misfit, sd = refine_centre(
+        pixels, BallPose((x + off_x, y + off_y), 3.0, 0.9), scene.LEDS
+    )
     np.testing.assert_allclose(found.centre_mm, [x, y], atol=0.01)
     assert misfit < 0.05
     assert sd < 0.01

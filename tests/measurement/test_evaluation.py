@@ -1,0 +1,249 @@
+"""The paper's protocol on a folder of presses: statistics, reports, and nothing left out."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.drape import cylinder_depth
+from gelpolight_core.measurement.evaluation import (
+    RANDOM,
+    SAME,
+    Evaluation,
+    evaluate,
+    evaluate_presses,
+)
+from gelpolight_core.measurement.evaluation_report import (
+    evaluation_figure,
+    evaluation_json,
+    evaluation_table,
+    write_evaluation,
+)
+from gelpolight_core.measurement.result import Measurement, Truth
+from gelpolight_core.measurement.truth import PressTruth, read_truth
+
+HEADER = "file,shape,diameter_mm,side_mm,height_mm\n"
+
+
+def measurement(shape: str, size: float, height: float) -> Measurement:
+    sides = (size, size) if shape == "cuboid" else None
+    key = "side_mm" if shape == "cuboid" else "diameter_mm"
+    return Measurement(
+        shape=shape,
+        diameter_mm=None if sides else size,
+        side_mm=sides,
+        height_mm=height,
+        centre_mm=(0.0, 0.0),
+        yaw_deg=None,
+        drape_decay_mm=0.7,
+        sd={key: (0.01, 0.01) if sides else 0.01, "height_mm": 0.005},
+        edge_radius_mm=0.1,
+        blur_mm=0.02,
+        baseline_mm=0.0,
+        residual_rms_mm=0.003,
+        correlated_pixels=1.0,
+        outline_mm=np.zeros((1, 2)),
+        verdict="ok",
+        reason="",
+    )
+
+
+def press(
+    shape: str, size: float, height: float, *, region: str = "", repeat: str = "", name: str = ""
+) -> PressTruth:
+    return PressTruth(
+        name or f"{shape}_{size:g}_{height:g}_{region}_{repeat}.png",
+        Truth(shape, size, height),
+        region,
+        repeat,
+    )
+
+
+def paper_protocol(seed: int = 0) -> Evaluation:
+    """Return presses with a within-region sd of 20 um and 50 um between regions, in height."""
+    rng = np.random.default_rng(seed)
+    rows, found = [], []
+    for shape in ("cylinder", "cuboid"):
+        for size in (3.0, 4.0, 5.0, 6.0, 7.0):
+            places = ["c"] * 5 + [f"r{k}" for k in range(25)]
+            offsets = {place: 0.05 * rng.standard_normal() for place in places}
+            for k, place in enumerate(places):
+                rows.append(press(shape, size, 1.0, region=place, repeat=str(k)))
+                height = 1.02 + offsets[place] + 0.02 * rng.standard_normal()
+                found.append(
+                    measurement(shape, size * (1.01 + 0.01 * rng.standard_normal()), height)
+                )
+    return evaluate(rows, found)
+
+
+def test_errors_are_averaged_by_direction_shape_and_dimension() -> None:
+    rows = [press("cylinder", 4.0, 1.0, name="a"), press("cylinder", 4.0, 0.5, name="b")]
+    rows.append(press("cuboid", 5.0, 1.0, name="c"))
+    found = [
+        measurement("cylinder", 4.2, 0.9),
+        measurement("cylinder", 3.9, 0.5),
+        measurement("cuboid", 5.0, 1.2),
+    ]
+    evaluation = evaluate(rows, found)
+    planar = evaluation.overall("planar")
+    assert planar.mean_absolute_percent == pytest.approx((5.0 + 2.5 + 0.0) / 3)
+    assert planar.mean_percent == pytest.approx((5.0 - 2.5 + 0.0) / 3)
+    groups = {(g.direction, g.shape, g.dimension_mm): g.statistic for g in evaluation.groups}
+    assert groups["planar", "cylinder", 4.0].count == 2
+    assert groups["planar", "cylinder", 4.0].sd_percent == pytest.approx(7.5 / math.sqrt(2))
+    assert groups["depth", "cylinder", 1.0].mean_percent == pytest.approx(-10.0)
+    assert groups["depth", "all", None].highest_percent == pytest.approx(20.0)
+
+
+def test_repeats_and_regions_are_told_apart() -> None:
+    evaluation = paper_protocol()
+    regions = {
+        group.regions: group.statistic.count
+        for group in evaluation.groups
+        if group.shape == "all" and group.direction == "planar"
+    }
+    assert regions == {"all": 300, SAME: 50, RANDOM: 300}
+    depth = {gauge.direction: gauge for gauge in evaluation.repeatability}["depth"]
+    # 40 degrees of freedom know an sd to 11 %, 250 to 5 %; twice that.
+    assert depth.within_region_mm == pytest.approx(0.02, rel=0.23)
+    assert depth.between_regions_mm == pytest.approx(0.05, rel=0.12)
+
+
+def test_regions_named_same_and_random_are_taken_at_their_word() -> None:
+    rows = [
+        press("ball", 6.0, 0.8, region=name, repeat=str(k), name=f"{name}{k}")
+        for name in ("same", "random")
+        for k in range(3)
+    ]
+    found = [measurement("ball", 6.0, 0.8 + 0.01 * k) for k in range(6)]
+    evaluation = evaluate(rows, found)
+    counts = {g.regions: g.statistic.count for g in evaluation.groups if g.shape == "all"}
+    assert counts == {"all": 6, SAME: 3, RANDOM: 3}
+    depth = {gauge.direction: gauge for gauge in evaluation.repeatability}["depth"]
+    assert depth.within_region_mm == pytest.approx(0.01)
+
+
+def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path: Path) -> None:
+    rows = [press("cylinder", 4.0, 1.0, name="a"), press("cylinder", 5.0, 1.0, name="b")]
+    evaluation = evaluate(rows, [measurement("cylinder", 4.0, 1.0), "no object is pressed"])
+    assert [r.press.file for r in evaluation.failed] == ["b"]
+    assert "not measured: no object is pressed" in evaluation_table(evaluation)
+    assert "1 of 2 presses could not be measured" in evaluation_table(evaluation)
+    write_evaluation(evaluation, tmp_path)
+    with (tmp_path / "evaluation.csv").open() as file:
+        table = list(csv.DictReader(file))
+    assert table[1]["verdict"] == "not measured"
+    assert table[1]["reason"] == "no object is pressed"
+    assert table[1]["size_mm"] == ""
+    assert json.loads((tmp_path / "evaluation.json").read_text())["failed"] == 1
+
+
+def test_an_evaluation_without_a_single_measurement_is_still_reported(tmp_path: Path) -> None:
+    evaluation = evaluate([press("ball", 6.0, 0.8)], ["the picture is all black"])
+    assert evaluation_json(evaluation)["overall"]["planar"]["mean_absolute_percent"] is None
+    assert len(write_evaluation(evaluation, tmp_path)) == 4
+
+
+def test_the_figure_shows_both_directions_the_series_and_the_papers_lines() -> None:
+    figure = evaluation_figure(paper_protocol())
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles == [
+        "planar direction, same region",
+        "depth direction, same region",
+        "planar direction, random regions",
+        "depth direction, random regions",
+    ]
+    for axes, percent in zip(figure.axes, (5.0, 8.0, 5.0, 8.0), strict=True):
+        dashed = [line for line in axes.lines if line.get_linestyle() == "--"]
+        assert [line.get_ydata()[0] for line in dashed] == [percent]
+    assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == list("34567")
+
+
+@dataclass(frozen=True)
+class Heights:
+    """A height map of an evaluation."""
+
+    depth_mm: NDArray[np.float32]
+    x_mm: NDArray[np.float64] = field(default_factory=lambda: np.arange(-8.0, 8.0, 0.08))
+    y_mm: NDArray[np.float64] = field(default_factory=lambda: np.arange(-8.0, 8.0, 0.08))
+    flags: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((200, 200), dtype=np.uint8))
+
+
+def heights(radius: float) -> Heights:
+    place = np.arange(-8.0, 8.0, 0.08)
+    distance = np.hypot(place[:, None], place[None, :])
+    depth = cylinder_depth(
+        distance, cylinder_radius_mm=radius, height_mm=1.0, decay_mm=0.7, edge_radius_mm=0.08
+    )
+    noise = 0.003 * np.random.default_rng(0).standard_normal(depth.shape)
+    return Heights((depth + noise).astype(np.float32))
+
+
+def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> None:
+    (tmp_path / "truth.csv").write_text(
+        HEADER + "a.png,cylinder,4.0,,1.0\nb.png,cylinder,6.0,,1.0\nc.png,cylinder,5,,1\n"
+        "coin.png,coin,,,0.6\n"
+    )
+    for name in ("a.png", "b.png", "c.png"):
+        (tmp_path / name).touch()
+
+    def reconstruct(path: Path) -> Heights:
+        if path.name == "c.png":
+            raise InputError("the picture is all black", where=path.name, advice="Open the shutter")
+        return heights({"a.png": 2.0, "b.png": 3.0}[path.name])
+
+    told: list[tuple[str, float]] = []
+    evaluation = evaluate_presses(
+        tmp_path, reconstruct, progress=lambda name, share: told.append((name, share))
+    )
+    assert evaluation.overall("planar").mean_absolute_percent < 0.5
+    assert [result.failure for result in evaluation.failed] == [
+        "c.png: the picture is all black. Open the shutter."
+    ]
+    assert evaluation.skipped == ("coin.png",)
+    assert "coin.png" in evaluation_table(evaluation)
+    assert told[0] == ("a.png", 0.0)
+    assert told[-1][1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("file,shape\na.png,ball\n", "column height_mm, diameter_mm is missing"),
+        (HEADER + "a.png,ball,,,1\n", "line 2: diameter_mm is empty"),
+        (HEADER + "a.png,cuboid,5,,1\n", "side_mm is empty"),
+        (HEADER + "a.png,ball,six,,1\n", "diameter_mm is 'six'"),
+        (HEADER + "a.png,ball,nan,,1\n", "diameter_mm is 'nan'"),
+        (HEADER + "a.png,ball,0,,1\n", "diameter_mm is '0'"),
+        (HEADER + "a.png,ball,6,,-1\n", "height_mm is '-1'"),
+        (HEADER + "a.png,ball,6,,1\n\na.png,ball,6,,1\n", "line 4: a.png stands here a second"),
+        (HEADER + ",ball,6,,1\n", "names no file"),
+        (HEADER + "a.png,coin,,,1\n", "no row with a cylinder"),
+        ("", "is missing"),
+    ],
+)
+def test_a_truth_file_that_cannot_be_used_says_where_and_why(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    (tmp_path / "truth.csv").write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_truth(tmp_path)
+
+
+def test_a_missing_truth_file_or_picture_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_truth(tmp_path)
+    (tmp_path / "truth.csv").write_bytes(b"file,\xff\xfe")
+    with pytest.raises(InputError, match="not text"):
+        read_truth(tmp_path)
+    (tmp_path / "truth.csv").write_text(HEADER + "a.png,ball,6,,1\n")
+    with pytest.raises(InputError, match=r"1 of 1 pictures are missing, first a\.png"):
+        evaluate_presses(tmp_path, lambda path: heights(2.0))

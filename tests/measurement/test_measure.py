@@ -1,0 +1,261 @@
+"""A user presses an object and reads its size, height, place, uncertainty and verdict."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.drape import ball_depth, cuboid_depth, cylinder_depth
+from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.measurement.result import Truth, compare
+
+Array = NDArray[np.float64]
+
+PITCH = 0.06
+X = np.arange(-10.0, 10.0, PITCH)
+Y = np.arange(-8.0, 8.0, PITCH)
+
+
+def pressed(
+    shape: str,
+    *,
+    centre: tuple[float, float] = (1.3, -0.7),
+    size: tuple[float, float] = (5.0, 5.0),
+    height: float = 1.0,
+    yaw_deg: float = 20.0,
+    decay: float = 0.7,
+    edge: float = 0.08,
+) -> Array:
+    x, y = np.meshgrid(X - centre[0], Y - centre[1])
+    if shape == "ball":
+        return ball_depth(
+            np.hypot(x, y), ball_radius_mm=size[0] / 2, height_mm=height, decay_mm=decay
+        )
+    options = {"height_mm": height, "decay_mm": decay, "edge_radius_mm": edge}
+    if shape == "cylinder":
+        return cylinder_depth(np.hypot(x, y), cylinder_radius_mm=size[0] / 2, **options)
+    cos, sin = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))
+    return cuboid_depth(cos * x + sin * y, cos * y - sin * x, side_mm=size, **options)
+
+
+def noisy(depth: Array, seed: int, sigma: float = 0.005) -> NDArray[np.float32]:
+    noise = np.random.default_rng(seed).standard_normal(depth.shape)
+    return (depth + sigma * noise).astype(np.float32)
+
+
+@given(
+    diameter=st.floats(2.0, 7.0),
+    height=st.floats(0.3, 1.5),
+    decay=st.floats(0.5, 1.0),
+    x=st.floats(-3.0, 3.0),
+    y=st.floats(-2.0, 2.0),
+)
+@settings(max_examples=12, deadline=None)
+def test_a_cylinder_anywhere_is_measured_without_its_drape(
+    diameter: float, height: float, decay: float, x: float, y: float
+) -> None:
+    depth = pressed("cylinder", size=(diameter, 0.0), height=height, decay=decay, centre=(x, y))
+    measured = measure_object(noisy(depth, 1), X, Y, shape="cylinder")
+    assert measured.diameter_mm == pytest.approx(diameter, abs=max(5 * measured.size_sd_mm, 0.01))
+    assert measured.height_mm == pytest.approx(height, abs=0.003)
+    assert measured.centre_mm == pytest.approx((x, y), abs=0.005)
+    assert measured.drape_decay_mm == pytest.approx(decay, abs=0.02)
+    assert measured.verdict == "ok"
+
+
+@pytest.mark.parametrize("yaw", [-44.0, -10.0, 0.0, 30.0])
+def test_a_cuboid_is_measured_with_both_sides_and_its_yaw(yaw: float) -> None:
+    depth = pressed("cuboid", size=(4.0, 6.0), yaw_deg=yaw)
+    measured = measure_object(noisy(depth, 2), X, Y, shape="cuboid")
+    assert measured.side_mm == pytest.approx((4.0, 6.0), abs=0.02)
+    assert measured.yaw_deg == pytest.approx(yaw, abs=0.1)
+    assert measured.verdict == "ok"
+
+
+@pytest.mark.parametrize(("diameter", "height"), [(6.0, 0.9), (8.0, 0.6), (4.0, 1.2)])
+def test_of_a_ball_the_diameter_is_the_balls_not_the_contacts(
+    diameter: float, height: float
+) -> None:
+    depth = pressed("ball", size=(diameter, 0.0), height=height)
+    measured = measure_object(noisy(depth, 3), X, Y, shape="ball")
+    assert measured.diameter_mm == pytest.approx(diameter, abs=5 * measured.size_sd_mm)
+    assert measured.size_sd_mm < 0.01 * diameter
+    assert measured.height_mm == pytest.approx(height, abs=0.005)
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "cuboid", "ball"])
+def test_the_stated_sd_is_the_scatter_of_repeats(shape: str) -> None:
+    depth = pressed(shape)
+    repeats = [measure_object(noisy(depth, seed), X, Y, shape=shape) for seed in range(12)]
+    for values, stated in (
+        ([m.size_mm if shape != "cuboid" else m.side_mm[0] for m in repeats], "size_sd_mm"),
+        ([m.height_mm for m in repeats], "height"),
+        ([m.centre_mm[0] for m in repeats], "centre"),
+    ):
+        sd = {
+            "size_sd_mm": np.mean([m.size_sd_mm for m in repeats]),
+            "height": np.mean([m.sd["height_mm"] for m in repeats]),
+            "centre": np.mean([m.sd["centre_mm"][0] for m in repeats]),
+        }[stated]
+        # A factor 1.5, and 12 repeats know their own scatter to 21 %, doubled for 95 %.
+        assert sd / np.std(values, ddof=1) == pytest.approx(1.0, rel=0.0, abs=0.85), stated
+        assert sd / np.std(values, ddof=1) > 0.5, stated
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "cuboid"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_real_reconstructions_errors_leave_the_sizes_usable(shape: str, seed: int) -> None:
+    depth = pressed(shape)
+    rng = np.random.default_rng(seed)
+    ground = gaussian_filter(rng.standard_normal(depth.shape), 2.5 / PITCH)
+    x, y = np.meshgrid(X - 1.3, Y + 0.7)
+    dome = 0.03 * np.clip(1.0 - (x**2 + y**2) / 2.5**2, 0.0, None)
+    worse = gaussian_filter(depth + dome, 1.0) + 0.02 * ground / ground.std()
+    measured = measure_object(noisy(worse, seed), X, Y, shape=shape)
+    assert measured.size_mm == pytest.approx(5.0, rel=0.015)
+    # The dome itself lifts the face by 1.5 % on average, the ground is off by 2 % of the height.
+    assert measured.height_mm == pytest.approx(1.0, rel=0.05)
+    # The errors hang together over millimetres, so the sd must be far above that of white noise.
+    assert measured.correlated_pixels > 100
+    assert abs(measured.size_mm - 5.0) < 3.0 * measured.size_sd_mm
+
+
+def test_flagged_and_missing_pixels_do_not_move_the_result() -> None:
+    depth = noisy(pressed("cylinder"), 4)
+    flags = np.zeros(depth.shape, dtype=np.uint8)
+    x, y = np.meshgrid(X - 1.3, Y + 0.7)
+    flags[(np.arctan2(y, x) > 0.2) & (np.arctan2(y, x) < 0.7)] = 4
+    depth[flags == 4] -= np.float32(0.05)
+    flags[np.hypot(x, y) > 7.0] = 1
+    depth[flags == 1] = 9.0
+    depth[::7, ::5] = np.nan
+    measured = measure_object(depth, X, Y, shape="cylinder", flags=flags)
+    assert measured.diameter_mm == pytest.approx(5.0, rel=0.01)
+    assert measured.height_mm == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_map_of_uncertainties_weights_the_pixels() -> None:
+    depth = noisy(pressed("cylinder"), 5)
+    sd = np.full(depth.shape, 0.005)
+    half = np.broadcast_to(X > 1.3, depth.shape) & np.broadcast_to(Y[:, None] > 0.0, depth.shape)
+    depth[half] += np.float32(0.1)
+    sd[half] = 0.5
+    measured = measure_object(depth, X, Y, shape="cylinder", depth_sd_mm=sd)
+    assert measured.diameter_mm == pytest.approx(5.0, abs=0.03)
+
+
+def test_the_object_under_the_seed_is_measured() -> None:
+    both = pressed("cylinder", centre=(-4.5, 0.0), size=(3.0, 0.0)) + pressed(
+        "cylinder", centre=(4.5, 1.0), size=(4.0, 0.0)
+    )
+    depth = noisy(both, 6)
+    with pytest.raises(InputError, match=r"2 objects.*--seed"):
+        measure_object(depth, X, Y, shape="cylinder")
+    left = measure_object(depth, X, Y, shape="cylinder", seed_mm=(-4.0, 0.5))
+    right = measure_object(depth, X, Y, shape="cylinder", seed_mm=(4.5, 1.0))
+    assert left.diameter_mm == pytest.approx(3.0, rel=0.01)
+    assert right.diameter_mm == pytest.approx(4.0, rel=0.01)
+    with pytest.raises(InputError, match="no object lies at the seed point"):
+        measure_object(depth, X, Y, shape="cylinder", seed_mm=(0.0, -6.0))
+
+
+@pytest.mark.parametrize("pressed_shape", ["cylinder", "cuboid", "ball"])
+@pytest.mark.parametrize("measured_shape", ["cylinder", "cuboid", "ball"])
+def test_the_wrong_shape_is_doubtful_and_the_right_one_named(
+    pressed_shape: str, measured_shape: str
+) -> None:
+    measured = measure_object(noisy(pressed(pressed_shape), 7), X, Y, shape=measured_shape)
+    if pressed_shape == measured_shape:
+        assert (measured.verdict, measured.reason) == ("ok", "")
+    else:
+        assert measured.verdict == "doubtful"
+        assert f"a {pressed_shape} fits better" in measured.reason
+
+
+def test_a_membrane_without_an_object_is_refused() -> None:
+    for depth in (np.zeros((Y.size, X.size)), noisy(np.zeros((Y.size, X.size)), 8)):
+        with pytest.raises(InputError, match="no object is pressed"):
+            measure_object(depth, X, Y, shape="ball")
+    wavy = gaussian_filter(np.random.default_rng(1).standard_normal((Y.size, X.size)), 30.0)
+    with pytest.raises(InputError, match="no object is pressed"):
+        measure_object(0.02 * wavy / wavy.std(), X, Y, shape="ball")
+
+
+def test_an_object_at_the_border_is_refused_and_a_cut_drape_doubtful() -> None:
+    cut = noisy(pressed("cylinder", centre=(9.0, 0.0)), 9)
+    with pytest.raises(InputError, match="cut by the border"):
+        measure_object(cut, X, Y, shape="cylinder")
+    close = noisy(pressed("cylinder", centre=(6.8, 5.0)), 9)
+    measured = measure_object(close, X, Y, shape="cylinder")
+    assert measured.verdict == "doubtful"
+    assert "of the drape" in measured.reason
+
+
+def test_unknown_shapes_and_arrays_that_do_not_fit_are_refused() -> None:
+    depth = pressed("ball")
+    with pytest.raises(InputError, match="unknown shape 'cone'"):
+        measure_object(depth, X, Y, shape="cone")
+    with pytest.raises(InputError, match="depth map"):
+        measure_object(depth, Y, X, shape="ball")
+    with pytest.raises(InputError, match="no pixel is usable"):
+        measure_object(np.full(depth.shape, np.nan), X, Y, shape="ball")
+
+
+def test_json_holds_what_scripts_rely_on() -> None:
+    measured = measure_object(noisy(pressed("cuboid"), 10), X, Y, shape="cuboid")
+    plain = json.loads(json.dumps(measured.as_json(compare(measured, Truth("cuboid", 5.0, 1.0)))))
+    assert set(plain["sd"]) == {"side_mm", "height_mm", "centre_mm", "yaw_deg", "drape_decay_mm"}
+    assert len(plain["side_mm"]) == len(plain["sd"]["side_mm"]) == 2
+    assert plain["truth"] == {"shape": "cuboid", "side_mm": 5.0, "height_mm": 1.0}
+    assert plain["error_percent"]["side_mm"] == pytest.approx(
+        100 * (np.mean(plain["side_mm"]) / 5.0 - 1)
+    )
+    assert plain["verdict"] == "ok"
+    round_one = measure_object(noisy(pressed("cylinder"), 10), X, Y, shape="cylinder").as_json()
+    assert "side_mm" not in round_one
+    assert round_one["diameter_mm"] == pytest.approx(5.0, rel=0.01)
+    assert round_one["truth"] is None
+
+
+def test_a_truth_of_another_shape_or_of_no_size_is_refused() -> None:
+    measured = measure_object(noisy(pressed("cylinder"), 11), X, Y, shape="cylinder")
+    with pytest.raises(InputError, match="the truth is a cuboid"):
+        compare(measured, Truth("cuboid", 5.0, 1.0))
+    with pytest.raises(InputError, match="true size"):
+        compare(measured, Truth("cylinder", 0.0, 1.0))
+
+
+def test_the_outline_lies_on_the_objects_wall() -> None:
+    measured = measure_object(noisy(pressed("cuboid", yaw_deg=20.0), 12), X, Y, shape="cuboid")
+    cos, sin = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
+    local = (measured.outline_mm - (1.3, -0.7)) @ np.array([[cos, -sin], [sin, cos]])
+    np.testing.assert_allclose(np.abs(local), 2.5, atol=0.03)
+    assert np.array_equal(measured.outline_mm[0], measured.outline_mm[-1])
+
+
+def true_presses(folder: Path) -> list[dict[str, Any]]:
+    with (folder / "presses" / "truth.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
+def test_true_depth_maps_give_the_true_sizes(shared_data: Path, sensor: str) -> None:
+    for row in true_presses(shared_data / sensor)[::2]:
+        with np.load(shared_data / sensor / "truth" / f"{Path(row['file']).stem}.npz") as file:
+            depth, pitch = file["depth_mm"], float(file["pitch_mm"])
+            x = float(file["x0_mm"]) + pitch * np.arange(depth.shape[1])
+            y = float(file["y0_mm"]) + pitch * np.arange(depth.shape[0])
+        measured = measure_object(depth, x, y, shape=row["shape"])
+        size = float(row["diameter_mm"] or row["side_mm"])
+        assert measured.size_mm == pytest.approx(size, rel=0.003), row["file"]
+        assert measured.height_mm == pytest.approx(float(row["height_mm"]), rel=0.002), row["file"]
