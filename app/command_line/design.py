@@ -9,6 +9,11 @@ from typing import Any
 from app.command_line.common import quality_lines
 from gelpolight_core.design.check import check_design
 from gelpolight_core.design.sensor_design import read_design
+from gelpolight_core.simulation.directional import (
+    ShadowComparison,
+    draw_shadow_comparison,
+    shadow_comparison,
+)
 from gelpolight_core.translation import tr
 
 
@@ -16,11 +21,35 @@ def add_parser(commands: Any) -> None:
     """Add the command."""
     parser = commands.add_parser("design", help=tr("check a sensor design before it is built"))
     parser.add_argument("design", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--shadows",
+        type=Path,
+        metavar="PNG",
+        help=tr("draw shadow area under point and directional light (the paper's Fig. 1)"),
+    )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the design's check."""
+    """Print the design's check, and the comparison of shadows where it is asked for."""
     result = check_design(read_design(options.design))
     print("\n".join(quality_lines({tr("design"): result.quality})))
+    if options.shadows:
+        comparison = shadow_comparison()
+        draw_shadow_comparison(comparison, options.shadows)
+        print("\n".join(shadow_lines(comparison)))
     return 0
+
+
+def shadow_lines(comparison: ShadowComparison) -> list[str]:
+    """Return the comparison of shadows as a table."""
+    head = tr("shadow of a {d:g} mm cylinder (mm2)").format(d=comparison.diameter_mm)
+    lines = [head, f"{'':<26}{tr('depth mm'):>10}{tr('one light'):>12}{tr('any light'):>12}"]
+    for row in comparison.rows:
+        unit = "mm" if row.lighting == "point" else "deg"
+        setting = f"{tr(row.lighting)} {row.setting:g} {unit}"
+        lines.append(
+            f"{setting:<26}{row.depth_mm:>10.2f}{row.mean_shadow_mm2:>12.1f}"
+            f"{row.any_shadow_mm2:>12.1f}"
+        )
+    return lines

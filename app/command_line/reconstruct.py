@@ -14,6 +14,7 @@ from app.command_line.common import add_model, load_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.export.preview import write_preview
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
@@ -30,6 +31,9 @@ def add_parser(commands: Any) -> None:
         default="npz",
         metavar="LIST",
         help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
+    )
+    parser.add_argument(
+        "--pictures", action="store_true", help=tr("also a picture of each depth map (PNG)")
     )
     add_model(parser)
     parser.set_defaults(run=run)
@@ -59,6 +63,8 @@ def run(options: argparse.Namespace) -> int:
         require_colour(picture, where=str(path))
         heightmap = reconstructor.depth(picture.rgb, name=path.name)
         write_heightmap(heightmap, options.output, formats=formats)
+        if options.pictures:
+            write_preview(heightmap, picture.rgb, options.output / f"{path.stem}.png")
     print(
         tr("{n} depth maps written to {folder}").format(
             n=len(options.images), folder=options.output

@@ -87,9 +87,11 @@ def test_a_press_becomes_a_depth_map_in_every_format(
     calibration: Path, press: Path, tmp_path: Path
 ) -> None:
     arguments = ["reconstruct", str(calibration), str(press), "-o", str(tmp_path / "out")]
-    assert main([*arguments, "--format", "npz,tif,vtp,ply,stl,gsf", "--model", "paper"]) == 0
+    formats = "npz,tif,vtp,ply,stl,gsf"
+    assert main([*arguments, "--format", formats, "--model", "paper", "--pictures"]) == 0
     names = sorted(p.name for p in (tmp_path / "out").iterdir())
-    assert names == [f"{press.stem}.{e}" for e in ("gsf", "npz", "ply", "stl", "tif", "vtp")]
+    assert names == [f"{press.stem}.{e}" for e in ("gsf", "npz", "ply", "png", "stl", "tif", "vtp")]
+    assert cv2.imread(str(tmp_path / "out" / f"{press.stem}.png")).std() > 10
     with np.load(tmp_path / "out" / f"{press.stem}.npz", allow_pickle=False) as data:
         depth, pitch = data["depth_mm"], float(data["pitch_mm"])
         assert depth.dtype == np.float32
@@ -146,8 +148,12 @@ def test_a_design_is_checked_from_its_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "d.toml").write_text("")
-    assert main(["design", str(tmp_path / "d.toml")]) == 0
-    assert "design" in capsys.readouterr().out
+    figure = tmp_path / "shadows.png"
+    assert main(["design", str(tmp_path / "d.toml"), "--shadows", str(figure)]) == 0
+    shown = capsys.readouterr().out
+    assert "design" in shown
+    assert "directional" in shown
+    assert cv2.imread(str(figure)) is not None
     (tmp_path / "bad.toml").write_text("nonsense = 1\n")
     assert "nonsense" in refusal(capsys, "design", str(tmp_path / "bad.toml"))
 

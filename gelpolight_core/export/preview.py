@@ -1,0 +1,83 @@
+"""A height map as one picture for people: camera picture, shaded depth, cross-section."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LightSource
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.translation import tr
+
+COLOURS = "viridis"
+
+
+def preview_figure(heightmap: HeightMap, frame: NDArray[np.floating[Any]]) -> Figure:
+    """Draw the camera picture, the hill-shaded depth with its scale, and a cross-section.
+
+    The cross-section runs along x through the deepest place.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The depth map.
+    frame : (height, width, 3)
+        The raw picture, 0..1.
+    """
+    figure = Figure(figsize=(13.0, 4.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.2, 1.1))
+    left.imshow(np.clip(frame, 0.0, 1.0) ** (1 / 2.2))
+    left.set_title(tr("What the camera sees"))
+    left.set_axis_off()
+    depth = np.where(heightmap.flags & int(Flag.OUTSIDE), np.nan, heightmap.depth_mm)
+    top = max(float(np.nanmax(depth)), 1e-3)
+    _draw_depth(figure, middle, heightmap, depth, top)
+    row = int(np.nanargmax(np.where(np.isfinite(depth), depth, -1.0)) // depth.shape[1])
+    middle.axhline(heightmap.y_mm[row], color="white", linewidth=0.8, linestyle="--")
+    right.plot(heightmap.x_mm, depth[row], linewidth=1.2)
+    right.set_title(tr("Section at y = {y:.2f} mm").format(y=heightmap.y_mm[row]))
+    right.set_xlabel("x (mm)")
+    right.set_ylabel(tr("depth (mm)"))
+    right.set_ylim(-0.1 * top, 1.15 * top)
+    right.grid(alpha=0.3)
+    return figure
+
+
+def _draw_depth(
+    figure: Figure, axes: Any, heightmap: HeightMap, depth: NDArray[np.floating[Any]], top: float
+) -> None:
+    x, y = heightmap.x_mm, heightmap.y_mm
+    extent = (float(x[0]), float(x[-1]), float(y[-1]), float(y[0]))
+    image = axes.imshow(depth, extent=extent, cmap=COLOURS, vmin=0.0, vmax=top)
+    light = LightSource(azdeg=315, altdeg=50)
+    shade = light.hillshade(np.nan_to_num(depth), dx=heightmap.pitch_mm, dy=-heightmap.pitch_mm)
+    shadow = np.zeros((*shade.shape, 4))
+    shadow[..., 3] = np.where(np.isfinite(depth), np.clip(0.85 - shade, 0.0, 0.6), 0.0)
+    axes.imshow(shadow, extent=extent)
+    axes.set_title(tr("Depth"))
+    axes.set_xlabel("x (mm)")
+    axes.set_ylabel("y (mm)")
+    figure.colorbar(image, ax=axes, label=tr("depth (mm)"), shrink=0.9)
+
+
+def write_preview(heightmap: HeightMap, frame: NDArray[np.floating[Any]], path: Path) -> None:
+    """Write the preview as a PNG file, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    figure = preview_figure(heightmap, frame)
+
+    def write(stream: BinaryIO) -> None:
+        figure.savefig(stream, format="png", dpi=100)
+
+    write_atomically(path, write)
