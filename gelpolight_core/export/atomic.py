@@ -35,6 +35,13 @@ def write_atomically(path: Path, writer: Callable[[BinaryIO], object]) -> None:
         Where the file cannot be written: no such folder, no permission, disk full.
     """
     target = Path(os.path.realpath(path))
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        # Replacing it would put an ordinary file in the place of, say, /dev/full.
+        raise InputError(
+            tr("this is a device, not a file"),
+            where=str(path),
+            advice=tr("Name a file"),
+        )
     temporary = target.with_name(f".{target.name[:200]}.{secrets.token_hex(4)}.part")
     try:
         _write_and_replace(target, temporary, writer)

@@ -12,26 +12,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardSpec, BoardView, find_board
 from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.mirrored_pose import SURE_MARGIN, choose_side, nearest_pose
+from gelpolight_core.optics.plane_pose import PlanePose, angle_between_deg, as_plane, find_poses
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.translation import tr
-
-Array = NDArray[np.float64]
-
-# Differences of chi-square: five standard deviations decide between a pose and its mirrored twin.
-SURE_MARGIN = 25.0
-# Boards pressed onto one surface agree better than this; the floor of what "agree" means.
-_FLATNESS_DEG = 0.05
 
 
 class Decision(StrEnum):
@@ -40,32 +32,6 @@ class Decision(StrEnum):
     SINGLE = "single"  # there was only one pose: the board faces the camera
     EVIDENCE = "evidence"  # reprojection error, and agreement where there are several views
     TILT = "tilt"  # the two explain the views equally well; the one that tilts less was taken
-
-
-@dataclass(frozen=True, slots=True)
-class PlanePose:
-    """One pose of the board in one view.
-
-    Attributes
-    ----------
-    plane : TopPlane
-        The board's plane in the camera frame.
-    rms_px : float
-        Reprojection error.
-    tilt_deg : float
-        Angle of the plane's normal to the optical axis.
-    normal_sd_deg, distance_sd_mm : float
-        Standard deviations from the corners' residuals, for the given camera.
-    residuals_px : (N, 2)
-        Projected minus seen corner.
-    """
-
-    plane: TopPlane
-    rms_px: float
-    tilt_deg: float
-    normal_sd_deg: float
-    distance_sd_mm: float
-    residuals_px: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,8 +130,8 @@ def estimate_top_pose(
     boards = [board_view for board_view, _ in looked if board_view is not None]
     if not boards:
         raise next(refusal for _, refusal in looked if refusal is not None)
-    candidates = [_find_poses(seen, camera) for seen in boards]
-    reference, margin = _choose_side(candidates)
+    candidates = [find_poses(seen, camera) for seen in boards]
+    reference, margin = choose_side(candidates)
     views = _describe(pictures, looked, candidates, reference)
     views = _leave_out_strays(views)
     return _assemble(views, camera, margin, focal_sd_px)
@@ -196,133 +162,6 @@ def _look(picture: Picture, board: BoardSpec) -> tuple[BoardView | None, InputEr
         return None, refusal
 
 
-def _find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
-    """Return the one or two poses of a board, refined, the one with the smaller error first."""
-    points, distortion = seen.board.points_mm, np.array(camera.distortion)
-    _, turns, shifts, _ = cv2.solvePnPGeneric(
-        points, seen.corners_px, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE
-    )
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
-    poses = []
-    starts = []
-    for turn, shift in zip(turns, shifts, strict=True):
-        # Before the refinement, which overwrites its start.
-        starts.append(_describe_pose(seen, camera, turn, shift))
-        refined = cv2.solvePnPRefineLM(
-            points, seen.corners_px, camera.matrix, distortion, turn, shift, criteria
-        )
-        poses.append(_describe_pose(seen, camera, refined[0], refined[1]))
-    poses.sort(key=lambda pose: pose.rms_px)
-    best = poses[0]
-    if len(poses) == 1:
-        return [best]
-    # Refinement may lead out of the mirrored pose into the true one, which rejects it; shown is
-    # then the pose that it left.
-    twin = poses[1]
-    if _are_one(twin, best):
-        twin = max(starts, key=lambda pose: pose.rms_px)
-    return [best] if _are_one(twin, best) else [best, twin]
-
-
-def _are_one(pose: PlanePose, other: PlanePose) -> bool:
-    """Whether two poses are apart by less than the corners can tell."""
-    return _angle_deg(pose.plane, other.plane) < max(5.0 * other.normal_sd_deg, 1e-4)
-
-
-def _describe_pose(
-    seen: BoardView, camera: Camera, turn: NDArray[Any], shift: NDArray[Any]
-) -> PlanePose:
-    rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)
-    shift_mm = np.asarray(shift, dtype=np.float64).ravel()
-    turned = seen.board.points_mm @ rotation.T
-    residuals = camera.project(turned + shift_mm) - seen.corners_px
-    normal = rotation[:, 2] if rotation[:, 2] @ shift_mm > 0.0 else -rotation[:, 2]
-    slopes = _pose_slopes(camera, turned, shift_mm)
-    freedom = max(residuals.size - 6, 1)
-    variance = float(np.sum(residuals**2)) / freedom
-    covariance = variance * np.linalg.inv(slopes.T @ slopes)
-    # n turns by w x n, and the distance n . t changes by (w x n) . t + n . dt.
-    normal_by_turn = -_cross_matrix(normal)
-    distance_by_pose = np.concatenate([np.cross(normal, shift_mm), normal])
-    normal_variance = np.trace(normal_by_turn @ covariance[:3, :3] @ normal_by_turn.T)
-    return PlanePose(
-        plane=_plane(normal, float(normal @ shift_mm)),
-        rms_px=float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))),
-        tilt_deg=math.degrees(math.acos(min(1.0, float(normal[2])))),
-        normal_sd_deg=math.degrees(math.sqrt(max(float(normal_variance), 0.0))),
-        distance_sd_mm=math.sqrt(max(float(distance_by_pose @ covariance @ distance_by_pose), 0.0)),
-        residuals_px=residuals,
-    )
-
-
-def _pose_slopes(camera: Camera, turned: Array, shift_mm: Array) -> Array:
-    """Return d(corners)/d(small turn about the board's origin, shift), (2N, 6)."""
-    columns = []
-    for k in range(3):
-        axis = np.eye(3)[k]
-        moves = (np.cross(axis, turned), np.broadcast_to(axis, turned.shape))
-        columns.append([_slope_along(camera, turned + shift_mm, move) for move in moves])
-    turns, shifts = zip(*columns, strict=True)
-    return np.stack([*turns, *shifts], axis=1)
-
-
-def _slope_along(camera: Camera, points_mm: Array, move: Array) -> Array:
-    step = 1e-5
-    ahead, behind = camera.project(points_mm + step * move), camera.project(points_mm - step * move)
-    return np.asarray((ahead - behind).ravel() / (2.0 * step))
-
-
-def _cross_matrix(v: Array) -> Array:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
-def _plane(normal: Array, distance_mm: float) -> TopPlane:
-    return TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), distance_mm)
-
-
-def _angle_deg(plane: TopPlane, other: TopPlane) -> float:
-    a, b = np.array(plane.normal_camera), np.array(other.normal_camera)
-    return math.degrees(math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b)))
-
-
-def _choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, float]:
-    """Return a pose on the true side, and the chi-square by which the other side is worse.
-
-    Every candidate is tried as the truth: each view adds by how much worse the candidate it then
-    takes fits its corners than its best one does, and how far that lies from the one tried, the
-    latter up to a bound, so that a board that does not lie flat cannot outvote the rest. Where
-    the margin is too small to decide, the side that tilts less is taken: sensors are built to
-    look at their top surface squarely.
-    """
-    tried = [(_cost(candidates, pose), pose) for view in candidates for pose in view]
-    cost, best = min(tried, key=lambda item: item[0])
-    taken = [_pick(view, best) for view in candidates]
-    others = [item for item in tried if not any(item[1] is pose for pose in taken)]
-    if not others:
-        return best, math.inf
-    other_cost, other = min(others, key=lambda item: item[0])
-    margin = other_cost - cost
-    if margin < SURE_MARGIN and other.tilt_deg < best.tilt_deg:
-        return other, margin
-    return best, margin
-
-
-def _cost(candidates: Sequence[Sequence[PlanePose]], truth: PlanePose) -> float:
-    return sum(_pose_cost(view, _pick(view, truth), truth) for view in candidates)
-
-
-def _pick(view: Sequence[PlanePose], truth: PlanePose) -> PlanePose:
-    return min(view, key=lambda pose: _pose_cost(view, pose, truth))
-
-
-def _pose_cost(view: Sequence[PlanePose], pose: PlanePose, truth: PlanePose) -> float:
-    best = view[0]
-    freedom = max(best.residuals_px.size - 6, 1)
-    worse = freedom * (pose.rms_px**2 / max(best.rms_px**2, 1e-12) - 1.0)
-    sd_deg = math.hypot(_FLATNESS_DEG, best.normal_sd_deg)
-    return worse + min((_angle_deg(pose.plane, truth.plane) / sd_deg) ** 2, 4.0 * SURE_MARGIN)
-
-
 def _describe(
     pictures: Sequence[Picture],
     looked: Sequence[tuple[BoardView | None, InputError | None]],
@@ -337,7 +176,7 @@ def _describe(
             views.append(TopPoseView(picture.name, False, reason))
             continue
         poses = next(found)
-        pose = _pick(poses, reference)
+        pose = nearest_pose(poses, reference)
         mirrored = next((p for p in poses if p is not pose), None)
         views.append(TopPoseView(picture.name, True, "", seen, pose, mirrored))
     return views
@@ -349,13 +188,13 @@ def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
     if len(poses) < 3:
         return views
     normal = np.median([pose.plane.normal_camera for pose in poses], axis=0)
-    middle = _plane(
+    middle = as_plane(
         normal / np.linalg.norm(normal), float(np.median([p.plane.distance_mm for p in poses]))
     )
     kept = []
     for view in views:
         if view.pose is not None:
-            angle_deg = _angle_deg(view.pose.plane, middle)
+            angle_deg = angle_between_deg(view.pose.plane, middle)
             off_mm = abs(view.pose.plane.distance_mm - middle.distance_mm)
             # Half a degree, 0.1 mm under one end of a board: it does not lie on the surface.
             if angle_deg > max(0.5, 5.0 * view.pose.normal_sd_deg) or off_mm > max(
@@ -394,7 +233,7 @@ def _average(poses: Sequence[PlanePose]) -> tuple[TopPlane, float, float]:
         distance_sd_mm = max(
             distance_sd_mm, math.sqrt(float(np.sum((distances - distance) ** 2)) / share)
         )
-    return _plane(normal, distance), normal_sd_deg, distance_sd_mm
+    return as_plane(normal, distance), normal_sd_deg, distance_sd_mm
 
 
 def _assemble(
@@ -410,7 +249,7 @@ def _assemble(
     decision = Decision.EVIDENCE if margin >= SURE_MARGIN else Decision.TILT
     if not math.isfinite(margin):
         decision = Decision.SINGLE
-    spread_deg = max(_angle_deg(pose.plane, plane) for pose in poses)
+    spread_deg = max(angle_between_deg(pose.plane, plane) for pose in poses)
     figures = (
         *_plane_figures(plane, normal_sd_deg, distance_sd_mm, tilt_deg),
         *_view_figures(views, rms, spread_deg, decision, margin),

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from test_checkerboard import BOARD, CAMERA, board_pose, render_board
+from boards import BOARD, CAMERA, board_pose, render_board
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.camera import Camera

@@ -8,9 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from boards import CAMERA, board_pose, render_board
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from test_checkerboard import CAMERA, board_pose, render_board
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.camera import Camera

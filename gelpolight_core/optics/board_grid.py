@@ -1,0 +1,165 @@
+"""Whether fitted corners are a whole checkerboard, and how they lie on its perspective grid."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from gelpolight_core.optics.crossings import Crossings, fit_crossings
+
+Array = NDArray[np.float64]
+
+# A real crossing has its neighbours' amplitude (1); the end of a lone edge square has half of it.
+MIN_CROSSING = 0.75
+# One square is even (0); half light and half dark has half the contrast.
+MAX_SPREAD_IN_SQUARE = 0.25
+
+
+def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
+    """Whether corners alternate in sign and the border rows are as strong as their neighbours.
+
+    Parameters
+    ----------
+    grey : (height, width) float32
+        The picture.
+    grid : Crossings
+        The corners fitted in it.
+    """
+    rows, columns = grid.amplitude.shape
+    signed = grid.amplitude * (1 - 2 * (np.add.outer(np.arange(rows), np.arange(columns)) % 2))
+    signed = signed * np.sign(np.median(signed))
+    if not (signed > 0.0).all():
+        return False
+    if _mixed_squares(grey, grid):
+        return False
+    sides = [(signed[0], signed[1]), (signed[-1], signed[-2])]
+    sides += [(signed[:, 0], signed[:, 1]), (signed[:, -1], signed[:, -2])]
+    return all(float(np.median(outer / inner)) > MIN_CROSSING for outer, inner in sides)
+
+
+def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
+    """Whether the grid's meshes hold light and dark: a detector that jumped over corners."""
+    t = np.linspace(0.2, 0.8, 7)
+    right, down = (a.reshape(-1, 1, 1, 1) for a in np.meshgrid(t, t))
+    c = grid.corners_px
+    upper = (1.0 - right) * c[:-1, :-1] + right * c[:-1, 1:]
+    lower = (1.0 - right) * c[1:, :-1] + right * c[1:, 1:]
+    points = np.round((1.0 - down) * upper + down * lower).astype(int)
+    u, v = (np.clip(points[..., k], 0, grey.shape[1 - k] - 1) for k in (0, 1))
+    spread = grey[v, u].std(axis=0) / (2.0 * np.abs(grid.amplitude[:-1, :-1]))
+    return bool(np.median(spread) > MAX_SPREAD_IN_SQUARE)
+
+
+def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
+    """Whether the checkerboard has a further row or column on any side of the grid.
+
+    Parameters
+    ----------
+    grey : (height, width) float32
+        The picture.
+    grid : Crossings
+        The corners fitted in it.
+    """
+    return any(
+        _has_next_row(grey, np.rot90(grid.corners_px, turns), np.rot90(grid.amplitude, turns))
+        for turns in range(4)
+    )
+
+
+def _has_next_row(grey: NDArray[np.float32], corners: Array, amplitude: Array) -> bool:
+    rows, columns = corners.shape[:2]
+    x, y = np.meshgrid(np.arange(columns, dtype=np.float64), np.arange(rows, dtype=np.float64))
+    matrix, _ = cv2.findHomography(np.stack([x, y], -1).reshape(-1, 2), corners.reshape(-1, 2))
+    bend = corners - apply_homography(matrix, x, y)
+    # Distortion bends the grid slowly: the border's misfit goes on outwards.
+    beyond = apply_homography(matrix, x[0], y[0] - 1.0) + 2.0 * bend[0] - bend[1]
+    step = corners[0] - beyond
+    # A quarter of a square around a corner has to be in the picture for it to be told.
+    margin = 0.25 * np.linalg.norm(step, axis=1, keepdims=True)
+    limit = np.array([grey.shape[1], grey.shape[0]]) - 1.0
+    seen = ((beyond > margin) & (beyond < limit - margin)).all(axis=1)
+    if np.count_nonzero(seen) < max(2.0, 0.5 * columns):
+        return False
+    along = np.gradient(beyond, axis=0)
+    found, further, _ = fit_crossings(grey, beyond[seen], along[seen], step[seen])
+    moved = np.linalg.norm(found - beyond[seen], axis=1)
+    real = (-further / amplitude[0][seen] > MIN_CROSSING) & (moved < margin[seen, 0])
+    return bool(2 * np.count_nonzero(real) > len(real))
+
+
+def apply_homography(matrix: NDArray[Any], x: Array, y: Array) -> Array:
+    """Map points of a plane into the picture.
+
+    Parameters
+    ----------
+    matrix : (3, 3)
+        The homography.
+    x, y : (...)
+        On the plane.
+
+    Returns
+    -------
+    (..., 2)
+        (u, v).
+    """
+    mapped = np.stack([x, y, np.ones_like(x)], axis=-1) @ np.asarray(matrix, dtype=np.float64).T
+    return np.asarray(mapped[..., :2] / mapped[..., 2:])
+
+
+def grid_misfit_px(
+    flat: Array, corners: Array, matrix: NDArray[Any], size: tuple[int, int]
+) -> Array:
+    """Return how far corners lie from a perspective grid bent by two radial coefficients.
+
+    Parameters
+    ----------
+    flat : (N, 2)
+        The corners on the board.
+    corners : (N, 2)
+        (u, v) of the same in the picture.
+    matrix : (3, 3)
+        Homography of the board into the picture, to start from.
+    size : (width, height)
+        Of the picture.
+
+    Returns
+    -------
+    (N,)
+        Distances in pixels.
+    """
+    centre = 0.5 * (np.array(size) - 1.0)
+    scale = 0.5 * max(size)
+
+    def misfit(values: Array) -> Array:
+        h = np.append(values[:8], 1.0).reshape(3, 3)
+        straight = (apply_homography(h, flat[:, 0], flat[:, 1]) - centre) / scale
+        r2 = np.sum(straight**2, axis=1, keepdims=True)
+        bent = straight * (1.0 + r2 * (values[8] + r2 * values[9]))
+        return np.asarray((bent * scale + centre - corners).ravel())
+
+    start = np.append(np.asarray(matrix, dtype=np.float64).ravel()[:8], [0.0, 0.0])
+    fit = least_squares(misfit, start, method="lm", x_scale=np.maximum(np.abs(start), 1e-3))
+    return np.asarray(np.linalg.norm(fit.fun.reshape(-1, 2), axis=1))
+
+
+def foreshortening_tilt_deg(matrix: NDArray[Any], at: Array) -> float:
+    """Return the tilt from the foreshortening at a point of the board: arccos of short by long.
+
+    Parameters
+    ----------
+    matrix : (3, 3)
+        Homography of the board into the picture.
+    at : (2,)
+        The point on the board.
+    """
+    step = 1e-3
+    x = at[0] + step * np.array([0.0, 1.0, 0.0])
+    y = at[1] + step * np.array([0.0, 0.0, 1.0])
+    origin, right, down = apply_homography(matrix, x, y)
+    long, short = np.linalg.svd(np.stack([right - origin, down - origin]), compute_uv=False)
+    return math.degrees(math.acos(min(1.0, short / long)))

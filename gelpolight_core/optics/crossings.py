@@ -1,0 +1,195 @@
+"""Place the corners of a checkerboard to a few hundredths of a pixel.
+
+Where four squares meet, the picture shows two crossing edges of one blur. Fitting just that to
+the pixels around a rough corner gives its place, its contrast and its sharpness at once.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erf
+
+Array = NDArray[np.float64]
+
+# A square pixel averages over itself: no edge is sharper than the sd of a unit box.
+_SIGMA_OF_PIXEL = 1.0 / math.sqrt(12.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Crossings:
+    """Fitted crossings of edges on a grid.
+
+    Attributes
+    ----------
+    corners_px : (rows, columns, 2)
+        (u, v) where the edges cross.
+    amplitude : (rows, columns)
+        Half of light minus dark, signed by the quadrant that is light.
+    sigma_px : (rows, columns)
+        Standard deviation of the edges' blur.
+    """
+
+    corners_px: Array
+    amplitude: Array
+    sigma_px: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """Pixels (N, P) around corners, their offsets x and y (P), and their weights (N, P)."""
+
+    values: Array
+    x: Array
+    y: Array
+    weights: Array
+
+
+def fit_grid(grey: NDArray[np.float32], rough: Array) -> Crossings:
+    """Fit the crossings of a whole grid.
+
+    Parameters
+    ----------
+    grey : (height, width) float32
+        The picture, 0..1.
+    rough : (rows, columns, 2)
+        (u, v) of the corners, to a pixel or so.
+
+    Returns
+    -------
+    Crossings
+        As they were fitted; whether they are a checkerboard's is for others to say.
+    """
+    rows, columns = rough.shape[:2]
+    along, down = (np.gradient(rough, axis=axis).reshape(-1, 2) for axis in (1, 0))
+    corners, amplitude, sigma = fit_crossings(grey, rough.reshape(-1, 2), along, down)
+    return Crossings(
+        corners.reshape(rows, columns, 2),
+        amplitude.reshape(rows, columns),
+        sigma.reshape(rows, columns),
+    )
+
+
+def fit_crossings(
+    grey: NDArray[np.float32], rough: Array, along: Array, down: Array
+) -> tuple[Array, Array, Array]:
+    """Fit two crossing blurred edges to each corner.
+
+    The model around corner c is b + g.x + A erf(n1.(x-c) / s) erf(n2.(x-c) / s), s = sqrt(2)
+    sigma: an uneven background, two edges of free direction, one blur. Damped Gauss-Newton on
+    the five shape values; the four linear ones are solved anew in each round; all corners at once.
+
+    Parameters
+    ----------
+    grey : (height, width)
+        The picture.
+    rough : (N, 2)
+        Where to start.
+    along, down : (N, 2)
+        Steps to the next corner in the row and in the column, which are the edges' directions.
+
+    Returns
+    -------
+    corners_px : (N, 2)
+    amplitude : (N,)
+    sigma_px : (N,)
+    """
+    area = np.abs(along[:, 0] * down[:, 1] - along[:, 1] * down[:, 0])
+    longest = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(down, axis=1))
+    # Up to 1 % of the picture, where lens distortion still leaves an edge straight.
+    radius = np.clip(0.7 * area / np.maximum(longest, 1e-9), 3.0, max(8.0, grey.shape[1] / 100.0))
+    shape = np.empty((len(rough), 5))
+    shape[:, :2] = rough
+    shape[:, 2] = np.arctan2(along[:, 0], -along[:, 1])
+    shape[:, 3] = np.arctan2(down[:, 0], -down[:, 1])
+    shape[:, 4] = 1.2
+    # First a small window and one blur for all, wide enough to be drawn in from a pixel away.
+    shape, _ = _fit_shapes(grey, shape, np.minimum(radius, 6.0), free_blur=False)
+    shape, amplitude = _fit_shapes(grey, shape, radius, free_blur=True)
+    return shape[:, :2], amplitude, shape[:, 4]
+
+
+def _fit_shapes(
+    grey: NDArray[np.float32], shape: Array, radius: Array, *, free_blur: bool, rounds: int = 12
+) -> tuple[Array, Array]:
+    """Improve shapes (N, 5) in windows of the given radii until no centre moves; and amplitudes."""
+    base = np.zeros_like(shape)
+    base[:, :2] = np.round(shape[:, :2])
+    window = _cut_windows(grey, base[:, :2], radius)
+    # Bounds keep the first steps, far from the answer, from jumping to a neighbouring corner.
+    bound = np.array([1.0, 1.0, 0.2, 0.2, 0.5 if free_blur else 0.0])
+    trust = np.ones(len(shape))
+    local = shape - base
+    step, amplitude, misfit = _propose(local, window, bound)
+    for _ in range(rounds):
+        trial = local + trust[:, None] * step
+        trial[:, 4] = np.clip(trial[:, 4], _SIGMA_OF_PIXEL, radius)
+        moved_px = np.abs(trial - local)[:, :2].max()
+        new = _propose(trial, window, bound)
+        better = new[2] <= misfit
+        trust = np.where(better, np.minimum(1.0, 2.0 * trust), 0.25 * trust)
+        local = np.where(better[:, None], trial, local)
+        step = np.where(better[:, None], new[0], step)
+        amplitude = np.where(better, new[1], amplitude)
+        misfit = np.where(better, new[2], misfit)
+        if moved_px < (1e-3 if free_blur else 0.05):
+            break
+    return base + local, amplitude
+
+
+def _cut_windows(grey: NDArray[np.float32], base: Array, radius: Array) -> _Window:
+    reach = math.ceil(float(radius.max()))
+    y, x = (a.ravel().astype(np.float64) for a in np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    u = base[:, :1] + x
+    v = base[:, 1:] + y
+    inside = (u >= 0) & (v >= 0) & (u < grey.shape[1]) & (v < grey.shape[0])
+    values = grey[np.where(inside, v, 0).astype(int), np.where(inside, u, 0).astype(int)]
+    weights = inside & (x * x + y * y <= radius[:, None] ** 2)
+    return _Window(values.astype(np.float64), x, y, weights.astype(np.float64))
+
+
+def _propose(shape: Array, window: _Window, bound: Array) -> tuple[Array, Array, Array]:
+    """Return the Gauss-Newton steps (N, 5), the amplitudes (N,) and the misfits (N,)."""
+    surface, slopes = _crossing_model(shape, window.x, window.y)
+    ones = np.ones_like(surface)
+    basis = np.stack([ones, ones * window.x, ones * window.y, surface], axis=-1)
+    linear = _solve(basis, window.weights, window.values)
+    rest = window.values - (basis @ linear[..., None])[..., 0]
+    free = np.flatnonzero(bound)
+    both = np.concatenate([slopes[..., free] * linear[:, None, 3:], basis], axis=-1)
+    step = np.zeros_like(shape)
+    step[:, free] = _solve(both, window.weights, rest)[:, : len(free)]
+    return np.clip(step, -bound, bound), linear[:, 3], np.sum(window.weights * rest**2, axis=1)
+
+
+def _crossing_model(shape: Array, x: Array, y: Array) -> tuple[Array, Array]:
+    """Return erf * erf (N, P) and its slopes (N, P, 5) by centre x, y, both angles and blur."""
+    cx, cy, angle_1, angle_2, sigma = (column[:, None] for column in shape.T)
+    dx, dy = x - cx, y - cy
+    cos_1, sin_1, cos_2, sin_2 = np.cos(angle_1), np.sin(angle_1), np.cos(angle_2), np.sin(angle_2)
+    off_1, off_2 = cos_1 * dx + sin_1 * dy, cos_2 * dx + sin_2 * dy
+    edge_1, edge_2 = erf(off_1 / (math.sqrt(2.0) * sigma)), erf(off_2 / (math.sqrt(2.0) * sigma))
+    peak = math.sqrt(2.0 / math.pi) / sigma
+    steep_1 = peak * np.exp(-0.5 * (off_1 / sigma) ** 2) * edge_2
+    steep_2 = peak * np.exp(-0.5 * (off_2 / sigma) ** 2) * edge_1
+    slopes = (
+        -(steep_1 * cos_1 + steep_2 * cos_2),
+        -(steep_1 * sin_1 + steep_2 * sin_2),
+        steep_1 * (cos_1 * dy - sin_1 * dx),
+        steep_2 * (cos_2 * dy - sin_2 * dx),
+        -(steep_1 * off_1 + steep_2 * off_2) / sigma,
+    )
+    return edge_1 * edge_2, np.stack(slopes, axis=-1)
+
+
+def _solve(basis: Array, weights: Array, values: Array) -> Array:
+    """Weighted least squares of (N, P) values in a basis (N, P, K): (N, K)."""
+    transposed = np.swapaxes(basis * weights[..., None], 1, 2)
+    normal = transposed @ basis
+    # The ridge is nothing beside a seen corner and keeps an unseen one from stopping the rest.
+    scale = np.trace(normal, axis1=1, axis2=2)[:, None, None]
+    normal = normal + (1e-12 * scale + 1e-12) * np.eye(basis.shape[2])
+    return np.asarray(np.linalg.solve(normal, transposed @ values[..., None])[..., 0])

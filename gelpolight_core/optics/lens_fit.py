@@ -1,0 +1,269 @@
+"""Solve a lens from corners: all views at once, and again without some of them.
+
+Zhang's method as OpenCV solves it: pinhole, k1 k2 p1 p2, k3 = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.checkerboard import BoardView
+from gelpolight_core.optics.lens_views import more_views_advice
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+_JACKKNIFE_GROUPS = 12
+_FLAGS = cv2.CALIB_FIX_K3
+
+
+@dataclass(frozen=True, slots=True)
+class LensFit:
+    """One solution.
+
+    Attributes
+    ----------
+    values, sd : (9,)
+        fx, fy, cx, cy, k1, k2, p1, p2, k3 and their formal standard deviations.
+    rotations : tuple of (3, 3)
+        From board to camera, per view.
+    shifts_mm : tuple of (3,)
+        The board's origin in the camera frame, per view.
+    view_rms_px : (V,)
+        Reprojection error per view.
+    rms_px : float
+        Over all corners of all views, both coordinates together.
+    """
+
+    values: Array
+    sd: Array
+    rotations: tuple[Array, ...]
+    shifts_mm: tuple[Array, ...]
+    view_rms_px: Array
+    rms_px: float
+
+    @property
+    def matrix(self) -> Array:
+        """(3, 3) pinhole matrix."""
+        fx, fy, cx, cy = self.values[:4]
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutViews:
+    """Cameras that were calibrated without a group of views.
+
+    Attributes
+    ----------
+    values : (G, 9)
+        Their intrinsics, as in :class:`LensFit`.
+    view_rms_px : (V,)
+        Reprojection error of each view by the camera that did not see it; NaN where there is none.
+    """
+
+    values: Array
+    view_rms_px: Array
+
+    @property
+    def sd(self) -> Array:
+        """Jackknife standard deviation of each value."""
+        groups = len(self.values)
+        return np.asarray(np.sqrt((groups - 1.0) * np.var(self.values, axis=0)))
+
+
+def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> LensFit:
+    """Solve from Zhang's closed form and from a plain guess; the better of the two.
+
+    Parameters
+    ----------
+    seen : sequence of BoardView
+        The views to solve from.
+    size : (width, height)
+        Of the pictures.
+
+    Returns
+    -------
+    LensFit
+        With fx and fy free.
+
+    Raises
+    ------
+    InputError
+        If no camera explains the views.
+    """
+    guess = _guess(size)
+    fits = [solve_lens(seen, size, start=start, square_pixels=False) for start in (None, guess)]
+    solved = [fit for fit in fits if fit is not None and np.isfinite(fit.values).all()]
+    if not solved:
+        raise InputError(
+            tr("no camera explains the views"),
+            where=tr("checkerboard"),
+            advice=more_views_advice(),
+        )
+    return min(solved, key=lambda fit: fit.rms_px)
+
+
+def _guess(size: tuple[int, int]) -> LensFit:
+    """Return a camera that sees as far across as it is away, axis through the middle."""
+    centre = [(size[0] - 1) / 2.0, (size[1] - 1) / 2.0]
+    values = np.array([float(max(size)), float(max(size)), *centre, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return LensFit(values, np.zeros(9), (), (), np.zeros(0), math.inf)
+
+
+def solve_lens(
+    seen: Sequence[BoardView], size: tuple[int, int], *, start: LensFit | None, square_pixels: bool
+) -> LensFit | None:
+    """Solve all views at once.
+
+    Parameters
+    ----------
+    seen : sequence of BoardView
+        The views to solve from.
+    size : (width, height)
+        Of the pictures.
+    start : LensFit or None
+        Where to start; Zhang's closed form when None.
+    square_pixels : bool
+        Whether fx = fy is kept.
+
+    Returns
+    -------
+    LensFit or None
+        None where OpenCV finds the views degenerate.
+    """
+    flags = _FLAGS
+    matrix, distortion = np.eye(3), np.zeros(5)
+    if start is not None:
+        flags |= cv2.CALIB_USE_INTRINSIC_GUESS
+        matrix, distortion = start.matrix, start.values[4:].copy()
+    if square_pixels:
+        # OpenCV keeps the ratio that the guess has.
+        matrix[0, 0] = matrix[1, 1] = 0.5 * (matrix[0, 0] + matrix[1, 1])
+        flags |= cv2.CALIB_FIX_ASPECT_RATIO
+    try:
+        rms, solved, bent, turns, shifts, sd, _, view_rms = cv2.calibrateCameraExtended(
+            [view.board.points_mm.astype(np.float32) for view in seen],
+            [view.corners_px.astype(np.float32) for view in seen],
+            size,
+            matrix,
+            distortion,
+            flags=flags,
+        )
+    except cv2.error:
+        return None
+    values = np.array([solved[0, 0], solved[1, 1], solved[0, 2], solved[1, 2], *bent.ravel()[:5]])
+    sds = np.asarray(sd, dtype=np.float64).ravel()[:9].copy()
+    if square_pixels:
+        sds[:2] = sds[:2].max()
+    return LensFit(
+        values,
+        sds,
+        tuple(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64) for turn in turns),
+        tuple(np.asarray(shift, dtype=np.float64).ravel() for shift in shifts),
+        np.asarray(view_rms, dtype=np.float64).ravel(),
+        float(rms),
+    )
+
+
+def hold_out(
+    seen: Sequence[BoardView], size: tuple[int, int], fit: LensFit, *, square_pixels: bool
+) -> HeldOutViews:
+    """Calibrate without each group of views, and see how the camera explains those.
+
+    Parameters
+    ----------
+    seen : sequence of BoardView
+        The views of `fit`.
+    size : (width, height)
+        Of the pictures.
+    fit : LensFit
+        The solution with all views, to start from.
+    square_pixels : bool
+        Whether fx = fy is kept.
+
+    Returns
+    -------
+    HeldOutViews
+        Without the groups whose rest is degenerate.
+    """
+    groups = min(len(seen), _JACKKNIFE_GROUPS)
+    group_of = np.arange(len(seen)) % groups
+    values = []
+    view_rms = np.full(len(seen), np.nan)
+    for group in range(groups):
+        rest = [view for view, g in zip(seen, group_of, strict=True) if g != group]
+        other = solve_lens(rest, size, start=fit, square_pixels=square_pixels)
+        if other is None:
+            continue
+        values.append(other.values)
+        for index in map(int, np.flatnonzero(group_of == group)):
+            view_rms[index] = _rms_of_pose(seen[index], other)
+    return HeldOutViews(np.array(values).reshape(-1, 9), view_rms)
+
+
+def _rms_of_pose(view: BoardView, fit: LensFit) -> float:
+    points, distortion = view.board.points_mm, fit.values[4:]
+    _, turn, shift = cv2.solvePnP(points, view.corners_px, fit.matrix, distortion)
+    turn, shift = cv2.solvePnPRefineLM(points, view.corners_px, fit.matrix, distortion, turn, shift)
+    seen, _ = cv2.projectPoints(points, turn, shift, fit.matrix, distortion)
+    apart = np.asarray(seen, dtype=np.float64).reshape(-1, 2) - view.corners_px
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+
+
+def aspect_is_significant(
+    free: LensFit, shared: LensFit, held_out: HeldOutViews, seen: Sequence[BoardView]
+) -> bool:
+    """Whether fx and fy differ by three standard deviations, formally and over the views.
+
+    Cameras have square pixels; only evidence beyond the noise of the corners and beyond the
+    scatter of the views speaks for others.
+
+    Parameters
+    ----------
+    free, shared : LensFit
+        Solutions with fx and fy free, and with fx = fy.
+    held_out : HeldOutViews
+        Of `free`.
+    seen : sequence of BoardView
+        The views of both.
+    """
+    corners = sum(len(view.corners_px) for view in seen)
+    freedom = max(2 * corners - 8 - 6 * len(seen), 1)
+    gain = freedom * (shared.rms_px**2 / max(free.rms_px**2, 1e-30) - 1.0)
+    ratios = held_out.values[:, 0] / held_out.values[:, 1]
+    scatter = math.sqrt((len(ratios) - 1.0) * float(np.var(ratios)))
+    return gain > 9.0 and abs(free.values[0] / free.values[1] - 1.0) > 3.0 * scatter
+
+
+def board_normal(rotation: Array) -> Array:
+    """Return the normal (3,) of a board that points away from the camera.
+
+    Parameters
+    ----------
+    rotation : (3, 3)
+        From board to camera.
+    """
+    normal = rotation[:, 2]
+    return np.asarray(normal if normal[2] > 0.0 else -normal)
+
+
+def normal_spread_deg(fit: LensFit) -> float:
+    """Return the RMS angle of the boards' normals about their mean.
+
+    Parameters
+    ----------
+    fit : LensFit
+        One rotation per view.
+    """
+    normals = np.stack([board_normal(rotation) for rotation in fit.rotations])
+    mean = normals.mean(axis=0)
+    mean /= np.linalg.norm(mean)
+    angles = np.arccos(np.clip(normals @ mean, -1.0, 1.0))
+    return math.degrees(float(np.sqrt(np.mean(angles**2))))

@@ -1,0 +1,139 @@
+"""How good a lens calibration is: whether it can be observed at all, coverage, judged figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.checkerboard import BoardView
+from gelpolight_core.optics.lens_fit import LensFit
+from gelpolight_core.optics.lens_views import MIN_VIEWS, LensView, more_views_advice
+from gelpolight_core.quality import Figure, judge
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+# Below this the perspective of a 3 mm square differs between views by less than a print's faults.
+MIN_NORMAL_SPREAD_DEG = 5.0
+# A focal length known to 1 % makes every length of the sensor wrong by as much.
+MAX_FOCAL_SD = 0.01
+COVERAGE_CELLS = (6, 8)
+
+
+def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
+    """Refuse views that are too much alike to give a focal length.
+
+    Parameters
+    ----------
+    sd : (9,)
+        Standard deviations of the intrinsics.
+    fit : LensFit
+        The solution.
+    spread_deg : float
+        Variation of the board's tilt.
+
+    Raises
+    ------
+    InputError
+        If the boards are nearly parallel or the focal length is known to more than 1 % only.
+    """
+    focal_sd = float(np.max(sd[:2] / np.abs(fit.values[:2])))
+    if spread_deg >= MIN_NORMAL_SPREAD_DEG and focal_sd <= MAX_FOCAL_SD:
+        return
+    raise InputError(
+        tr(
+            "the views are too nearly parallel: the board's tilt varies by {s:.1f} degrees, "
+            "and the focal length is known to {p:.2g} % only"
+        ).format(s=spread_deg, p=100.0 * focal_sd),
+        where=tr("checkerboard"),
+        advice=more_views_advice(),
+    )
+
+
+def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray[np.int64]:
+    """Count the corners seen in each part of the picture.
+
+    Parameters
+    ----------
+    seen : sequence of BoardView
+        The used views.
+    size : (width, height)
+        Of the pictures.
+
+    Returns
+    -------
+    (6, 8) int
+        Row by row from the top left.
+    """
+    corners = np.concatenate([view.corners_px for view in seen]) + 0.5
+    counts, _, _ = np.histogram2d(
+        corners[:, 1], corners[:, 0], bins=COVERAGE_CELLS, range=[(0, size[1]), (0, size[0])]
+    )
+    return counts.astype(np.int64)
+
+
+def fit_figures(fit: LensFit, held_out_rms: float, sd: Array, camera: Camera) -> tuple[Figure, ...]:
+    """Judge how well the camera explains the corners, and how sure it is.
+
+    Parameters
+    ----------
+    fit : LensFit
+        The solution.
+    held_out_rms : float
+        Reprojection error of views held out, pixels.
+    sd : (9,)
+        Standard deviations of the intrinsics.
+    camera : Camera
+        The intrinsics.
+    """
+    focal = max(100.0 * sd[0] / camera.fx, 100.0 * sd[1] / camera.fy)
+    centre = float(np.hypot(sd[2], sd[3]))
+    steady = tr("Use a flat board, hold it still, and focus; look at the views with large errors")
+    return (
+        # A good print is placed to 0.1 px; half a pixel at the rim is 0.05 mm on the membrane.
+        judge("reprojection_rms", tr("Reprojection error"), fit.rms_px, "px",
+              warn=0.3, fail=1.0, advice=steady),
+        judge("held_out_rms", tr("Error on views held out"), held_out_rms, "px",
+              warn=0.4, fail=1.5, advice=more_views_advice()),
+        judge("focal_sd", tr("Uncertainty of the focal length"), float(focal), "%",
+              warn=0.1, fail=100.0 * MAX_FOCAL_SD, advice=more_views_advice()),
+        judge("centre_sd", tr("Uncertainty of the principal point"), centre, "px",
+              warn=camera.width / 500.0, fail=camera.width / 50.0, advice=more_views_advice()),
+    )  # fmt: skip
+
+
+def view_figures(
+    views: Sequence[LensView], coverage: float, spread_deg: float
+) -> tuple[Figure, ...]:
+    """Judge what the views show.
+
+    Parameters
+    ----------
+    views : sequence of LensView
+        Used or not.
+    coverage : float
+        Share of the picture's parts that hold a corner.
+    spread_deg : float
+        Variation of the board's tilt.
+    """
+    used = sum(view.used for view in views)
+    refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
+    edges = [v.board.edge_width_px for v in views if v.used and v.board is not None]
+    return (
+        judge("views_used", tr("Views used"), used,
+              warn=8, fail=MIN_VIEWS, higher_is_better=True, advice=more_views_advice()),
+        judge("views_left_out", tr("Views left out"), len(refused), warn=0,
+              advice=tr("Left out: {names}").format(names="; ".join(refused))),
+        judge("normal_spread", tr("Variation of the board's tilt"), spread_deg, "deg",
+              warn=10.0, fail=MIN_NORMAL_SPREAD_DEG, higher_is_better=True,
+              advice=tr("Tilt the board more, in other directions")),
+        # Where no corner was seen, the distortion is a guess.
+        judge("coverage", tr("Picture covered by corners"), 100.0 * coverage, "%",
+              warn=60.0, fail=25.0, higher_is_better=True,
+              advice=tr("Show the board in the corners of the picture too")),
+        judge("edge_width", tr("Width of the squares' edges"), float(np.median(edges)), "px"),
+    )  # fmt: skip

@@ -1,0 +1,161 @@
+"""The one or two poses in which a seen board may lie, and how sure each is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.checkerboard import BoardView
+from gelpolight_core.optics.frame import TopPlane
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanePose:
+    """One pose of the board in one view.
+
+    Attributes
+    ----------
+    plane : TopPlane
+        The board's plane in the camera frame.
+    rms_px : float
+        Reprojection error.
+    tilt_deg : float
+        Angle of the plane's normal to the optical axis.
+    normal_sd_deg, distance_sd_mm : float
+        Standard deviations from the corners' residuals, for the given camera.
+    residuals_px : (N, 2)
+        Projected minus seen corner.
+    """
+
+    plane: TopPlane
+    rms_px: float
+    tilt_deg: float
+    normal_sd_deg: float
+    distance_sd_mm: float
+    residuals_px: Array
+
+
+def find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
+    """Find the one or two poses of a board (IPPE), and refine them.
+
+    Parameters
+    ----------
+    seen : BoardView
+        Its corners.
+    camera : Camera
+        The calibrated camera.
+
+    Returns
+    -------
+    list of PlanePose
+        The one with the smaller error first.
+    """
+    points, distortion = seen.board.points_mm, np.array(camera.distortion)
+    _, turns, shifts, _ = cv2.solvePnPGeneric(
+        points, seen.corners_px, camera.matrix, distortion, flags=cv2.SOLVEPNP_IPPE
+    )
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+    poses = []
+    starts = []
+    for turn, shift in zip(turns, shifts, strict=True):
+        # Before the refinement, which overwrites its start.
+        starts.append(_describe_pose(seen, camera, turn, shift))
+        refined = cv2.solvePnPRefineLM(
+            points, seen.corners_px, camera.matrix, distortion, turn, shift, criteria
+        )
+        poses.append(_describe_pose(seen, camera, refined[0], refined[1]))
+    poses.sort(key=lambda pose: pose.rms_px)
+    best = poses[0]
+    if len(poses) == 1:
+        return [best]
+    # Refinement may lead out of the mirrored pose into the true one, which rejects it; shown is
+    # then the pose that it left.
+    twin = poses[1]
+    if _are_one(twin, best):
+        twin = max(starts, key=lambda pose: pose.rms_px)
+    return [best] if _are_one(twin, best) else [best, twin]
+
+
+def _are_one(pose: PlanePose, other: PlanePose) -> bool:
+    """Whether two poses are apart by less than the corners can tell."""
+    return angle_between_deg(pose.plane, other.plane) < max(5.0 * other.normal_sd_deg, 1e-4)
+
+
+def _describe_pose(
+    seen: BoardView, camera: Camera, turn: NDArray[Any], shift: NDArray[Any]
+) -> PlanePose:
+    rotation = np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)
+    shift_mm = np.asarray(shift, dtype=np.float64).ravel()
+    turned = seen.board.points_mm @ rotation.T
+    residuals = camera.project(turned + shift_mm) - seen.corners_px
+    normal = rotation[:, 2] if rotation[:, 2] @ shift_mm > 0.0 else -rotation[:, 2]
+    slopes = _pose_slopes(camera, turned, shift_mm)
+    freedom = max(residuals.size - 6, 1)
+    variance = float(np.sum(residuals**2)) / freedom
+    covariance = variance * np.linalg.inv(slopes.T @ slopes)
+    # n turns by w x n, and the distance n . t changes by (w x n) . t + n . dt.
+    normal_by_turn = -_cross_matrix(normal)
+    distance_by_pose = np.concatenate([np.cross(normal, shift_mm), normal])
+    normal_variance = np.trace(normal_by_turn @ covariance[:3, :3] @ normal_by_turn.T)
+    return PlanePose(
+        plane=as_plane(normal, float(normal @ shift_mm)),
+        rms_px=float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))),
+        tilt_deg=math.degrees(math.acos(min(1.0, float(normal[2])))),
+        normal_sd_deg=math.degrees(math.sqrt(max(float(normal_variance), 0.0))),
+        distance_sd_mm=math.sqrt(max(float(distance_by_pose @ covariance @ distance_by_pose), 0.0)),
+        residuals_px=residuals,
+    )
+
+
+def _pose_slopes(camera: Camera, turned: Array, shift_mm: Array) -> Array:
+    """Return d(corners)/d(small turn about the board's origin, shift), (2N, 6)."""
+    columns = []
+    for k in range(3):
+        axis = np.eye(3)[k]
+        moves = (np.cross(axis, turned), np.broadcast_to(axis, turned.shape))
+        columns.append([_slope_along(camera, turned + shift_mm, move) for move in moves])
+    turns, shifts = zip(*columns, strict=True)
+    return np.stack([*turns, *shifts], axis=1)
+
+
+def _slope_along(camera: Camera, points_mm: Array, move: Array) -> Array:
+    step = 1e-5
+    ahead, behind = camera.project(points_mm + step * move), camera.project(points_mm - step * move)
+    return np.asarray((ahead - behind).ravel() / (2.0 * step))
+
+
+def _cross_matrix(v: Array) -> Array:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def as_plane(normal: Array, distance_mm: float) -> TopPlane:
+    """Return a plane from its normal as an array.
+
+    Parameters
+    ----------
+    normal : (3,)
+        Unit normal, away from the camera.
+    distance_mm : float
+        From the optical centre.
+    """
+    return TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), distance_mm)
+
+
+def angle_between_deg(plane: TopPlane, other: TopPlane) -> float:
+    """Return the angle between two planes.
+
+    Parameters
+    ----------
+    plane, other : TopPlane
+        In the camera frame.
+    """
+    a, b = np.array(plane.normal_camera), np.array(other.normal_camera)
+    return math.degrees(math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b)))
