@@ -19,7 +19,7 @@ MIN_CONTRAST = 10.0 / 255.0
 # A value that the camera may have cut off.
 SATURATED = 254.5 / 255.0
 # An edge over more than 1/200 of the picture's width resolves fewer than 100 line pairs across
-# it, too few for a depth map; over a third of a square it runs into the next edge.
+# it, too few for a depth map.
 MAX_EDGE_OF_WIDTH = 1.0 / 200.0
 # Three pixels are sharp to any fit, however small the picture.
 MAX_EDGE_AT_LEAST_PX = 3.0

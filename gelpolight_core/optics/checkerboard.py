@@ -46,6 +46,7 @@ Array = NDArray[np.float64]
 
 # Half of the light squares cut off leaves their edges without a level to be measured from.
 MAX_SATURATED_SHARE = 0.5
+# An edge wider than a third of a square runs into the next edge.
 MAX_EDGE_OF_SQUARE = 1.0 / 3.0
 # A printed board keeps its lines to about 0.5 % of a square; a misplaced corner is off by 50 %.
 MAX_RMS_OF_SQUARE = 0.02

@@ -75,7 +75,8 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
     Raises
     ------
     InputError
-        If any of the edge lies outside, or most of it was not seen and the region touches the border.
+        If any of the edge lies outside, or most of it was not seen and the
+        region touches the border.
     """
     circle = contour.circle
     angle = np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False)
