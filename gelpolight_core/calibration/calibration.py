@@ -15,12 +15,13 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, build_stack
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import SensorData
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-MODELS = ("paper",)
+MODELS = ("paper", "full")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,38 @@ class Provenance:
     camera_settings: Mapping[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class FullModel:
+    """What the full model knows beyond the paper's.
+
+    Attributes
+    ----------
+    led_positions_mm, led_sd_mm : (3, 3)
+        Refined on the ball presses, sensor frame, with standard deviations.
+    membrane : Membrane
+        Its response to light, view and surroundings.
+    background : (rows, columns, 3) float32
+        The contact-free membrane on the grid, crosstalk removed.
+    decay_mm : float
+        Decay length of the drape around the balls.
+    misfit : float
+        Robust relative misfit of the ball presses.
+    held_out : tuple of 2 floats
+        Misfit on presses held out, with the mirror's LEDs and with the refined ones.
+    kept : str
+        ``refined`` or ``mirror``: which LEDs `led_positions_mm` holds.
+    """
+
+    led_positions_mm: Array
+    led_sd_mm: Array
+    membrane: Membrane
+    background: Map
+    decay_mm: float
+    misfit: float
+    held_out: tuple[float, float]
+    kept: str
+
+
 @dataclass(frozen=True)
 class Calibration:
     """All that is known of one sensor.
@@ -60,7 +93,7 @@ class Calibration:
     sensor : SensorData
         As its maker states it.
     model : str
-        The model it was made with: ``paper``.
+        The model it was made for: ``paper`` or ``full``.
     camera, plane
         Lens and top surface.
     led_positions_mm : (3, 3)
@@ -79,6 +112,8 @@ class Calibration:
         Quality table of every stage, in their order.
     provenance : Provenance
         When, who, from what.
+    full : FullModel or None
+        What the full model needs; None where the calibration was made for the paper's alone.
     """
 
     sensor: SensorData
@@ -94,6 +129,7 @@ class Calibration:
     noise: Array
     quality: Mapping[str, QualityTable]
     provenance: Provenance
+    full: FullModel | None = None
 
     @cached_property
     def stack(self) -> LayerStack:
@@ -124,6 +160,10 @@ class Calibration:
             *self.reflectance.values,
         ):
             digest.update(np.ascontiguousarray(array).tobytes())
+        if self.full is not None:
+            digest.update(repr((self.full.membrane, self.full.kept)).encode())
+            digest.update(np.ascontiguousarray(self.full.led_positions_mm).tobytes())
+            digest.update(np.ascontiguousarray(self.full.background).tobytes())
         return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"
 
     @property

@@ -19,12 +19,13 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import MODELS, Calibration, Provenance
+from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import MAX_PIXELS, SensorData
 from gelpolight_core.translation import tr
@@ -142,11 +143,15 @@ def _arrays_of(c: Calibration) -> dict[str, NDArray[Any]]:
     for k in range(3):
         arrays[f"reflectance_cosines_{k}"] = c.reflectance.cosines[k]
         arrays[f"reflectance_values_{k}"] = c.reflectance.values[k]
+    if c.full is not None:
+        arrays["full_led_positions_mm"] = c.full.led_positions_mm
+        arrays["full_led_sd_mm"] = c.full.led_sd_mm
+        arrays["full_background"] = c.full.background
     return arrays
 
 
 def _manifest_of(c: Calibration) -> dict[str, Any]:
-    return {
+    manifest = {
         "format": FORMAT,
         "version": VERSION,
         "identity": c.identity,
@@ -158,6 +163,15 @@ def _manifest_of(c: Calibration) -> dict[str, Any]:
         "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
         "provenance": asdict(c.provenance),
     }
+    if c.full is not None:
+        manifest["full"] = {
+            "membrane": asdict(c.full.membrane),
+            "decay_mm": c.full.decay_mm,
+            "misfit": c.full.misfit,
+            "held_out": list(c.full.held_out),
+            "kept": c.full.kept,
+        }
+    return manifest
 
 
 def _read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
@@ -239,6 +253,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         noise=arrays["noise"],
         quality={stage: _read_quality(rows) for stage, rows in manifest["quality"].items()},
         provenance=Provenance(**manifest["provenance"]),
+        full=_read_full(manifest["full"], arrays) if "full" in manifest else None,
     )
     _check(calibration)
     return calibration
@@ -256,6 +271,26 @@ def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
         (cosines[0], cosines[1], cosines[2]),
         (values[0], values[1], values[2]),
         arrays["reflectance_coverage"],
+    )
+
+
+def _read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullModel:
+    membrane = Membrane(**{name: float(value) for name, value in entry["membrane"].items()})
+    numbers = np.array([*asdict(membrane).values(), entry["decay_mm"], entry["misfit"]], float)
+    if not np.isfinite(numbers).all() or not 0.0 <= membrane.gloss < 1.0:
+        raise ValueError("the membrane is not possible")
+    if membrane.exponent <= 0.0 or not 0.0 < membrane.roughness <= 1.0:
+        raise ValueError("the membrane is not possible")
+    before, after = (float(value) for value in entry["held_out"])
+    return FullModel(
+        led_positions_mm=arrays["full_led_positions_mm"],
+        led_sd_mm=arrays["full_led_sd_mm"],
+        membrane=membrane,
+        background=arrays["full_background"],
+        decay_mm=float(entry["decay_mm"]),
+        misfit=float(entry["misfit"]),
+        held_out=(before, after),
+        kept=str(entry["kept"]),
     )
 
 
@@ -287,11 +322,18 @@ def _check(calibration: Calibration) -> None:
         "noise": ((3,), c.noise),
         "reflectance_coverage": ((3, 2), c.reflectance.coverage),
     }
+    maps = {"radiance": c.radiance, "factors": c.factors}
+    if c.full is not None:
+        expected["full_led_positions_mm"] = ((3, 3), c.full.led_positions_mm)
+        expected["full_led_sd_mm"] = ((3, 3), c.full.led_sd_mm)
+        maps["full_background"] = np.maximum(c.full.background, 0.0)
+    if c.model == "full" and c.full is None:
+        raise ValueError("the full model is missing")
     for name, (shape, array) in expected.items():
         if array.shape != shape or not np.isfinite(array).all():
             raise ValueError(f"{name} is not possible")
     rows_columns = c.table.grid.shape
-    for name, map_ in (("radiance", c.radiance), ("factors", c.factors)):
+    for name, map_ in maps.items():
         if map_.shape != (*rows_columns, 3) or map_.dtype != np.float32:
             raise ValueError(f"{name} does not fit the optics")
         if not np.isfinite(map_).all() or float(map_.min()) < 0.0:

@@ -11,7 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.calibration.calibration import Calibration, Provenance, sensor_stack
+from gelpolight_core.calibration.calibration import (
+    MODELS,
+    Calibration,
+    FullModel,
+    Provenance,
+    sensor_stack,
+)
+from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -20,6 +27,7 @@ from gelpolight_core.lights.positions import LightResult, locate_leds
 from gelpolight_core.optics.lens import LensResult, calibrate_lens
 from gelpolight_core.optics.pose import TopPoseResult, estimate_top_pose
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radiance
 from gelpolight_core.reflectance.press import BallPress, find_ball
 from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
@@ -52,7 +60,7 @@ class CalibrationRun:
 
 
 def calibrate_session(
-    session: Session, *, model: str = "paper", progress: Progress | None = None
+    session: Session, *, model: str = MODELS[-1], progress: Progress | None = None
 ) -> CalibrationRun:
     """Calibrate a sensor from its session folder.
 
@@ -102,10 +110,14 @@ def calibrate_session(
     _refuse_unlit(background)
     bare = table.apply(background.rgb)
     presses, pictures = _find_balls(session, bare, table, lights, lens, radiance, tell)
-    tell(tr("reflectance"), 0.9)
+    tell(tr("reflectance"), 0.8)
     reflectance, factors = _reflectance_and_factors(
         presses, pictures, bare, table, lights, radiance
     )
+    full = None
+    if model == "full":
+        tell(tr("joint refinement"), 0.85)
+        full = _full_model(presses, pictures, bare, table, lights, factors)
     calibration = Calibration(
         sensor=session.sensor,
         model=model,
@@ -117,7 +129,7 @@ def calibrate_session(
         radiance=radiance.radiance,
         factors=factors.factors,
         reflectance=reflectance.table,
-        noise=np.mean([p.indentation.noise for p in presses], axis=0),
+        noise=_press_noise(presses),
         quality={
             "lens": lens.quality,
             "top_pose": pose.quality,
@@ -125,8 +137,10 @@ def calibrate_session(
             "radiance": radiance.quality,
             "reflectance": reflectance.quality,
             "factors": factors.quality,
+            **({} if full is None else {"joint": _judge_full(full)}),
         },
         provenance=_provenance(session),
+        full=full,
     )
     tell(tr("done"), 1.0)
     return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
@@ -148,6 +162,70 @@ def _reflectance_and_factors(
     return second, calibrate_factors(bare, table, leds, radiance, second.table)
 
 
+def _press_noise(presses: tuple[BallPress, ...]) -> NDArray[np.float64]:
+    """Return the noise of press minus background, per channel, over all presses."""
+    return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
+
+
+def _full_model(
+    presses: tuple[BallPress, ...],
+    pictures: tuple[Map, ...],
+    bare: Map,
+    table: ResamplingTable,
+    lights: LightResult,
+    factors: FactorResult,
+) -> FullModel:
+    """Refine LEDs and membrane on the presses, and keep the background to compare with."""
+    crosstalk = crosstalk_from_spots(lights.spots)
+    background = unmix(bare, crosstalk)
+    noise = _press_noise(presses)
+    pixels = [
+        gather_ball_pixels(
+            press, unmix(picture, crosstalk), background, table, factors.usable, noise
+        )
+        for press, picture in zip(presses, pictures, strict=True)
+    ]
+    joint = refine_jointly(presses, pixels, lights.led_positions_mm)
+    return FullModel(
+        joint.led_positions_mm,
+        joint.led_sd_mm,
+        joint.membrane,
+        background,
+        joint.decay_mm,
+        joint.misfit,
+        joint.held_out,
+        joint.kept,
+    )
+
+
+def _judge_full(full: FullModel) -> QualityTable:
+    return QualityTable(
+        (
+            judge(
+                "joint_misfit_percent",
+                tr("Ball presses and drapes not explained"),
+                100.0 * full.misfit,
+                "%",
+                warn=4.0,
+                fail=12.0,
+                advice=tr("Check ball radii, then repeat the worst presses"),
+            ),
+            judge(
+                "joint_led_sd_mm",
+                tr("LED position after refinement, standard deviation"),
+                float(np.linalg.norm(full.led_sd_mm, axis=1).max()),
+                "mm",
+                warn=0.2,
+                fail=1.0,
+                advice=tr("Press more balls, at more places"),
+            ),
+            judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
+            judge("bounce", tr("Light from the membrane around"), full.membrane.bounce, warn=1.2),
+            judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
+        )
+    )
+
+
 def _find_balls(
     session: Session,
     bare: Map,
@@ -162,7 +240,7 @@ def _find_balls(
     presses, pictures = [], []
     files = session.files("balls")
     for index, path in enumerate(files):
-        tell(tr("ball presses"), 0.5 + 0.4 * index / len(files))
+        tell(tr("ball presses"), 0.5 + 0.3 * index / len(files))
         picture = read_picture(path)
         radius = session.ball_radius_mm(path.name)
         require_colour(picture, where=str(path))

@@ -18,7 +18,7 @@ def crosstalk_from_spots(spots: MirrorSpots) -> Array:
     matrix = np.eye(3)
     for k, spot in enumerate(spots.spots):
         if spot.peak[k] < SATURATED:
-            matrix[:, k] = np.asarray(spot.flux) / spot.flux[k]
+            matrix[:, k] = np.maximum(np.asarray(spot.colour) / spot.colour[k], 0.0)
     return matrix
 
 

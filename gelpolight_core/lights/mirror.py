@@ -39,6 +39,8 @@ class Spot:
         Brightest value in each channel, 0..1.
     flux : tuple of 3 floats
         Light above the local background, summed over the spot, per channel.
+    colour : tuple of 3 floats
+        Light of each channel over the brightest channel's, from the spot's core.
     elongation : float
         Long over short axis of the spot.
     touches_border : bool
@@ -50,6 +52,7 @@ class Spot:
     area_px: int
     peak: tuple[float, float, float]
     flux: tuple[float, float, float]
+    colour: tuple[float, float, float]
     elongation: float
     touches_border: bool
 
@@ -183,9 +186,16 @@ def _describe(
         int((total > 0.5 * total.max()).sum()),
         _triple(np.where(inner[..., None], rgb[box], 0.0).max(axis=(0, 1))),
         _triple(light.sum(axis=(0, 1))),
+        _triple(_colour(excess[box], total)),
         float(axes[1] / axes[0]),
         left == 0 or top == 0 or left + width >= columns or top + height >= rows,
     )
+
+
+def _colour(excess: Array, total: Array) -> Array:
+    """Return the channels' sums over the core, brightest 1; noise is not cut off at zero here."""
+    core = excess[total > 0.5 * total.max()].sum(axis=0)
+    return np.asarray(core / core.max())
 
 
 def _triple(values: Array) -> tuple[float, float, float]:

@@ -173,7 +173,9 @@ def _visible_grid(
         )
     axes = []
     for start, stop in zip(low, high, strict=True):
-        count = next_fast_len(int(np.ceil((stop - start) / pitch_mm)) + 1, real=True)
+        # In fours, so that a quarter-scale grid has whole nodes too.
+        quarter = int(np.ceil(((stop - start) / pitch_mm + 1.0) / 4.0))
+        count = 4 * next_fast_len(quarter, real=True)
         middle = (start + stop) / 2
         axes.append(middle + pitch_mm * (np.arange(count) - (count - 1) / 2))
     return MembraneGrid(axes[0], axes[1], float(pitch_mm))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.full import reconstruct_full
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.normals import (
     ShadingMaps,
@@ -23,22 +24,38 @@ LOOKUP_SIZE = 2048
 
 
 class Reconstructor:
-    """Reconstructs height maps by the paper's model; what does not change is made ready once.
+    """Reconstructs height maps; what does not change from frame to frame is made ready once.
 
     Parameters
     ----------
     calibration : Calibration
         Of the sensor that the pictures come from.
+    model : str, optional
+        ``paper`` or ``full``; by default the one that the calibration was made for.
     workers : int, optional
         Threads of the solve and the transforms.
+
+    Raises
+    ------
+    InputError
+        If the calibration was not made for the model.
 
     Examples
     --------
     >>> Reconstructor(read_calibration(path)).depth(frame).depth_mm  # doctest: +SKIP
     """
 
-    def __init__(self, calibration: Calibration, *, workers: int = 2) -> None:
+    def __init__(
+        self, calibration: Calibration, *, model: str | None = None, workers: int = 2
+    ) -> None:
         self.calibration = calibration
+        self.model = model or calibration.model
+        if self.model == "full" and calibration.full is None:
+            raise InputError(
+                tr("the calibration was made for the paper's model only"),
+                where=calibration.identity,
+                advice=tr("Calibrate again with --model full, or use --model paper"),
+            )
         self.maps = shading_maps(calibration)
         self.workers = workers
         rows, columns = calibration.table.grid.shape
@@ -54,16 +71,7 @@ class Reconstructor:
         InputError
             If the frame is not of the calibration's size, or not in colour.
         """
-        camera = self.calibration.camera
-        if frame.shape != (camera.height, camera.width, 3):
-            shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
-            raise InputError(
-                tr("the picture is {shape}, the calibration is for {w}x{h}x3").format(
-                    shape=shape, w=camera.width, h=camera.height
-                ),
-                where=name or tr("picture"),
-                advice=tr("Use the calibration of this sensor at this picture size"),
-            )
+        self._check(frame, name)
         return solve_slopes(frame, self.maps, workers=self.workers)
 
     def depth(self, frame: NDArray[Any], *, name: str = "", normals: bool = True) -> HeightMap:
@@ -83,21 +91,56 @@ class Reconstructor:
         InputError
             If the frame is not of the calibration's size.
         """
+        self._check(frame, name)
+        if self.model == "full":
+            return self._depth_full(frame, name, normals)
         field = self.slopes(frame, name=name)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
+        shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
+        return self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name)
+
+    def _depth_full(self, frame: NDArray[Any], name: str, normals: bool) -> HeightMap:
+        assert self.calibration.full is not None
+        scale = 1.0 if frame.dtype.kind == "f" else 1.0 / np.iinfo(frame.dtype).max
+        rgb = np.asarray(frame, np.float32) * np.float32(scale)
+        result = reconstruct_full(
+            rgb, self.calibration, self.calibration.full, workers=self.workers
+        )
+        shown = result.normals if normals else None
+        return self._heightmap(result.depth_mm, shown, result.flags, name)
+
+    def _heightmap(
+        self,
+        depth_mm: NDArray[np.float32],
+        normals: NDArray[np.float32] | None,
+        flags: NDArray[np.uint8],
+        name: str,
+    ) -> HeightMap:
         grid = self.calibration.table.grid
         return HeightMap(
-            depth_mm=np.asarray(depth_mm, np.float32),
+            depth_mm=depth_mm,
             x_mm=grid.x_mm,
             y_mm=grid.y_mm,
             pitch_mm=grid.pitch_mm,
-            normals=normals_from_slopes(field.slope_x, field.slope_y) if normals else None,
-            flags=field.flags,
+            normals=normals,
+            flags=flags,
             calibration_id=self.calibration.identity,
-            model=self.calibration.model,
+            model=self.model,
             source=name,
         )
+
+    def _check(self, frame: NDArray[Any], name: str) -> None:
+        camera = self.calibration.camera
+        if frame.shape != (camera.height, camera.width, 3):
+            shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
+            raise InputError(
+                tr("the picture is {shape}, the calibration is for {w}x{h}x3").format(
+                    shape=shape, w=camera.width, h=camera.height
+                ),
+                where=name or tr("picture"),
+                advice=tr("Use the calibration of this sensor at this picture size"),
+            )
 
 
 def shading_maps(calibration: Calibration) -> ShadingMaps:

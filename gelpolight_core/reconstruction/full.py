@@ -1,0 +1,169 @@
+"""The full model: near light from coarse to fine, ray-true integration, true positions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.calibration.joint import neighbourhood
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
+from gelpolight_core.reconstruction.placement import place_on_grid, resample
+from gelpolight_core.reconstruction.weighted import WeightedIntegration, integrate_weighted
+
+Map = NDArray[np.float32]
+SATURATED = 0.995
+LEAST_BASE = 0.01
+COARSE = 4
+COARSE_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class FullDepth:
+    """A reconstruction by the full model, at true positions on the metric grid.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float32
+        At the grid's own (x, y).
+    normals : (rows, columns, 3) float32
+        Unit normals, z < 0.
+    slope_sd : (rows, columns) float32
+        Standard deviation of the slopes from the picture's noise.
+    flags : (rows, columns) uint8
+        Bits of :class:`Flag`.
+    changes_mm : tuple of float
+        Largest change of the depth in each near-light round.
+    stopped : str
+        Why the rounds ended: ``done``, or ``grows`` when the last change was larger than the one
+        before and the round was taken back.
+    """
+
+    depth_mm: Map
+    normals: Map
+    slope_sd: Map
+    flags: NDArray[np.uint8]
+    changes_mm: tuple[float, ...]
+    stopped: str
+
+
+def reconstruct_full(
+    rgb: Map, calibration: Calibration, full: FullModel, *, workers: int = 2
+) -> FullDepth:
+    """Reconstruct one picture by the full model.
+
+    Parameters
+    ----------
+    rgb : (height, width, 3) float32
+        Raw picture, linear light 0..1.
+    calibration, full
+        The sensor's.
+    workers : int, optional
+        Threads of the transforms.
+    """
+    field = shaded_field(rgb, calibration, full)
+    pitch = calibration.table.grid.pitch_mm
+    coarse = coarsen(field)
+    depth = np.zeros(coarse.usable.shape, np.float32)
+    changes: list[float] = []
+    stopped = "done"
+    for _ in range(COARSE_ROUNDS):
+        _, solved = _round(coarse, depth, full, pitch * COARSE, workers)
+        changes.append(float(np.abs(solved.depth_mm - depth).max()))
+        if len(changes) > 2 and changes[-1] > changes[-2]:
+            stopped = "grows"
+            break
+        depth = solved.depth_mm
+    rows, columns = field.usable.shape
+    depth = np.asarray(cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    slopes, solved = _round(field, depth, full, pitch, workers)
+    changes.append(float(np.abs(solved.depth_mm - depth).max()))
+    return _placed(field, slopes, solved.depth_mm, tuple(changes), stopped)
+
+
+def _round(
+    field: ShadedField, depth_mm: Map, full: FullModel, pitch_mm: float, workers: int
+) -> tuple[RaySlopes, WeightedIntegration]:
+    """One near-light round: normals at the present depth, then the depth of their slopes."""
+    slopes = solve_near_light(field, depth_mm, full.led_positions_mm, full.membrane)
+    solved = integrate_weighted(
+        slopes.slope_x,
+        slopes.slope_y,
+        slopes.weight,
+        pitch_mm=pitch_mm,
+        start_mm=depth_mm,
+        workers=workers,
+    )
+    return slopes, solved
+
+
+def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedField:
+    """Resample a raw picture and compare it with the background."""
+    table = calibration.table
+    light = unmix(table.apply(rgb), calibration.crosstalk)
+    bad = ~np.isfinite(light)
+    light[bad] = 0.0
+    saturated = table.apply((rgb >= SATURATED).astype(np.float32)) > 0.0
+    base = np.maximum(full.background, LEAST_BASE)
+    usable = table.valid & (full.background > LEAST_BASE).all(axis=2)
+    usable &= (calibration.factors > 0.0).all(axis=2)
+    ratio = np.where(usable[..., None], light / base, 1.0).astype(np.float32)
+    sigma = (calibration.noise / np.sqrt(2.0) / base).astype(np.float32)
+    grid = table.grid
+    return ShadedField(
+        ratio,
+        sigma,
+        neighbourhood(ratio, usable, grid.pitch_mm, full.membrane.bounce_reach_mm),
+        saturated | bad,
+        usable,
+        table.drift,
+        grid.x_mm,
+        grid.y_mm,
+    )
+
+
+def coarsen(field: ShadedField) -> ShadedField:
+    """Average the field over blocks of nodes; a block counts where all of it does."""
+    rows, columns = (n // COARSE for n in field.usable.shape)
+
+    def average(values: Map) -> Map:
+        whole = np.ascontiguousarray(values[: rows * COARSE, : columns * COARSE], np.float32)
+        return np.asarray(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA))
+
+    def middle(axis_mm: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+        return np.asarray(axis_mm[: count * COARSE].reshape(count, COARSE).mean(axis=1))
+
+    return ShadedField(
+        average(field.ratio),
+        average(field.sigma) / np.float32(COARSE),
+        average(field.around),
+        average(field.saturated.astype(np.float32)) > 0.5,
+        average(field.usable.astype(np.float32)) > 0.99,
+        average(field.drift),
+        middle(field.x_mm, columns),
+        middle(field.y_mm, rows),
+    )
+
+
+def _placed(
+    field: ShadedField, slopes: RaySlopes, depth_mm: Map, changes: tuple[float, ...], stopped: str
+) -> FullDepth:
+    column, row, folded = place_on_grid(depth_mm, field.drift, field.x_mm, field.y_mm)
+    depth = resample(depth_mm, column, row)
+    normals = np.stack(
+        [resample(np.ascontiguousarray(slopes.normals[..., k]), column, row) for k in range(3)],
+        axis=-1,
+    )
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    flags = resample(slopes.flags.astype(np.float32), column, row, nearest=True).astype(np.uint8)
+    flags[folded] |= int(Flag.NOT_OBSERVABLE)
+    outside = (flags & int(Flag.OUTSIDE)) != 0
+    depth[outside] = 0.0
+    return FullDepth(
+        depth, normals, resample(slopes.slope_sd, column, row), flags, changes, stopped
+    )

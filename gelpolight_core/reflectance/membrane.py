@@ -1,0 +1,88 @@
+"""The membrane of the full model: a diffuse and a glossy share, and light from its neighbourhood.
+
+The glossy share is a microfacet lobe (GGX distribution, Smith's masking) about the half vector
+between light and view; the diffuse share is a power of the cosine. Both together form one curve of
+brightness that depends on the viewing side, as a real membrane's does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+LEAST_COSINE = 1e-3
+LEAST_VIEW = 1e-2
+
+
+@dataclass(frozen=True, slots=True)
+class Membrane:
+    """How the membrane answers light.
+
+    Attributes
+    ----------
+    exponent : float
+        Of the diffuse share's cosine; 1 is Lambertian.
+    gloss : float
+        Share of the glossy lobe, 0..1.
+    roughness : float
+        GGX alpha of the glossy lobe.
+    bounce : float
+        Light from the membrane around: share of the neighbourhood's brightness that a wall turned
+        fully towards it receives.
+    bounce_reach_mm : float
+        Standard deviation of the Gaussian over which the neighbourhood is averaged.
+    """
+
+    exponent: float = 1.0
+    gloss: float = 0.0
+    roughness: float = 0.5
+    bounce: float = 0.0
+    bounce_reach_mm: float = 0.8
+
+    def response(self, light: Array, normals: Array, view: Array) -> Array:
+        """Return the brightness under each light, per unit of light; 0 on the dark side.
+
+        Parameters
+        ----------
+        light : (N, 3, 3)
+            Unit directions to the three LEDs.
+        normals, view : (N, 3)
+            Unit normals, and unit directions to the camera inside the elastomer.
+
+        Returns
+        -------
+        (N, 3)
+        """
+        facing = np.einsum("nkc,nc->nk", light, normals)
+        cosine = np.clip(facing, LEAST_COSINE, 1.0)
+        diffuse = (1.0 - self.gloss) * cosine**self.exponent / np.pi
+        glossy = self.gloss * _glossy_lobe(light, normals, view, cosine, self.roughness)
+        return np.asarray(np.where(facing > 0.0, diffuse + glossy, 0.0))
+
+
+def _glossy_lobe(
+    light: Array, normals: Array, view: Array, cosine: Array, roughness: float
+) -> Array:
+    """Return the GGX lobe times the light's cosine, (N, 3)."""
+    half = light + view[:, None, :]
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    tilt = np.clip(np.einsum("nkc,nc->nk", half, normals), 0.0, 1.0)
+    seen = np.clip(np.einsum("nc,nc->n", view, normals), LEAST_VIEW, 1.0)[:, None]
+    a2 = roughness * roughness
+    facets = a2 / (np.pi * (tilt * tilt * (a2 - 1.0) + 1.0) ** 2)
+
+    def masking(x: Array) -> Array:
+        return np.asarray(2.0 * x / (x + np.sqrt(a2 + (1.0 - a2) * x * x)))
+
+    return np.asarray(facets * masking(cosine) * masking(seen) / (4.0 * seen))
+
+
+def bounce_weight(normals: Array) -> Array:
+    """Return how much of its view a tilted point has of the membrane around, (...).
+
+    A plane element tilted by tau against an even ground sees (1 - cos tau) / 2 of it.
+    """
+    return np.asarray((1.0 + normals[..., 2]) / 2.0)
