@@ -222,8 +222,9 @@ class _Problem:
             [
                 PRIOR_STRENGTH * moved[:, :2].ravel() / LED_LATERAL_SD_MM,
                 PRIOR_STRENGTH * moved[:, 2] / LED_HEIGHT_SD_MM,
-                # A diffuse share far from Lambert's law, or a lobe that is not seen, stays put.
-                [PRIOR_STRENGTH * (x[9] - 1.0) / 0.05, (x[12] - x[13]) / 0.2, (x[11] - 0.5) / 0.3],
+                # Exponent and gloss trade off; a diffuse share that departs from Lambert's law has
+                # to be asked for by the data (the loss lets it go far), as has an unseen lobe.
+                [PRIOR_STRENGTH * (x[9] - 1.0) / 0.01, (x[12] - x[13]) / 0.2, (x[11] - 0.5) / 0.3],
             ]
         )
 
@@ -329,7 +330,9 @@ def _solve(
     )
     x = whole(fit.x)
     left = CORRELATION * np.concatenate(problem.residuals(x))
-    misfit = MODEL_ERROR * 1.4826 * float(np.median(np.abs(left[left != 0.0])))
+    weight = np.concatenate([p.weight.ravel() for p in pixels])
+    seen = (weight > 0.0) & (left != 0.0)
+    misfit = 1.4826 * float(np.median(np.abs(left[seen] / weight[seen])))
     curvature = problem.jacobian(x)[:, first_free:]
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.concatenate([np.zeros(first_free), np.sqrt(np.maximum(variance, 0.0))])

@@ -90,7 +90,9 @@ def _round(
     field: ShadedField, depth_mm: Map, full: FullModel, pitch_mm: float, workers: int
 ) -> tuple[RaySlopes, WeightedIntegration]:
     """One near-light round: normals at the present depth, then the depth of their slopes."""
-    slopes = solve_near_light(field, depth_mm, full.led_positions_mm, full.membrane)
+    slopes = solve_near_light(
+        field, depth_mm, full.led_positions_mm, full.membrane, workers=workers
+    )
     solved = integrate_weighted(
         slopes.slope_x,
         slopes.slope_y,

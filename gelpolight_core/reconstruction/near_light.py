@@ -9,7 +9,9 @@ with |n| = 1. Of their two solutions the one that keeps the dark light dark is s
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi, sqrt
 
 import numba
@@ -90,7 +92,12 @@ class RaySlopes:
 
 
 def solve_near_light(
-    field: ShadedField, depth_mm: Map, led_positions_mm: NDArray[np.float64], membrane: Membrane
+    field: ShadedField,
+    depth_mm: Map,
+    led_positions_mm: NDArray[np.float64],
+    membrane: Membrane,
+    *,
+    workers: int = 1,
 ) -> RaySlopes:
     """Solve every node's normal at the present depth.
 
@@ -104,6 +111,8 @@ def solve_near_light(
         Sensor frame.
     membrane : Membrane
         Its response.
+    workers : int, optional
+        Threads; each takes a block of rows, so that the result does not depend on their number.
     """
     shape = depth_mm.shape
     slope_x, slope_y, weight, slope_sd = (np.zeros(shape, np.float32) for _ in range(4))
@@ -112,29 +121,40 @@ def solve_near_light(
     shape_of = np.array(
         [membrane.exponent, membrane.gloss, membrane.roughness, membrane.bounce], np.float64
     )
-    _solve_all(
-        field.ratio,
-        field.sigma,
-        field.around,
-        field.saturated,
-        field.usable,
-        field.drift,
-        field.x_mm,
-        field.y_mm,
-        np.ascontiguousarray(depth_mm, np.float32),
-        np.ascontiguousarray(led_positions_mm, np.float64),
-        shape_of,
-        slope_x,
-        slope_y,
-        normals,
-        weight,
-        slope_sd,
-        flags,
-    )
+    depth = np.ascontiguousarray(depth_mm, np.float32)
+    leds = np.ascontiguousarray(led_positions_mm, np.float64)
+
+    def solve(rows: tuple[int, int]) -> None:
+        _solve_all(
+            rows[0],
+            rows[1],
+            field.ratio,
+            field.sigma,
+            field.around,
+            field.saturated,
+            field.usable,
+            field.drift,
+            field.x_mm,
+            field.y_mm,
+            depth,
+            leds,
+            shape_of,
+            slope_x,
+            slope_y,
+            normals,
+            weight,
+            slope_sd,
+            flags,
+        )
+
+    # More blocks than threads: rows without contact are done sooner.
+    edges = np.linspace(0, shape[0], 8 * max(workers, 1) + 1).astype(int).tolist()
+    with ThreadPoolExecutor(max(workers, 1)) as pool:
+        list(pool.map(solve, pairwise(edges)))
     return RaySlopes(slope_x, slope_y, normals, weight, slope_sd, flags)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
 def _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return the membrane's brightness under one light; as Membrane.response."""
     facing = lx * nx + ly * ny + lz * nz
@@ -154,7 +174,7 @@ def _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape):  # type: ignore[no-unt
     return value
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
 def _limit(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return the normal at unit length and not steeper than can be seen."""
     size = sqrt(nx * nx + ny * ny + nz * nz)
@@ -166,7 +186,7 @@ def _limit(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover
     return nx, ny, nz
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
 def _start(light, value, known, missing):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return a first normal from equivalent cosines: three lights, or two and |n| = 1.
 
@@ -201,8 +221,10 @@ def _start(light, value, known, missing):  # type: ignore[no-untyped-def]  # pra
     return bx + step * ex, by + step * ey, bz + step * ez
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
 def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    first,
+    last,
     ratio,
     sigma,
     around,
@@ -225,7 +247,7 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     light = np.empty((3, 3))
     scale, direct, value, spread = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     out = np.zeros(3, np.int64)
-    for i in range(rows):
+    for i in range(first, last):
         for j in range(columns):
             normals[i, j, 2] = -1.0
             if not usable[i, j]:
@@ -316,7 +338,7 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                 nx, ny, nz = _limit(
                     nx + m1 * tx + m2 * sx, ny + m1 * ty + m2 * sy, nz + m1 * tz + m2 * sz
                 )
-                if move < 1e-4:
+                if move < 5e-4:  # the next step's move would be its square
                     break
             for k in range(3):
                 if out[k] < 0:

@@ -36,7 +36,7 @@ def relative_error(rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def test_the_intensity_is_the_picture_over_the_cosine() -> None:
     error, usable = relative_error(whiteboard())
-    assert usable.mean() > 0.65
+    assert usable[scene.table().valid].mean() > 0.85
     assert np.abs(error[usable]).max() < 0.005
 
 
@@ -77,7 +77,7 @@ def test_a_board_smaller_than_the_circle_ends_where_it_ends() -> None:
     result = calibrate_radiance(Picture("w", rgb), table, scene.LEDS)
     # Specks up to 15 nodes wide count as board, so the corners of its outline are rounded.
     assert not result.usable[table.u_px > 276].any()
-    assert result.usable[(table.u_px < 250) & table.valid].mean() > 0.95
+    assert result.usable[(table.u_px < 250) & table.valid].mean() > 0.9
 
 
 @pytest.mark.parametrize(
