@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.lights.mirror import SATURATED, MirrorSpots
+from gelpolight_core.lights.mirror import MirrorSpots
 
 Array = NDArray[np.float64]
 
@@ -13,11 +13,12 @@ Array = NDArray[np.float64]
 def crosstalk_from_spots(spots: MirrorSpots) -> Array:
     """Return the matrix M (3, 3) of ``I_raw = M I_true``; column k is LED k, diagonal 1.
 
-    A saturated spot says nothing of the ratio; its column is left without crosstalk.
+    A spot without unsaturated pixels says nothing of the ratio; its column is left without
+    crosstalk.
     """
     matrix = np.eye(3)
     for k, spot in enumerate(spots.spots):
-        if spot.peak[k] < SATURATED:
+        if np.isfinite(spot.colour).all():
             matrix[:, k] = np.maximum(np.asarray(spot.colour) / spot.colour[k], 0.0)
     return matrix
 

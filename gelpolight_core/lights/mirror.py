@@ -21,6 +21,9 @@ SATURATED = 0.995
 BRIGHT_SHARE_LIMIT = 0.02
 RIVAL_FLUX = 0.5
 MERGED_SHARE = 0.6
+COLOUR_TOP = 0.97
+COLOUR_SHARES = (0.5, 0.15)
+COLOUR_PIXELS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,8 @@ class Spot:
     flux : tuple of 3 floats
         Light above the local background, summed over the spot, per channel.
     colour : tuple of 3 floats
-        Light of each channel over the brightest channel's, from the spot's core.
+        Light of each channel over the brightest channel's, from pixels that are not saturated; NaN
+        where there are too few.
     elongation : float
         Long over short axis of the spot.
     touches_border : bool
@@ -95,7 +99,7 @@ def find_mirror_spots(picture: Picture) -> MirrorSpots:
         If the picture is grey, black or flooded with light, or if a spot is missing, merged with
         another, cut by the border, or has a rival of like brightness in its own colour.
     """
-    where = picture.name
+    where = f"mirror/{picture.name}"
     require_colour(picture, where=where)
     rgb = picture.rgb.astype(np.float64)
     brightest = rgb.max(axis=2)
@@ -186,16 +190,23 @@ def _describe(
         int((total > 0.5 * total.max()).sum()),
         _triple(np.where(inner[..., None], rgb[box], 0.0).max(axis=(0, 1))),
         _triple(light.sum(axis=(0, 1))),
-        _triple(_colour(excess[box], total)),
+        _triple(_colour(excess[box], rgb[box].max(axis=2), total)),
         float(axes[1] / axes[0]),
         left == 0 or top == 0 or left + width >= columns or top + height >= rows,
     )
 
 
-def _colour(excess: Array, total: Array) -> Array:
-    """Return the channels' sums over the core, brightest 1; noise is not cut off at zero here."""
-    core = excess[total > 0.5 * total.max()].sum(axis=0)
-    return np.asarray(core / core.max())
+def _colour(excess: Array, brightest: Array, total: Array) -> Array:
+    """Return the channels' sums over unsaturated pixels, brightest 1; noise is not cut off at 0.
+
+    Of a saturated spot only its flanks are left, which a lens always blurs over some pixels.
+    """
+    for share in COLOUR_SHARES:
+        clear = (brightest < COLOUR_TOP) & (total > share * total.max())
+        if clear.sum() >= COLOUR_PIXELS:
+            core = excess[clear].sum(axis=0)
+            return np.asarray(core / core.max())
+    return np.full(3, np.nan)
 
 
 def _triple(values: Array) -> tuple[float, float, float]:

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_fill_holes
 
 from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.calibration.joint import neighbourhood
 from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.reconstruction.denoise import quiet_even_parts
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
 from gelpolight_core.reconstruction.placement import place_on_grid, resample
@@ -114,6 +116,7 @@ def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedF
     base = np.maximum(full.background, LEAST_BASE)
     usable = table.valid & (full.background > LEAST_BASE).all(axis=2)
     usable &= (calibration.factors > 0.0).all(axis=2)
+    light = quiet_even_parts(light, usable)
     ratio = np.where(usable[..., None], light / base, 1.0).astype(np.float32)
     sigma = (calibration.noise / np.sqrt(2.0) / base).astype(np.float32)
     grid = table.grid
@@ -123,10 +126,16 @@ def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedF
         neighbourhood(ratio, usable, grid.pitch_mm, full.membrane.bounce_reach_mm),
         saturated | bad,
         usable,
+        filled_inside(usable),
         table.drift,
         grid.x_mm,
         grid.y_mm,
     )
+
+
+def filled_inside(usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the usable area with its holes filled: specks, dust, an LED in view."""
+    return np.asarray(binary_fill_holes(usable))
 
 
 def coarsen(field: ShadedField) -> ShadedField:
@@ -146,6 +155,7 @@ def coarsen(field: ShadedField) -> ShadedField:
         average(field.around),
         average(field.saturated.astype(np.float32)) > 0.5,
         average(field.usable.astype(np.float32)) > 0.99,
+        average(field.inside.astype(np.float32)) > 0.5,
         average(field.drift),
         middle(field.x_mm, columns),
         middle(field.y_mm, rows),

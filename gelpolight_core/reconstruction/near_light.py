@@ -49,6 +49,9 @@ class ShadedField:
         Channels that are saturated.
     usable : (rows, columns) bool
         Nodes with light and membrane.
+    inside : (rows, columns) bool
+        Nodes within the seen part of the working circle; where they are not usable, the depth is
+        led by what is around.
     drift : (rows, columns, 2) float32
         Sideways move of the ray per mm of depth.
     x_mm, y_mm : (columns,), (rows,) float64
@@ -60,6 +63,7 @@ class ShadedField:
     around: Map
     saturated: NDArray[np.bool_]
     usable: NDArray[np.bool_]
+    inside: NDArray[np.bool_]
     drift: Map
     x_mm: NDArray[np.float64]
     y_mm: NDArray[np.float64]
@@ -133,6 +137,7 @@ def solve_near_light(
             field.around,
             field.saturated,
             field.usable,
+            field.inside,
             field.drift,
             field.x_mm,
             field.y_mm,
@@ -230,6 +235,7 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     around,
     saturated,
     usable,
+    inside,
     drift,
     x_mm,
     y_mm,
@@ -252,7 +258,7 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             normals[i, j, 2] = -1.0
             if not usable[i, j]:
                 flags[i, j] = _OUTSIDE
-                weight[i, j] = 1.0
+                weight[i, j] = UNSOLVED_WEIGHT if inside[i, j] else 1.0
                 continue
             x, y, d = x_mm[j], y_mm[i], depth[i, j]
             wx, wy = drift[i, j, 0], drift[i, j, 1]
