@@ -23,6 +23,10 @@ SATURATED = 0.995
 LEAST_BASE = 0.01
 COARSE = 4
 COARSE_ROUNDS = 3
+RIM_MM = 0.5
+RIM_CHANGE = 0.08
+RIM_REACH_MM = 2.5
+LET_GO = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,8 @@ class FullDepth:
         Bits of :class:`Flag`.
     changes_mm : tuple of float
         Largest change of the depth in each near-light round.
+    rim : str
+        ``held`` at depth 0, or ``free`` where a contact crosses it.
     stopped : str
         Why the rounds ended: ``done``, or ``grows`` when the last change was larger than the one
         before and the round was taken back.
@@ -51,6 +57,7 @@ class FullDepth:
     slope_sd: Map
     flags: NDArray[np.uint8]
     changes_mm: tuple[float, ...]
+    rim: str
     stopped: str
 
 
@@ -85,7 +92,8 @@ def reconstruct_full(
     depth = np.asarray(cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR))
     slopes, solved = _round(field, depth, full, pitch, workers)
     changes.append(float(np.abs(solved.depth_mm - depth).max()))
-    return _placed(field, slopes, solved.depth_mm, tuple(changes), stopped)
+    rim = "free" if released_rim(coarse, pitch * COARSE).any() else "held"
+    return _placed(field, slopes, solved.depth_mm, tuple(changes), (rim, stopped))
 
 
 def _round(
@@ -95,12 +103,18 @@ def _round(
     slopes = solve_near_light(
         field, depth_mm, full.led_positions_mm, full.membrane, workers=workers
     )
+    let_go = released_rim(field, pitch_mm)
+    weight, hold = slopes.weight, None
+    if let_go.any():
+        hold = np.where(let_go, LET_GO, 1.0).astype(np.float32)
+        weight = np.where(field.inside, weight, weight * hold)
     solved = integrate_weighted(
         slopes.slope_x,
         slopes.slope_y,
-        slopes.weight,
+        weight,
         pitch_mm=pitch_mm,
         start_mm=depth_mm,
+        hold=hold,
         workers=workers,
     )
     return slopes, solved
@@ -133,6 +147,26 @@ def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedF
     )
 
 
+def released_rim(field: ShadedField, pitch_mm: float) -> NDArray[np.bool_]:
+    """Return the nodes at which a contact crosses the rim of what is seen.
+
+    There depth 0 outside would be wrong (PHYSICS, integration); elsewhere the rim stays held, so
+    that the membrane that is not in contact anchors the depth.
+    """
+
+    def disc(radius_mm: float) -> NDArray[np.uint8]:
+        size = 2 * max(round(radius_mm / pitch_mm), 1) + 1
+        return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
+
+    seen = field.inside.astype(np.uint8)
+    core = cv2.erode(seen, disc(RIM_MM), borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    disturbed = np.abs(field.around - 1.0).max(axis=2) > RIM_CHANGE
+    touched = (disturbed & (seen > 0) & (core == 0)).astype(np.uint8)
+    if not touched.any():
+        return np.zeros(seen.shape, dtype=bool)
+    return np.asarray(cv2.dilate(touched, disc(RIM_REACH_MM)) > 0)
+
+
 def filled_inside(usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the usable area with its holes filled: specks, dust, an LED in view."""
     return np.asarray(binary_fill_holes(usable))
@@ -163,7 +197,11 @@ def coarsen(field: ShadedField) -> ShadedField:
 
 
 def _placed(
-    field: ShadedField, slopes: RaySlopes, depth_mm: Map, changes: tuple[float, ...], stopped: str
+    field: ShadedField,
+    slopes: RaySlopes,
+    depth_mm: Map,
+    changes: tuple[float, ...],
+    said: tuple[str, str],
 ) -> FullDepth:
     column, row, folded = place_on_grid(depth_mm, field.drift, field.x_mm, field.y_mm)
     depth = resample(depth_mm, column, row)
@@ -176,6 +214,4 @@ def _placed(
     flags[folded] |= int(Flag.NOT_OBSERVABLE)
     outside = (flags & int(Flag.OUTSIDE)) != 0
     depth[outside] = 0.0
-    return FullDepth(
-        depth, normals, resample(slopes.slope_sd, column, row), flags, changes, stopped
-    )
+    return FullDepth(depth, normals, resample(slopes.slope_sd, column, row), flags, changes, *said)

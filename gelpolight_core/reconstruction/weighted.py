@@ -44,6 +44,7 @@ def integrate_weighted(
     *,
     pitch_mm: float,
     start_mm: Map | None = None,
+    hold: Map | None = None,
     tolerance: float = TOLERANCE,
     workers: int = 2,
 ) -> WeightedIntegration:
@@ -59,11 +60,15 @@ def integrate_weighted(
         Distance between nodes.
     start_mm : (rows, columns), optional
         A first guess.
+    hold : (rows, columns), optional
+        How firmly depth 0 is held just outside the border, 0..1; by default 1 everywhere. Where a
+        contact crosses the border, it is let go and what is around leads the depth.
     tolerance : float, optional
         Of the preconditioned residual, relative to the right side's.
     workers : int, optional
         Threads of the transforms.
     """
+    firm = np.float32(2.0) * (np.ones_like(weight) if hold is None else hold)
     across = np.minimum(weight[:, 1:], weight[:, :-1])
     down = np.minimum(weight[1:], weight[:-1])
     edges_x = across * _edge_integrals(slope_x) * np.float32(pitch_mm)
@@ -82,10 +87,8 @@ def integrate_weighted(
     def apply(depth: Map) -> Map:
         result = _divergence(across * np.diff(depth, axis=1), down * np.diff(depth, axis=0))
         # Depth 0 half a node outside the border: an edge of half the length on each side.
-        result[:, 0] += 2.0 * depth[:, 0]
-        result[:, -1] += 2.0 * depth[:, -1]
-        result[0] += 2.0 * depth[0]
-        result[-1] += 2.0 * depth[-1]
+        for side in (np.s_[:, 0], np.s_[:, -1], np.s_[0], np.s_[-1]):
+            result[side] += firm[side] * depth[side]
         return result
 
     right = _divergence(edges_x, edges_y)
