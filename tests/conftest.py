@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from gelpolight_core.calibration.calibration import Calibration
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -15,3 +19,23 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip(f"the rendered sessions are not at {SHARED_DATA}")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def virtual_session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a session folder of the virtual sensor with its truth, at half the picture's size."""
+    from gelpolight_core.design.sensor_design import SensorDesign
+    from gelpolight_core.simulation.session import simulate_session
+
+    folder = tmp_path_factory.mktemp("virtual-sensor") / "session"
+    simulate_session(SensorDesign(), folder, scale=0.5)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def virtual_calibration(virtual_session: Path) -> Calibration:
+    """Return the full model's calibration of the virtual session; not to be changed."""
+    from gelpolight_core.calibration.pipeline import calibrate_session
+    from gelpolight_core.session.session import read_session
+
+    return calibrate_session(read_session(virtual_session), model="full").calibration

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import add_model, load_calibration, write_json
+from app.command_line.common import add_model, load_calibration, refuse_overwriting, write_json
+from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture
+from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -28,8 +29,12 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Time the frame and print a table."""
+    if options.json:
+        refuse_overwriting([options.json], [options.calibration, options.image])
+        refuse_unwritable(options.json)
     calibration = load_calibration(options.calibration, model=options.model)
     picture = read_picture(options.image)
+    require_colour(picture, where=str(options.image))
     frame = np.round(picture.rgb * (2**picture.bit_depth - 1)).astype(f"u{picture.bit_depth // 8}")
     result = benchmark_frame(Reconstructor(calibration), frame, repeats=max(options.repeats, 1))
     rows = [*result.steps, result.total, result.plain]

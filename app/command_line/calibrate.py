@@ -13,12 +13,13 @@ from app.command_line.common import (
     add_model,
     check_model,
     quality_lines,
+    refuse_overwriting,
     write_json,
 )
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session
-from gelpolight_core.errors import InputError
-from gelpolight_core.session.session import read_session
+from gelpolight_core.calibration.pipeline import STAGES, CalibrationRun, calibrate_session
+from gelpolight_core.export.atomic import refuse_unwritable
+from gelpolight_core.session.session import read_session, refuse_copies
 from gelpolight_core.translation import tr
 
 
@@ -35,14 +36,13 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
     model = check_model(options.model)
-    for path in filter(None, (options.output, options.json)):
-        if not path.resolve().parent.is_dir() or path.is_dir():
-            raise InputError(
-                tr("the file cannot be written there"),
-                where=str(path),
-                advice=tr("Name a file in a folder that exists"),
-            )
     session = read_session(options.session)
+    outputs = [path for path in (options.output, options.json) if path is not None]
+    used = [path for stage in STAGES for path in session.files(stage)]
+    refuse_overwriting(outputs, [session.folder / "session.toml", *used])
+    for path in outputs:
+        refuse_unwritable(path)
+    refuse_copies(used)
     with StageProgress() as tell:
         result = calibrate_session(session, model=model, progress=tell)
     write_calibration(result.calibration, options.output)

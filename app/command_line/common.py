@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -71,6 +71,20 @@ def load_calibration(path: Path, *, model: str | None = None) -> Calibration:
     if model is not None:
         check_model(model)
     return read_calibration(path)
+
+
+def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Refuse to write over a file that is read, or twice to the same one."""
+    taken = {path.resolve() for path in inputs}
+    for path in outputs:
+        place = path.resolve()
+        if place in taken:
+            raise InputError(
+                tr("the result would take the place of a file that is used here"),
+                where=str(path),
+                advice=tr("Choose another name or folder for the result"),
+            )
+        taken.add(place)
 
 
 def write_json(content: Mapping[str, Any], path: Path) -> None:

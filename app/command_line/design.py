@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import quality_lines
+from app.command_line.common import quality_lines, refuse_overwriting
 from gelpolight_core.design.check import check_design
 from gelpolight_core.design.sensor_design import read_design
+from gelpolight_core.export.atomic import refuse_unwritable, write_atomically
 from gelpolight_core.simulation.directional import (
     ShadowComparison,
     draw_shadow_comparison,
@@ -32,11 +34,14 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the design's check, and the comparison of shadows where it is asked for."""
+    if options.shadows:
+        refuse_overwriting([options.shadows], [options.design])
+        refuse_unwritable(options.shadows)
     result = check_design(read_design(options.design))
     print("\n".join(quality_lines({tr("design"): result.quality})))
     if options.shadows:
         comparison = shadow_comparison()
-        draw_shadow_comparison(comparison, options.shadows)
+        write_atomically(options.shadows, partial(draw_shadow_comparison, comparison))
         print("\n".join(shadow_lines(comparison)))
     return 0
 

@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import os
 import sys
+import tempfile
 import traceback
+import warnings
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NoReturn, TextIO
 
 import platformdirs
 
-from app.command_line import (
-    benchmark,
-    calibrate,
-    design,
-    evaluate,
-    inspect_calibration,
-    measure,
-    reconstruct,
-    simulate,
-)
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -30,39 +22,62 @@ from gelpolight_core.translation import tr
 OUR_FAULT = 1
 MENDABLE = 2
 INTERRUPTED = 130
-COMMANDS = (
-    simulate,
-    calibrate,
-    inspect_calibration,
-    reconstruct,
-    measure,
-    evaluate,
-    benchmark,
-    design,
-)
+LOG = "gelpolight-faults.log"
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that refuses in one line, as everything else here does."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is, and leave."""
+        advice = tr("See {command} --help").format(command=self.prog)
+        self.exit(MENDABLE, f"{self.prog}: {message}. {advice}.\n")
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
-    parser = argparse.ArgumentParser(
+    # Not above: they load for seconds, and Ctrl-C shall be answered in that time too.
+    from app.command_line import (
+        benchmark,
+        calibrate,
+        design,
+        evaluate,
+        inspect_calibration,
+        measure,
+        reconstruct,
+        simulate,
+    )
+
+    parser = _Parser(
         prog="gelpolight",
         description=tr("Calibrate a point-lit tactile sensor, see what it feels, and measure it."),
     )
     parser.add_argument("--version", action="version", version=f"gelpolight {__version__}")
     commands = parser.add_subparsers(title=tr("commands"), metavar=tr("COMMAND"))
-    for command in COMMANDS:
+    for command in (
+        simulate,
+        calibrate,
+        inspect_calibration,
+        reconstruct,
+        measure,
+        evaluate,
+        benchmark,
+        design,
+    ):
         command.add_parser(commands)
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    parser = build_parser()
-    options = parser.parse_args(arguments)
-    if not hasattr(options, "run"):
-        parser.print_help()
-        return 0
+    _open_closed_streams()
+    warnings.showwarning = _log_warning
     try:
+        parser = build_parser()
+        options = parser.parse_args(arguments)
+        if not hasattr(options, "run"):
+            parser.print_help()
+            return 0
         status: int = options.run(options)
         sys.stdout.flush()
     except InputError as error:
@@ -75,29 +90,70 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output has gone; nothing is left to say to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:  # a name too long, no permission, a full disk
+        print(_environment_fault(error), file=sys.stderr)
+        return MENDABLE
     except Exception:  # the outermost edge: a technician sees one line, the log the whole of it
         print(_report_fault(), file=sys.stderr)
         return OUR_FAULT
     return status
 
 
+def _open_closed_streams() -> None:
+    """Give a program whose output is closed (``>&-``) somewhere to write, as progress bars do."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+
+
+def _environment_fault(error: OSError) -> str:
+    """Log the traceback, and return the line that the person sees."""
+    _write_log(traceback.format_exc())
+    found = InputError(
+        tr("the system refuses it ({reason})").format(reason=error.strerror or error),
+        where=str(error.filename or tr("files")),
+        advice=tr("Check the name, the permissions and the disk"),
+    )
+    return f"gelpolight: {found}"
+
+
 def _report_fault() -> str:
     """Write the traceback to the log, and return the line that the person sees."""
-    folder = Path(platformdirs.user_log_path("gelpolight"))
-    text = f"{datetime.now(UTC).isoformat()} gelpolight {__version__}\n{traceback.format_exc()}\n"
     summary = str(sys.exc_info()[1]).splitlines()
     said = tr("gelpolight: a fault of this program ({what})").format(
         what=summary[0] if summary else sys.exc_info()[0].__name__  # type: ignore[union-attr]
     )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        log = folder / "faults.log"
-        with log.open("a", encoding="utf-8") as stream:
-            stream.write(text)
-    except OSError:
-        logging.getLogger("gelpolight").error("%s", text)
-        return said
-    return said + tr("; please report it with the log {log}").format(log=log)
+    log = _write_log(traceback.format_exc())
+    return (
+        said if log is None else said + tr("; please report it with the log {log}").format(log=log)
+    )
+
+
+def _log_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Put a library's warning into the log: it tells a technician nothing."""
+    _write_log(warnings.formatwarning(message, category, filename, lineno, line))
+
+
+def _write_log(text: str) -> Path | None:
+    """Add to the log, in the temporary folder where need be, and return its place."""
+    entry = f"{datetime.now(UTC).isoformat()} gelpolight {__version__}\n{text}\n"
+    for folder in (platformdirs.user_log_path("gelpolight"), Path(tempfile.gettempdir())):
+        log = folder / LOG
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with log.open("a", encoding="utf-8") as stream:
+                stream.write(entry)
+        except OSError:  # a full disk, a home that can only be read
+            continue
+        return log
+    return None
 
 
 if __name__ == "__main__":

@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import add_model, load_calibration, write_json
+from app.command_line.common import add_model, load_calibration, refuse_overwriting, write_json
 from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.measurement.measure import SHAPES, measure_object
 from gelpolight_core.measurement.result import Comparison, Measurement, compare
 from gelpolight_core.measurement.truth import read_truth
@@ -39,6 +40,10 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Reconstruct the picture, fit the object and print its size."""
+    if options.json:
+        used = [options.calibration, options.image, options.truth]
+        refuse_overwriting([options.json], filter(None, used))
+        refuse_unwritable(options.json)
     calibration = load_calibration(options.calibration, model=options.model)
     truth = None
     if options.truth is not None:

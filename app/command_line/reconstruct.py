@@ -10,7 +10,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from app.command_line.common import add_model, load_calibration
+from app.command_line.common import add_model, load_calibration, refuse_overwriting
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
@@ -49,13 +49,17 @@ def run(options: argparse.Namespace) -> int:
             where="--format",
             advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
         )
-    twins = [stem for stem, n in Counter(path.stem for path in options.images).items() if n > 1]
+    names = Counter(path.stem.casefold() for path in options.images)  # some disks ignore the case
+    twins = [path.stem for path in options.images if names[path.stem.casefold()] > 1]
     if twins:
         raise InputError(
             tr("two pictures are named {name}").format(name=twins[0]),
             where=tr("IMAGE"),
             advice=tr("Reconstruct them into different folders, so that neither is overwritten"),
         )
+    endings = dict.fromkeys([*formats, *(["png"] if options.pictures else [])])
+    outputs = [options.output / f"{path.stem}.{e}" for path in options.images for e in endings]
+    refuse_overwriting(outputs, [options.calibration, *options.images])
     reconstructor = Reconstructor(load_calibration(options.calibration, model=options.model))
     make_folder(options.output)
     for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):

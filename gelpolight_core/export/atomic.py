@@ -34,17 +34,28 @@ def write_atomically(path: Path, writer: Callable[[BinaryIO], object]) -> None:
     InputError
         Where the file cannot be written: no such folder, no permission, disk full.
     """
-    target = Path(os.path.realpath(path))
-    if target.exists() and not (target.is_file() or target.is_dir()):
-        # Replacing it would put an ordinary file in the place of, say, /dev/full.
-        raise InputError(
-            tr("this is a device, not a file"),
-            where=str(path),
-            advice=tr("Name a file"),
-        )
-    temporary = target.with_name(f".{target.name[:200]}.{secrets.token_hex(4)}.part")
+    target = _ordinary_target(path)
     try:
-        _write_and_replace(target, temporary, writer)
+        _write_and_replace(target, _temporary_for(target), writer)
+    except OSError as error:
+        raise _as_input_error(error, path) from error
+
+
+def refuse_unwritable(path: Path) -> None:
+    """Refuse a file that cannot be written, before the work that it shall hold is done.
+
+    Raises
+    ------
+    InputError
+        As :func:`write_atomically` would, but for the size of the disk.
+    """
+    target = _ordinary_target(path)
+    temporary = _temporary_for(target)
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        temporary.open("xb").close()
+        temporary.unlink()
     except OSError as error:
         raise _as_input_error(error, path) from error
 
@@ -61,6 +72,23 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _as_input_error(error, folder) from error
+
+
+def _ordinary_target(path: Path) -> Path:
+    """Return where a path leads; refuse what is no ordinary file."""
+    target = Path(os.path.realpath(path))
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        # Replacing it would put an ordinary file in the place of, say, /dev/full.
+        raise InputError(
+            tr("this is a device, not a file"),
+            where=str(path),
+            advice=tr("Name a file"),
+        )
+    return target
+
+
+def _temporary_for(target: Path) -> Path:
+    return target.with_name(f".{target.name[:200]}.{secrets.token_hex(4)}.part")
 
 
 def _write_and_replace(target: Path, temporary: Path, writer: Callable[[BinaryIO], object]) -> None:

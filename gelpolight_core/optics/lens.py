@@ -204,7 +204,7 @@ def _common_size(pictures: Sequence[Picture]) -> tuple[int, int]:
                     c=size[0],
                     d=size[1],
                 ),
-                where=picture.name,
+                where=f"checkerboard/{picture.name}",
                 advice=tr("Capture all pictures of a session at one size"),
             )
     return size

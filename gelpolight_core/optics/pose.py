@@ -123,13 +123,15 @@ def estimate_top_pose(
     Raises
     ------
     InputError
-        If there is no picture, one has not the camera's size, or none shows the board.
+        If there is no picture, one has not the camera's size, none shows the board, or three and
+        more boards lie in as many different planes.
     """
     _check_pictures(pictures, camera)
     looked = [_look(picture, board) for picture in pictures]
     boards = [board_view for board_view, _ in looked if board_view is not None]
     if not boards:
-        raise next(refusal for _, refusal in looked if refusal is not None)
+        first = next(refusal for _, refusal in looked if refusal is not None)
+        raise InputError(first.found, where=f"top_pose/{first.where}", advice=first.advice)
     candidates = [find_poses(seen, camera) for seen in boards]
     reference, margin = choose_side(candidates)
     views = _describe(pictures, looked, candidates, reference)
@@ -150,7 +152,7 @@ def _check_pictures(pictures: Sequence[Picture], camera: Camera) -> None:
                 tr("the picture is {a} x {b} pixels, the calibrated camera's are {c} x {d}").format(
                     a=picture.size[0], b=picture.size[1], c=camera.width, d=camera.height
                 ),
-                where=picture.name,
+                where=f"top_pose/{picture.name}",
                 advice=tr("Capture all pictures of a session at one size"),
             )
 
@@ -210,7 +212,22 @@ def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
                     view.mirrored,
                 )
         kept.append(view)
+    _refuse_discord(kept, len(poses))
     return kept
+
+
+def _refuse_discord(views: Sequence[TopPoseView], count: int) -> None:
+    """Refuse `count` boards of which no two lie in one plane: then none is known to be right."""
+    if sum(view.used for view in views) >= 2:
+        return
+    strays = (view for view in views if view.pose is not None and not view.used)
+    raise InputError(
+        tr("the {n} boards do not lie in one plane ({names})").format(
+            n=count, names="; ".join(f"{view.name}: {view.reason}" for view in strays)
+        ),
+        where=tr("top_pose"),
+        advice=tr("Capture the board only where it lies flat on the top surface"),
+    )
 
 
 def _average(poses: Sequence[PlanePose]) -> tuple[TopPlane, float, float]:

@@ -22,6 +22,8 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 FLOAT32_MAX_PIXELS = 32_766
 GRID_PER_PICTURE = 8.0
+# Less than this holds no indentation with undeformed membrane about it.
+LEAST_NODES = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +165,14 @@ def _visible_grid(
             tr("the camera sees nothing of the working circle"),
             where="top_pose",
             advice=tr("Check the board's square size and the picture of the top surface"),
+        )
+    if not (high - low >= LEAST_NODES * pitch_mm).all():
+        raise InputError(
+            tr("the working circle's seen part is {x:.2f} x {y:.2f} mm, below {n} pixels").format(
+                x=high[0] - low[0], y=high[1] - low[1], n=LEAST_NODES
+            ),
+            where="session.toml [sensor]",
+            advice=tr("State working_diameter_mm in mm, as the width of the membrane in use"),
         )
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_PICTURE * camera.width * camera.height:

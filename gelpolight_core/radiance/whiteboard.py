@@ -73,7 +73,8 @@ def calibrate_radiance(
     InputError
         If the picture is grey, too dark in a channel, or saturated over most of the field.
     """
-    require_colour(whiteboard, where=whiteboard.name)
+    where = f"whiteboard/{whiteboard.name}"
+    require_colour(whiteboard, where=where)
     image = table.apply(whiteboard.rgb)
     points = table.grid.points_mm()
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
@@ -82,7 +83,7 @@ def calibrate_radiance(
     # A Lambertian LED facing the membrane: lobe = cosine of the same angle, as faces are parallel.
     law = cosines / distances**2
     saturated = (image >= SATURATED).any(axis=2) & table.valid
-    _refuse_hopeless(image, saturated, table.valid, whiteboard.name)
+    _refuse_hopeless(image, saturated, table.valid, where)
     sigma_px = SMOOTHING_MM / table.grid.pitch_mm
     board = _board_area(image, table.valid)
     radiance = np.zeros(image.shape, dtype=np.float32)

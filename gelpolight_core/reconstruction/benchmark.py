@@ -12,8 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.full import as_linear, coarse_depth, shaded_field
+from gelpolight_core.reconstruction.near_light import solve_near_light
+from gelpolight_core.reconstruction.placement import place_on_grid
 from gelpolight_core.reconstruction.plain import plain_depth, plain_slopes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.weighted import integrate_weighted
 
 LIBRARIES = ("numpy", "scipy", "numba", "opencv-contrib-python-headless")
 
@@ -89,49 +93,102 @@ def benchmark_frame(
     repeats, plain_repeats : int, optional
         Counted runs after one warm-up.
     """
-    maps, solver, calibration = (
-        reconstructor.maps,
-        reconstructor.solver,
-        reconstructor.calibration,
-    )
-    field = reconstructor.slopes(frame)
-    read = frame.nbytes + maps.u_px.nbytes + maps.v_px.nbytes + maps.gain.nbytes
-    slope_bytes = field.slope_x.nbytes + field.slope_y.nbytes
-    written = slope_bytes + field.flags.nbytes + field.length_error.nbytes
-    depth_bytes = field.slope_x.nbytes
-    source = np.zeros(read + slope_bytes, np.uint8)
-    target = np.zeros_like(source)
-    pitch_mm = calibration.table.grid.pitch_mm
-
-    def plain() -> None:
-        plain_depth(*plain_slopes(frame, calibration), pitch_mm)
-
+    calibration = reconstructor.calibration
+    steps = _full_steps(reconstructor, frame)
+    if reconstructor.model == "paper":
+        steps = _paper_steps(reconstructor, frame)
+    table = calibration.table
+    read = frame.nbytes + table.u_px.nbytes + table.v_px.nbytes + calibration.radiance.nbytes
+    must = read + table.u_px.nbytes
+    source, target = np.zeros(must // 2, np.uint8), np.empty(must // 2, np.uint8)
     fast: dict[str, Callable[[], object]] = {
         "picture to depth": lambda: reconstructor.depth(frame, normals=False),
-        "resampling and normals": lambda: reconstructor.slopes(frame),
-        "integration": lambda: solver.integrate(field.slope_x, field.slope_y),
+        **{name: action for name, (action, _) in steps.items()},
+        # Reading one half and writing the other touches as many bytes as the frame must.
         "copy of the bytes": lambda: np.copyto(target, source),
     }
+
+    def plain() -> None:
+        plain_depth(*plain_slopes(frame, calibration), table.grid.pitch_mm)
+
     times = _time_in_turn(fast, repeats)
     slow = _time_in_turn({"plain": plain}, plain_repeats)["plain"]
-    sizes = {
-        "picture to depth": read + depth_bytes,
-        "resampling and normals": read + written,
-        "integration": slope_bytes + depth_bytes,
-    }
-    timings = {name: _timing(name, times[name], size) for name, size in sizes.items()}
     return BenchmarkResult(
-        timings["picture to depth"],
-        (timings["resampling and normals"], timings["integration"]),
-        _timing("plain NumPy and SciPy", slow, read + depth_bytes),
+        _timing("picture to depth", times["picture to depth"], must),
+        tuple(_timing(name, times[name], size) for name, (_, size) in steps.items()),
+        _timing("paper's model, plain NumPy and SciPy", slow, must),
         float(np.median(times["copy of the bytes"])),
-        solver.workers,
+        reconstructor.workers,
         {
             "python": platform.python_version(),
             "machine": platform.machine(),
             **{name: version(name) for name in LIBRARIES},
         },
     )
+
+
+Steps = dict[str, tuple[Callable[[], object], int]]
+
+
+def _paper_steps(reconstructor: Reconstructor, frame: NDArray[Any]) -> Steps:
+    """Return the paper's model step by step, each with the bytes that it touches."""
+    maps, solver = reconstructor.maps, reconstructor.solver
+    field = reconstructor.slopes(frame)
+    slope_bytes = field.slope_x.nbytes + field.slope_y.nbytes
+    read = frame.nbytes + maps.u_px.nbytes + maps.v_px.nbytes + maps.gain.nbytes
+    return {
+        "resampling and normals": (
+            lambda: reconstructor.slopes(frame),
+            read + slope_bytes + field.flags.nbytes + field.length_error.nbytes,
+        ),
+        "integration": (
+            lambda: solver.integrate(field.slope_x, field.slope_y),
+            slope_bytes + field.slope_x.nbytes,
+        ),
+    }
+
+
+def _full_steps(reconstructor: Reconstructor, frame: NDArray[Any]) -> Steps:
+    """Return the full model step by step, each with the bytes that it touches."""
+    calibration, full = reconstructor.calibration, reconstructor.calibration.full
+    if full is None:
+        return {}
+    workers, pitch_mm = reconstructor.workers, calibration.table.grid.pitch_mm
+    rgb = as_linear(frame)
+    field = shaded_field(rgb, calibration, full)
+    depth, _ = coarse_depth(field, full, pitch_mm, workers)
+    leds, membrane = full.led_positions_mm, full.membrane
+    slopes = solve_near_light(field, depth, leds, membrane, workers=workers)
+    shaded = field.ratio.nbytes + field.sigma.nbytes + field.around.nbytes
+    return {
+        "resampling and comparing": (
+            lambda: shaded_field(rgb, calibration, full),
+            rgb.nbytes + shaded,
+        ),
+        "near light, quarter scale": (
+            lambda: coarse_depth(field, full, pitch_mm, workers),
+            shaded + depth.nbytes,
+        ),
+        "near light, full scale": (
+            lambda: solve_near_light(field, depth, leds, membrane, workers=workers),
+            shaded + 7 * depth.nbytes,
+        ),
+        "integration": (
+            lambda: integrate_weighted(
+                slopes.slope_x,
+                slopes.slope_y,
+                slopes.weight,
+                pitch_mm=pitch_mm,
+                start_mm=depth,
+                workers=workers,
+            ),
+            4 * depth.nbytes,
+        ),
+        "true positions": (
+            lambda: place_on_grid(depth, field.drift, field.x_mm, field.y_mm),
+            4 * depth.nbytes,
+        ),
+    }
 
 
 def _time_in_turn(actions: dict[str, Callable[[], object]], repeats: int) -> dict[str, list[float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -77,23 +78,45 @@ def reconstruct_full(
     """
     field = shaded_field(rgb, calibration, full)
     pitch = calibration.table.grid.pitch_mm
+    depth, (changes, stopped) = coarse_depth(field, full, pitch, workers)
+    slopes, solved = _round(field, depth, full, pitch, workers)
+    last = float(np.abs(solved.depth_mm - depth).max())
+    rim = "free" if released_rim(field, pitch).any() else "held"
+    return _placed(field, slopes, solved.depth_mm, (*changes, last), (rim, stopped))
+
+
+def coarse_depth(
+    field: ShadedField, full: FullModel, pitch_mm: float, workers: int
+) -> tuple[Map, tuple[tuple[float, ...], str]]:
+    """Run the near-light rounds at quarter scale.
+
+    Returns
+    -------
+    depth_mm : (rows, columns) float32
+        Brought back to the field's own scale.
+    changes_mm, stopped
+        As in :class:`FullDepth`.
+    """
     coarse = coarsen(field)
     depth = np.zeros(coarse.usable.shape, np.float32)
     changes: list[float] = []
     stopped = "done"
     for _ in range(COARSE_ROUNDS):
-        _, solved = _round(coarse, depth, full, pitch * COARSE, workers)
+        _, solved = _round(coarse, depth, full, pitch_mm * COARSE, workers)
         changes.append(float(np.abs(solved.depth_mm - depth).max()))
         if len(changes) > 2 and changes[-1] > changes[-2]:
             stopped = "grows"
             break
         depth = solved.depth_mm
     rows, columns = field.usable.shape
-    depth = np.asarray(cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR))
-    slopes, solved = _round(field, depth, full, pitch, workers)
-    changes.append(float(np.abs(solved.depth_mm - depth).max()))
-    rim = "free" if released_rim(coarse, pitch * COARSE).any() else "held"
-    return _placed(field, slopes, solved.depth_mm, tuple(changes), (rim, stopped))
+    whole = cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(whole), (tuple(changes), stopped)
+
+
+def as_linear(frame: NDArray[Any]) -> Map:
+    """Return a frame as float32, 0..1, whatever it was."""
+    scale = 1.0 if frame.dtype.kind == "f" else 1.0 / np.iinfo(frame.dtype).max
+    return np.asarray(frame, np.float32) * np.float32(scale)
 
 
 def _round(
@@ -123,9 +146,10 @@ def _round(
 def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedField:
     """Resample a raw picture and compare it with the background."""
     table = calibration.table
-    light = unmix(table.apply(rgb), calibration.crosstalk)
-    bad = ~np.isfinite(light)
-    light[bad] = 0.0
+    seen = table.apply(rgb)
+    bad = ~np.isfinite(seen)
+    seen[bad] = 0.0
+    light = unmix(seen, calibration.crosstalk)
     saturated = table.apply((rgb >= SATURATED).astype(np.float32)) > 0.0
     base = np.maximum(full.background, LEAST_BASE)
     usable = table.valid & (full.background > LEAST_BASE).all(axis=2)

@@ -55,6 +55,8 @@ class HeightMap:
         ``paper`` or ``full``.
     source : str
         Name of the picture, such as ``press_03.png``.
+    notes : tuple of str
+        What is to be said of this map, in sentences for a person.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class HeightMap:
     calibration_id: str
     model: str
     source: str
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that the shapes fit each other."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.reconstruction.full import reconstruct_full
+from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.normals import (
     ShadingMaps,
@@ -102,13 +102,16 @@ class Reconstructor:
 
     def _depth_full(self, frame: NDArray[Any], name: str, normals: bool) -> HeightMap:
         assert self.calibration.full is not None
-        scale = 1.0 if frame.dtype.kind == "f" else 1.0 / np.iinfo(frame.dtype).max
-        rgb = np.asarray(frame, np.float32) * np.float32(scale)
         result = reconstruct_full(
-            rgb, self.calibration, self.calibration.full, workers=self.workers
+            as_linear(frame), self.calibration, self.calibration.full, workers=self.workers
         )
+        notes = []
+        if result.rim == "free":
+            notes.append(tr("a contact crosses the rim: the rim was let go there"))
+        if result.stopped == "grows":
+            notes.append(tr("the near-light rounds did not settle: the last was taken back"))
         shown = result.normals if normals else None
-        return self._heightmap(result.depth_mm, shown, result.flags, name)
+        return self._heightmap(result.depth_mm, shown, result.flags, name, tuple(notes))
 
     def _heightmap(
         self,
@@ -116,6 +119,7 @@ class Reconstructor:
         normals: NDArray[np.float32] | None,
         flags: NDArray[np.uint8],
         name: str,
+        notes: tuple[str, ...] = (),
     ) -> HeightMap:
         grid = self.calibration.table.grid
         return HeightMap(
@@ -128,6 +132,7 @@ class Reconstructor:
             calibration_id=self.calibration.identity,
             model=self.model,
             source=name,
+            notes=notes,
         )
 
     def _check(self, frame: NDArray[Any], name: str) -> None:

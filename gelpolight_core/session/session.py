@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,15 @@ import numpy as np
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.wholeness import is_whole_picture
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
 VERSION = 1
 SUFFIXES = (".png", ".tif", ".tiff")
 MAX_PIXELS = 64_000_000
+# Diamond has 2.42; no clear elastomer or window has more.
+DENSEST_INDEX = 2.5
 ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
 
 
@@ -58,7 +60,7 @@ class Session:
             If the stage's folder is missing or holds no PNG or TIFF picture.
         """
         folder = self.folder / stage
-        found = tuple(sorted(p for p in folder.glob("*") if p.suffix.lower() in SUFFIXES))
+        found = tuple(sorted(p for p in folder.glob("[!.]*") if p.suffix.lower() in SUFFIXES))
         if not found:
             raise InputError(
                 tr("the stage has no pictures"),
@@ -90,6 +92,8 @@ class Session:
     def ball_radius_mm(self, name: str) -> float:
         """Return the radius of the ball pressed in the picture `name`."""
         radius = self.ball_radii_mm.get(name, self.ball_default_radius_mm)
+        if name not in self.ball_radii_mm:
+            self._refuse_misspelt_ball(name)
         if radius is None:
             raise InputError(
                 tr("[balls] states no radius for {name}").format(name=name),
@@ -97,6 +101,23 @@ class Session:
                 advice=tr('Add "{name}" = radius in mm, or a default').format(name=name),
             )
         return radius
+
+    def _refuse_misspelt_ball(self, name: str) -> None:
+        """Refuse a default radius while another radius is stated for a picture that is not there.
+
+        It may be meant for the picture `name`, which would be calibrated with a wrong radius.
+        """
+        folder = self.folder / "balls"
+        strays = [key for key in self.ball_radii_mm if not (folder / key).exists()]
+        if self.ball_default_radius_mm is None or not folder.is_dir() or not strays:
+            return
+        raise InputError(
+            tr("[balls] names {stray}, which is not there, and not {name}").format(
+                stray=strays[0], name=name
+            ),
+            where=str(self.folder / "session.toml"),
+            advice=tr("Correct the file's name in [balls], or remove its row"),
+        )
 
 
 def average(pictures: Sequence[Picture], *, name: str) -> Picture:
@@ -146,14 +167,25 @@ def read_picture(path: Path) -> Picture:
 
 
 def _decode(path: Path) -> np.ndarray[Any, Any] | None:
-    data = np.fromfile(path, dtype=np.uint8)
+    try:
+        data = np.fromfile(path, dtype=np.uint8)
+    except OSError as error:
+        raise _unreadable(error, path) from error
     _check_declared_size(path, data[:64].tobytes())
-    if data.size == 0:
+    if not is_whole_picture(data.tobytes()):
         return None
     try:
         return cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     except cv2.error:
         return None
+
+
+def _unreadable(error: OSError, path: Path) -> InputError:
+    return InputError(
+        tr("the file cannot be read ({reason})").format(reason=error.strerror or error),
+        where=str(path),
+        advice=tr("Check its permissions and the disk, or copy it to a folder of your own"),
+    )
 
 
 def _check_declared_size(path: Path, head: bytes) -> None:
@@ -170,7 +202,19 @@ def _check_declared_size(path: Path, head: bytes) -> None:
 
 
 def require_colour(picture: Picture, *, where: str) -> None:
-    """Refuse a grey picture where the three LEDs' colours are needed."""
+    """Refuse a grey picture where the three LEDs' colours are needed.
+
+    Raises
+    ------
+    InputError
+        If the channels are alike, be it by a grey camera or because all are at the end of scale.
+    """
+    if float(picture.rgb.min()) >= 1.0:
+        raise InputError(
+            tr("the picture is saturated everywhere"),
+            where=where,
+            advice=tr("Shorten the exposure"),
+        )
     rgb = picture.rgb
     same = picture.grey or bool(
         np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
@@ -185,7 +229,34 @@ def require_colour(picture: Picture, *, where: str) -> None:
 
 def file_hash(path: Path) -> str:
     """Return the SHA-256 of a file as hexadecimal text."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise _unreadable(error, path) from error
+
+
+def refuse_copies(files: Iterable[Path]) -> None:
+    """Refuse a picture that stands in a session twice: noise makes any two captures differ.
+
+    A copied picture is a stage that was not captured, such as the background in the place of the
+    whiteboard, which no later figure shows.
+
+    Raises
+    ------
+    InputError
+        If two of the files hold the same bytes.
+    """
+    seen: dict[str, Path] = {}
+    for path in files:
+        first = seen.setdefault(file_hash(path), path)
+        if first is not path:
+            raise InputError(
+                tr("the picture is a copy of {first}").format(
+                    first=f"{first.parent.name}/{first.name}"
+                ),
+                where=str(path),
+                advice=tr("Capture this picture itself, or remove the copy"),
+            )
 
 
 def read_session(folder: Path) -> Session:
@@ -205,12 +276,18 @@ def read_session(folder: Path) -> Session:
             advice=tr("Name a session folder, or make one with gelpolight simulate"),
         )
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(
             tr("the file is not valid TOML ({error})").format(error=error),
             where=str(path),
             advice=tr("Mend that line"),
+        ) from error
+    except OSError as error:
+        raise _unreadable(error, path) from error
+    except RecursionError as error:
+        raise InputError(
+            tr("the file is nested too deeply"), where=str(path), advice=tr("Mend the file")
         ) from error
     return _parse(content, path)
 
@@ -245,9 +322,11 @@ def _parse_sensor(table: _Table) -> SensorData:
         serial=table.text("serial"),
         led_height_mm=table.number("led_height_mm", 0.1, 500.0),
         elastomer_thickness_mm=table.number("elastomer_thickness_mm", 0.0, 500.0),
-        elastomer_refractive_index=table.number("elastomer_refractive_index", 1.0, 3.0),
+        elastomer_refractive_index=table.number("elastomer_refractive_index", 1.0, DENSEST_INDEX),
         window_thickness_mm=table.number("window_thickness_mm", 0.0, 100.0, default=0.0),
-        window_refractive_index=table.number("window_refractive_index", 1.0, 3.0, default=1.49),
+        window_refractive_index=table.number(
+            "window_refractive_index", 1.0, DENSEST_INDEX, default=1.49
+        ),
         working_diameter_mm=table.number("working_diameter_mm", 0.5, 1000.0),
     )
     table.no_more(*SensorData.__dataclass_fields__)
@@ -300,9 +379,9 @@ class _Table:
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
         value = self.content.get(key, default)
         good = isinstance(value, int | float) and not isinstance(value, bool)
-        if not good or not math.isfinite(value) or not low <= value <= high:  # type: ignore[arg-type, operator]
+        if not good or not low <= value <= high:  # type: ignore[operator]
             text = tr("is {value}, not a number from {low} to {high}")
-            raise self.wrong(key, text.format(value=value, low=low, high=high))
+            raise self.wrong(key, text.format(value=str(value)[:40], low=low, high=high))
         return float(value)  # type: ignore[arg-type]
 
     def table(self, key: str) -> _Table:

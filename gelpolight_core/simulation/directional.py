@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -182,15 +183,15 @@ def _longest_shadow(depth_mm: float, elevation_deg: float) -> float:
     return 0.5 + depth_mm / math.tan(math.radians(elevation_deg))
 
 
-def draw_shadow_comparison(comparison: ShadowComparison, path: Path) -> None:
+def draw_shadow_comparison(comparison: ShadowComparison, file: Path | BinaryIO) -> None:
     """Draw the area dark under at least one light over the depth, to a PNG file.
 
     Parameters
     ----------
     comparison : ShadowComparison
         The table.
-    path : Path
-        PNG file to be written.
+    file : Path or binary file
+        Where the PNG goes.
     """
     figure = Figure(figsize=(6.4, 4.2), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
@@ -205,4 +206,4 @@ def draw_shadow_comparison(comparison: ShadowComparison, path: Path) -> None:
     axes.set_title(f"Shadow of a cylinder of {comparison.diameter_mm:g} mm")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    figure.savefig(path, format="png")
+    figure.savefig(file, format="png")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
+import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -19,6 +21,7 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core.design.parts import BallPress, Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.simulation.boards import board_views
 from gelpolight_core.simulation.drape import contact_radius
 from gelpolight_core.simulation.indenters import (
@@ -60,6 +63,7 @@ AVERAGED = {
 
 TRUTH_PITCH_MM = 0.05
 
+_TEXTS = ("session.toml", "truth.json")
 _BOARD_STAGES = ("checkerboard", "top_pose")
 _INNER_CORNERS = (9, 6)
 _VIEW_SQUARE_MM = 3.0
@@ -106,7 +110,8 @@ def simulate_session(
     Raises
     ------
     InputError
-        If the folder holds files already, or the design does not hold together.
+        If the folder holds files already or cannot be written, or the design does not hold
+        together; nothing is left in the folder then.
     """
     out = Path(out)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -114,8 +119,23 @@ def simulate_session(
             tr("there are files already"), where=str(out), advice=tr("Name a new folder")
         )
     sensor = VirtualSensor(design.scaled(scale), seed)
+    made = not out.exists()
     for stage in (*AVERAGED, "truth"):
-        (out / stage).mkdir(parents=True, exist_ok=True)
+        make_folder(out / stage)
+    try:
+        _write_session(out, sensor, progress)
+    except BaseException:
+        # A part of a session is of no use, and would stand in the way of the next try.
+        for stage in (*AVERAGED, "truth"):
+            shutil.rmtree(out / stage, ignore_errors=True)
+        for text in _TEXTS:
+            (out / text).unlink(missing_ok=True)
+        if made:
+            out.rmdir()
+        raise
+
+
+def _write_session(out: Path, sensor: VirtualSensor, progress: Progress | None) -> None:
     _write_texts(out, sensor)
     shots = tuple(_shots(sensor))
     with ThreadPoolExecutor(_THREADS) as pool:
@@ -216,16 +236,19 @@ def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:
     done, data = cv2.imencode(".png", np.ascontiguousarray(picture))
     if not done:
         raise RuntimeError(f"OpenCV could not encode {path}")
-    path.write_bytes(data.tobytes())
+    write_atomically(path, lambda stream: stream.write(data.tobytes()))
     if shot.keeps_truth and isinstance(state, PressedMembrane):
         depth, contact, x0, y0 = truth_grid(state.surface)
-        np.savez_compressed(
+        arrays: dict[str, Any] = {
+            "depth_mm": depth,
+            "contact": contact,
+            "x0_mm": np.float64(x0),
+            "y0_mm": np.float64(y0),
+            "pitch_mm": np.float64(TRUTH_PITCH_MM),
+        }
+        write_atomically(
             out / "truth" / f"{path.stem}.npz",
-            depth_mm=depth,
-            contact=contact,
-            x0_mm=np.float64(x0),
-            y0_mm=np.float64(y0),
-            pitch_mm=np.float64(TRUTH_PITCH_MM),
+            lambda stream: np.savez_compressed(stream, **arrays),
         )
 
 
@@ -252,15 +275,20 @@ def truth_grid(
 
 def _write_texts(out: Path, sensor: VirtualSensor) -> None:
     design = sensor.design
-    (out / "session.toml").write_text(session_toml(design), encoding="utf-8")
-    (out / "truth.json").write_text(json.dumps(truth_table(sensor), indent=1), encoding="utf-8")
-    with (out / "presses" / "truth.csv").open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["file", "shape", "diameter_mm", "side_mm", "height_mm"])
-        for name, item in zip(press_names(design.presses), design.presses, strict=True):
-            if item.shape in ("cylinder", "cuboid"):
-                size = [item.size_mm, ""] if item.shape == "cylinder" else ["", item.size_mm]
-                writer.writerow([f"{name}.png", item.shape, *size, item.depth_mm])
+    texts = (session_toml(design), json.dumps(truth_table(sensor), indent=1), _truth_csv(design))
+    for name, text in zip((*_TEXTS, "presses/truth.csv"), texts, strict=True):
+        write_atomically(out / name, lambda stream, text=text: stream.write(text.encode()))  # type: ignore[misc]
+
+
+def _truth_csv(design: SensorDesign) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["file", "shape", "diameter_mm", "side_mm", "height_mm"])
+    for name, item in zip(press_names(design.presses), design.presses, strict=True):
+        if item.shape in ("cylinder", "cuboid"):
+            size = [item.size_mm, ""] if item.shape == "cylinder" else ["", item.size_mm]
+            writer.writerow([f"{name}.png", item.shape, *size, item.depth_mm])
+    return stream.getvalue()
 
 
 def session_toml(design: SensorDesign) -> str:

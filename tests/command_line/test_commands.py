@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,8 +14,10 @@ import numpy as np
 import pytest
 
 from app.command_line import calibrate
+from app.command_line import main as main_module
 from app.command_line.main import MENDABLE, OUR_FAULT, main
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.session import simulate_session
 
 SCALE = 0.5
@@ -231,6 +235,20 @@ DAMAGES: list[tuple[str, Callable[[Path], None], str]] = [
     ),
     ("future", lambda f: replace_text(f / "session.toml", "version = 1", "version = 3"), "newer"),
     (
+        "copied stage",
+        lambda f: shutil.copy(
+            next((f / "background").iterdir()), next((f / "whiteboard").iterdir())
+        ),
+        "copy of whiteboard",
+    ),
+    (
+        "working diameter",
+        lambda f: replace_text(
+            f / "session.toml", "working_diameter_mm = 26.0", "working_diameter_mm = 1.0"
+        ),
+        "working_diameter_mm",
+    ),
+    (
         "no picture",
         lambda f: next((f / "mirror").iterdir()).write_bytes(b"\x89PNG broken"),
         "not a whole",
@@ -283,6 +301,141 @@ def test_what_is_wrong_on_the_command_line_is_said(
     assert "damaged" in refusal(capsys, "inspect", str(cut))
 
 
+def test_no_result_takes_the_place_of_what_it_is_made_of(
+    session: Path,
+    calibration: Path,
+    press: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A slip of the hand costs a line of text, not the capture or the calibration."""
+    picture, cal = tmp_path / "p.png", tmp_path / "c.gplcal"
+    shutil.copy(press, picture)
+    shutil.copy(calibration, cal)
+    (tmp_path / "link.gplcal").symlink_to(cal)
+    (tmp_path / "d.toml").write_text("")
+    ball = session / "balls" / "ball_00.png"
+    kept = [path.read_bytes() for path in (picture, cal, ball)]
+    measure = ("measure", str(cal), str(picture), "--shape", "ball", "--json")
+    both = ("-o", str(tmp_path / "x"), "--json", str(tmp_path / "x"))
+    for arguments in (
+        ("reconstruct", str(cal), str(picture), "-o", str(tmp_path), "--pictures"),
+        (*measure, str(cal)),
+        (*measure, str(picture)),
+        (*measure, str(tmp_path / "link.gplcal")),
+        ("benchmark", str(cal), str(picture), "--json", str(cal)),
+        ("calibrate", str(session), "-o", str(ball)),
+        ("calibrate", str(session), *both),
+        ("design", str(tmp_path / "d.toml"), "--shadows", str(tmp_path / "d.toml")),
+    ):
+        assert "take the place" in refusal(capsys, *arguments)
+    assert [path.read_bytes() for path in (picture, cal, ball)] == kept
+    assert not (tmp_path / "x").exists()
+
+
+def test_what_the_system_refuses_is_a_sentence(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    long = "x" * 300
+    assert "too long" in refusal(capsys, "inspect", str(tmp_path / long))
+    assert "too long" in refusal(capsys, "simulate", str(tmp_path / long))
+    inside = str(press / "session")
+    assert "a file stands" in refusal(capsys, "simulate", inside)
+    (tmp_path / "d.toml").write_text("")
+    shadows = ("design", str(tmp_path / "d.toml"), "--shadows", str(tmp_path))
+    assert "a folder stands" in refusal(capsys, *shadows)
+    shutil.copy(press, tmp_path)
+    evaluate = ("evaluate", str(calibration), str(tmp_path), "-o", str(tmp_path / "e"))
+    assert "truth.csv" in refusal(capsys, *evaluate)
+    assert not (tmp_path / "e").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (("measure", "c", "p.png", "--shape", "star"), "star"),
+        (("measure", "c"), "IMAGE"),
+        (("benchmark", "c", "p.png", "--repeats", "many"), "many"),
+        (("sing",), "sing"),
+    ],
+)
+def test_a_slip_in_the_arguments_is_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], what: str
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == MENDABLE
+    (line,) = capsys.readouterr().err.splitlines()
+    assert what in line
+    assert "--help" in line
+
+
+def test_ctrl_c_while_the_program_loads_is_answered(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(main_module, "build_parser", interrupt)
+    assert main(["inspect", "c"]) == main_module.INTERRUPTED
+    assert capsys.readouterr().err == "gelpolight: stopped\n"
+
+
+def test_a_log_that_cannot_be_written_shows_no_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "file"))
+
+    def fail(_path: Path) -> None:
+        raise ZeroDivisionError("the tests did it")
+
+    monkeypatch.setattr(calibrate, "read_session", fail)
+    assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == OUR_FAULT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "the tests did it" in line
+
+
+def test_names_that_differ_only_in_case_are_one_name(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On many disks the second depth map would take the place of the first."""
+    shutil.copy(press, tmp_path / "A.png")
+    shutil.copy(press, tmp_path / "a.tif")
+    twins = (str(tmp_path / "A.png"), str(tmp_path / "a.tif"))
+    assert "two pictures" in refusal(
+        capsys, "reconstruct", str(calibration), *twins, "-o", str(tmp_path / "o")
+    )
+
+
+def test_a_closed_output_is_no_fault(calibration: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert main(["inspect", str(calibration)]) == 0
+    for stream in (sys.stdout, sys.stderr):
+        stream.close()
+
+
+def test_warnings_of_libraries_go_to_the_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    def warn(_path: Path) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            # pytest puts its own recorder in the place of what main set
+            warnings.showwarning = main_module._log_warning
+            warnings.warn("divide by zero", RuntimeWarning, stacklevel=1)
+        raise InputError("stop", where="here", advice="Do")
+
+    monkeypatch.setattr(calibrate, "read_session", warn)
+    assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == MENDABLE
+    assert "divide" not in capsys.readouterr().err
+    assert "divide by zero" in next(tmp_path.rglob("gelpolight-faults.log")).read_text()
+
+
 def test_a_full_disk_is_a_sentence(
     session: Path, capsys: pytest.CaptureFixture[str], calibration: Path
 ) -> None:
@@ -306,7 +459,7 @@ def test_a_fault_of_ours_is_one_line_and_a_log(
     said = capsys.readouterr().err
     assert "the tests did it" in said
     assert "Traceback" not in said
-    log = next(tmp_path.rglob("faults.log"))
+    log = next(tmp_path.rglob("gelpolight-faults.log"))
     assert "Traceback" in log.read_text()
 
 

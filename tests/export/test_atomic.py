@@ -12,7 +12,7 @@ from typing import BinaryIO
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.export.atomic import make_folder, refuse_unwritable, write_atomically
 
 
 def half_then(fault: BaseException) -> Callable[[BinaryIO], None]:
@@ -85,6 +85,21 @@ def test_a_disk_that_refuses_is_told_in_plain_words(
     assert found in caught.value.found
     assert caught.value.where == str(path)
     assert caught.value.advice
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+    """Minutes of calibration are not spent on a file that cannot be."""
+    (tmp_path / "kept").write_text("old")
+    refuse_unwritable(tmp_path / "new")
+    refuse_unwritable(tmp_path / "kept")
+    assert [p.name for p in tmp_path.iterdir()] == ["kept"]
+    assert (tmp_path / "kept").read_text() == "old"
+    with pytest.raises(InputError, match="does not exist"):
+        refuse_unwritable(tmp_path / "no" / "new")
+    with pytest.raises(InputError, match="a folder stands"):
+        refuse_unwritable(tmp_path)
+    with pytest.raises(InputError, match="a file stands"):
+        refuse_unwritable(tmp_path / "kept" / "new")
 
 
 def test_a_real_full_disk_is_told_in_plain_words(tmp_path: Path) -> None:

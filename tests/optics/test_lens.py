@@ -164,7 +164,7 @@ def test_pictures_of_two_sizes_are_refused(views: list[Picture]) -> None:
     cropped = Picture("cropped.png", views[3].rgb[:300])
     with pytest.raises(InputError, match="480 x 300") as refusal:
         calibrate_lens([*views[:3], cropped], BOARD)
-    assert refusal.value.where == "cropped.png"
+    assert refusal.value.where == "checkerboard/cropped.png"
 
 
 @pytest.mark.parametrize(

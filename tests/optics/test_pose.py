@@ -138,6 +138,22 @@ def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
     assert angle_deg(result.plane, flat[0][1]) < 0.1
 
 
+@pytest.mark.parametrize("tilts_deg", [(0.0, 12.0, 24.0), (-24.0, -8.0, 9.0, 25.0)])
+def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg: tuple[float, ...]) -> None:
+    """The lens's pictures of a board held freely, copied here, say nothing of the surface.
+
+    Of three such boards one may happen to be the middle one; nothing speaks for it either.
+    """
+    pictures = [
+        lying_board(tilt_deg=tilt, distance_mm=38.0 + 2.0 * k, name=f"held_{k}.png")[0]
+        for k, tilt in enumerate(tilts_deg)
+    ]
+    with pytest.raises(InputError, match=f"the {len(tilts_deg)} boards .* plane") as refusal:
+        estimate_top_pose(pictures, BOARD, CAMERA)
+    assert refusal.value.where == "top_pose"
+    assert "held_0.png" in refusal.value.found
+
+
 def test_a_failed_picture_among_good_ones_is_left_out_and_named() -> None:
     """A black frame among the views is named, not fatal."""
     picture, truth = lying_board()
@@ -164,7 +180,7 @@ def test_without_a_usable_picture_the_reason_is_given() -> None:
     black = Picture("top_pose.png", np.zeros_like(picture.rgb))
     with pytest.raises(InputError, match="black") as refusal:
         estimate_top_pose([black], BOARD, CAMERA)
-    assert refusal.value.where == "top_pose.png"
+    assert refusal.value.where == "top_pose/top_pose.png"
     with pytest.raises(InputError, match="480 x 200"):
         estimate_top_pose([Picture("cut.png", picture.rgb[:200])], BOARD, CAMERA)
 

@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import average, read_picture, read_session, require_colour
+from gelpolight_core.session.session import (
+    average,
+    read_picture,
+    read_session,
+    refuse_copies,
+    require_colour,
+)
 
 GOOD = """format = "gelpolight-session"
 version = 1
@@ -67,6 +73,9 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> 
         ("led_height_mm = 13.8", "led_height_mm = -3", "led_height_mm is -3"),
         ("led_height_mm = 13.8", "led_height_mm = nan", "led_height_mm is nan"),
         ("led_height_mm = 13.8", 'led_height_mm = "x"', "led_height_mm"),
+        ("led_height_mm = 13.8", "led_height_mm = 1" + "0" * 400, "not a number from"),
+        ("index = 1.41", "index = 2.6", "refractive_index is 2.6"),
+        ("[sensor]", "a = " + "[" * 3000 + "]" * 3000 + "\n[sensor]", "nested too deeply"),
         ("led_height_mm = 13.8", "led_height_mm = true", "led_height_mm"),
         ("working_diameter_mm = 26.0", "working_diameter_mm = 26.0\nfoo = 1", r"\[sensor\] foo"),
         ("[balls]", "[colours]\nx = 1\n[balls]", "colours"),
@@ -108,6 +117,44 @@ def test_a_ball_without_a_radius_is_named(tmp_path: Path) -> None:
     session = read_session(session_folder(tmp_path, GOOD.replace("default = 3.0\n", "")))
     with pytest.raises(InputError, match=r"ball_00\.png"):
         session.ball_radius_mm("ball_00.png")
+
+
+def test_a_misspelt_ball_is_not_given_the_default_radius(tmp_path: Path) -> None:
+    """ball_3.png = 4.0 was meant for ball_03.png; at the default 3.0 the sensor would be wrong."""
+    text = GOOD.replace("ball_03.png", "ball_3.png")
+    session = read_session(session_folder(tmp_path, text))
+    (tmp_path / "balls").mkdir()
+    (tmp_path / "balls" / "ball_03.png").touch()
+    with pytest.raises(InputError, match=r"ball_3\.png, which is not there, and not ball_03\.png"):
+        session.ball_radius_mm("ball_03.png")
+
+
+def test_a_description_from_an_editor_that_marks_utf8_is_read(tmp_path: Path) -> None:
+    folder = session_folder(tmp_path)
+    (folder / "session.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
+    assert read_session(folder).sensor.serial == "A-001"
+
+
+def test_a_copied_picture_is_refused_and_both_places_named(tmp_path: Path) -> None:
+    """A background in the place of the whiteboard gives a calibration that looks good."""
+    files = [tmp_path / stage / "p.png" for stage in ("mirror", "whiteboard", "background")]
+    for number, path in enumerate(files):
+        path.parent.mkdir()
+        path.write_bytes(bytes([number]))
+    refuse_copies(files)
+    files[2].write_bytes(files[1].read_bytes())
+    with pytest.raises(InputError, match=r"copy of whiteboard/p\.png") as refusal:
+        refuse_copies(files)
+    assert refusal.value.where == str(files[2])
+
+
+def test_hidden_files_beside_the_pictures_are_no_pictures(tmp_path: Path) -> None:
+    """Some systems leave such files on every disk that they copy to."""
+    session = read_session(session_folder(tmp_path))
+    (tmp_path / "mirror").mkdir()
+    for name in ("m.PNG", "._m.PNG"):
+        (tmp_path / "mirror" / name).touch()
+    assert [p.name for p in session.files("mirror")] == ["m.PNG"]
 
 
 def write_rgb(path: Path, rgb: np.ndarray) -> None:
@@ -153,6 +200,33 @@ def test_a_file_that_is_no_picture_is_refused(tmp_path: Path, data: bytes) -> No
         read_picture(tmp_path / "p.png")
 
 
+def test_a_jpeg_under_another_name_is_refused(tmp_path: Path) -> None:
+    """Its losses and its gamma would go into the calibration unseen."""
+    done, data = cv2.imencode(".jpg", np.full((8, 8, 3), 90, np.uint8))
+    assert done
+    (tmp_path / "p.png").write_bytes(data.tobytes())
+    with pytest.raises(InputError, match="not a whole PNG or TIFF"):
+        read_picture(tmp_path / "p.png")
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.integers(0, 7), st.booleans())
+def test_a_damaged_png_is_refused_wherever_the_damage_is(
+    tmp_path_factory: pytest.TempPathFactory, place: int, bit: int, cut: bool
+) -> None:
+    done, data = cv2.imencode(
+        ".png", np.random.default_rng(0).integers(0, 256, (9, 7, 3), dtype=np.uint8)
+    )
+    assert done
+    damaged = bytearray(data.tobytes())
+    place %= len(damaged)
+    damaged[place] ^= 1 << bit
+    path = tmp_path_factory.mktemp("p") / "p.png"
+    path.write_bytes(damaged[:place] if cut else damaged)
+    with pytest.raises(InputError):
+        read_picture(path)
+
+
 def test_a_picture_that_declares_a_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
     head = b"\x89PNG\r\n\x1a\n" + b"\0\0\0\rIHDR" + (2**20).to_bytes(4, "big") * 2
     (tmp_path / "p.png").write_bytes(head + b"\0" * 20)
@@ -163,4 +237,6 @@ def test_a_picture_that_declares_a_gigantic_size_is_refused_unread(tmp_path: Pat
 def test_a_grey_picture_is_refused_where_colour_is_needed() -> None:
     with pytest.raises(InputError, match="grey"):
         require_colour(Picture("g", np.full((2, 2, 3), 0.5, np.float32)), where="g")
+    with pytest.raises(InputError, match="saturated"):
+        require_colour(Picture("w", np.ones((2, 2, 3), np.float32)), where="w")
     require_colour(Picture("c", np.float32([[[0.5, 0.1, 0.2]]])), where="c")

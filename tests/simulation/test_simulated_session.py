@@ -135,7 +135,23 @@ def test_progress_can_stop_the_work(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         simulate_session(DESIGN, tmp_path / "out", scale=SCALE, progress=stop)
-    assert len(list((tmp_path / "out").rglob("*.png"))) < 24
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half a session would be taken for a whole one, or stand in the way of the next try."""
+
+    def full(path: Path, _writer: object) -> None:
+        if path.suffix == ".png":
+            raise InputError("the disk is full", where=str(path), advice="Free some space")
+        path.touch()
+
+    monkeypatch.setattr("gelpolight_core.simulation.session.write_atomically", full)
+    with pytest.raises(InputError, match="full"):
+        simulate_session(DESIGN, tmp_path, scale=SCALE)
+    assert not list(tmp_path.iterdir())
 
 
 def test_repeated_presses_get_names_of_their_own() -> None:

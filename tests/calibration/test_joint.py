@@ -1,0 +1,314 @@
+"""Joint refinement on ball pixels whose light, membrane and balls are known.
+
+The pixels are shaded here, by other formulae than the program's: rays are marched onto the
+simulator's drape, and the membrane's lobe is the published one written by cosines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.joint import (
+    BallPixels,
+    JointResult,
+    neighbourhood,
+    refine_jointly,
+    view_directions,
+)
+from gelpolight_core.quality import QualityTable
+from gelpolight_core.reflectance.ball import BallPose
+from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.simulation.drape import contact_radius, free_profile
+from gelpolight_core.simulation.indenters import Ball
+
+Array = NDArray[np.float64]
+MIRROR = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]])
+# The housing's nominal height is not each LED's own; across, 0.3 px of a spot are 0.02 mm.
+MOVED_MM = np.array([[0.015, -0.01, 0.12], [-0.02, 0.01, -0.17], [0.01, 0.02, 0.2]])
+BALLS = (
+    BallPose((-4.1, -1.6), 3.0, 1.05),
+    BallPose((0.2, 1.2), 4.0, 1.15),
+    BallPose((-2.1, -6.2), 3.0, 0.85),
+    BallPose((2.3, -3.4), 4.0, 1.35),
+    BallPose((-1.0, 5.6), 3.0, 1.1),
+    BallPose((5.8, 1.9), 4.0, 0.9),
+    BallPose((-6.4, 3.1), 3.0, 0.95),
+    BallPose((4.2, 5.3), 4.0, 1.2),
+)
+PIXELS = 120  # on the cap, and as many on the drape
+# So many neighbouring pixels err together; the square of the program's own allowance.
+TOGETHER = 16
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the pixels are shaded from."""
+
+    leds: Array
+    exponent: float = 1.0
+    gloss: float = 0.0
+    roughness: float = 0.5
+    bounce: float = 0.0
+    decay_mm: float = 0.7
+
+
+def truth(**changes: float) -> Truth:
+    return replace(Truth(MIRROR + MOVED_MM), **changes)  # type: ignore[arg-type]
+
+
+def drape(place: Array, pose: BallPose, decay_mm: float) -> Array:
+    """Return the simulator's depth at true positions (..., 2)."""
+    ball = Ball(pose.radius_mm, pose.depth_mm)
+    b = contact_radius(ball.profile, ball.reach_mm, decay_mm)
+    r = np.hypot(place[..., 0] - pose.centre_mm[0], place[..., 1] - pose.centre_mm[1])
+    outside = free_profile(np.maximum(r, b), b, ball.profile(b)[0], decay_mm)
+    return np.where(r <= b, ball.obstacle(np.minimum(r, b), 0.0 * r), outside)
+
+
+def shaded(truth: Truth, place: Array, normals: Array, view: Array) -> Array:
+    """Return the brightness of points (N, 3) under three LEDs that look along +z."""
+    columns = []
+    for led in truth.leds:
+        light = led - place
+        r2 = (light**2).sum(-1, keepdims=True)
+        light = light / np.sqrt(r2)
+        lit = np.clip((light * normals).sum(-1), 1e-3, None)
+        seen = np.clip((view * normals).sum(-1), 1e-2, None)
+        half = light + view
+        tilt = (half * normals).sum(-1) / np.linalg.norm(half, axis=-1)
+        a2 = truth.roughness**2
+        spread = a2 / np.pi / (1.0 - tilt**2 * (1.0 - a2)) ** 2
+        masks = 1.0
+        for cosine in (lit, seen):
+            masks = masks * 2.0 / (1.0 + np.sqrt(1.0 + a2 * (1.0 / cosine**2 - 1.0)))
+        lobe = truth.gloss * spread * masks / (4.0 * seen)
+        both = (1.0 - truth.gloss) * lit**truth.exponent / np.pi + lobe
+        columns.append(both * -light[:, 2] / r2[:, 0])
+    return np.stack(columns, axis=-1)
+
+
+def pixels_of(
+    pose: BallPose, truth: Truth, noise: float, random: np.random.Generator
+) -> BallPixels:
+    """Return the pixels of one press, neighbours in runs of `TOGETHER`."""
+    ball = Ball(pose.radius_mm, pose.depth_mm)
+    b = contact_radius(ball.profile, ball.reach_mm, truth.decay_mm)
+    r = np.concatenate(
+        [b * 0.9 * np.sqrt(random.uniform(0, 1, PIXELS)), b + random.uniform(0.12, 1.6, PIXELS)]
+    )
+    angle = np.concatenate([np.sort(random.uniform(0, 2 * np.pi, PIXELS)) for _ in range(2)])
+    place = np.asarray(pose.centre_mm) + np.stack([r * np.cos(angle), r * np.sin(angle)], -1)
+    depth = drape(place, pose, truth.decay_mm)
+    # The ray through a true place leans as its foot says: P0 = P - depth w(P0), w = -P0 / 38.
+    points = place / (1.0 - depth[:, None] / 38.0)
+    drift = -points / 38.0
+    step = 1e-5
+    slope = np.stack(
+        [
+            (drape(place + m, pose, truth.decay_mm) - drape(place - m, pose, truth.decay_mm))
+            for m in (np.array([step, 0.0]), np.array([0.0, step]))
+        ],
+        axis=-1,
+    ) / (2.0 * step)
+    normals = np.concatenate([-slope, -np.ones((len(r), 1))], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    view = np.concatenate([drift, -np.ones((len(r), 1))], axis=1)
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
+    flat = np.concatenate([points, np.zeros((len(r), 1))], axis=1)
+    up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
+    seen = np.concatenate([place, -depth[:, None]], axis=1)
+    ratio = shaded(truth, seen, normals, view) / shaded(truth, flat, up, view)
+    around = np.full_like(ratio, 0.95) + 0.1 * np.cos(angle)[:, None] * [1.0, -0.5, 0.2]
+    ratio += truth.bounce * around * (0.5 * (1.0 + normals[:, 2:]))
+    runs = random.normal(size=(-(-len(r) // TOGETHER), 3)).repeat(TOGETHER, axis=0)
+    ratio += noise * runs[: len(r)]
+    weight = np.full_like(ratio, 1.0 / max(noise, 0.01))
+    return BallPixels(points, drift, view, ratio, weight, around, pose.radius_mm)
+
+
+def found_press(pose: BallPose, random: np.random.Generator) -> BallPress:
+    """Return the ball as an earlier stage found it: a little beside, its depth 5 % wrong."""
+    x, y = np.asarray(pose.centre_mm) + random.normal(scale=0.02, size=2)
+    depth = pose.depth_mm * (1.0 + 0.05 * random.normal())
+    start = BallPose((float(x), float(y)), pose.radius_mm, float(depth))
+    return BallPress("ball", start, 1.8, 0.02, 0.02, None, QualityTable(()))  # type: ignore[arg-type]
+
+
+def refined(truth: Truth, *, noise: float = 0.01, seed: int = 0, count: int = 8) -> JointResult:
+    random = np.random.default_rng(seed)
+    presses = [found_press(pose, random) for pose in BALLS[:count]]
+    pixels = [pixels_of(pose, truth, noise, random) for pose in BALLS[:count]]
+    return refine_jointly(presses, pixels, MIRROR)
+
+
+@pytest.fixture(scope="module")
+def glossy() -> tuple[Truth, JointResult]:
+    """Return a glossy membrane under LEDs at other heights than stated, and its refinement."""
+    known = truth(gloss=0.3, roughness=0.45, decay_mm=0.6)
+    # Little noise: with the usual 1 % the presses that are held out hardly tell LEDs that are
+    # 0.2 mm off from true ones, and which are kept is left to chance.
+    return known, refined(known, noise=0.003)
+
+
+def test_leds_that_are_not_at_the_housings_height_are_found(
+    glossy: tuple[Truth, JointResult],
+) -> None:
+    known, result = glossy
+    assert result.kept == "refined"
+    left = np.linalg.norm(result.led_positions_mm - known.leds, axis=1)
+    before = np.linalg.norm(MIRROR - known.leds, axis=1)
+    # 0.1 mm of LED position costs 0.4 % of depth (PHYSICS).
+    assert (left < 0.1).all()
+    assert left.mean() < 0.5 * before.mean()
+
+
+def test_gloss_and_decay_length_are_found(glossy: tuple[Truth, JointResult]) -> None:
+    known, result = glossy
+    assert result.membrane.gloss == pytest.approx(known.gloss, abs=0.06)
+    assert result.membrane.exponent == pytest.approx(known.exponent, abs=0.03)
+    assert result.membrane.roughness == pytest.approx(known.roughness, abs=0.08)
+    assert result.decay_mm == pytest.approx(known.decay_mm, abs=0.01)
+    assert result.membrane.bounce < 0.1
+
+
+def test_the_balls_come_to_their_places(glossy: tuple[Truth, JointResult]) -> None:
+    _, result = glossy
+    for found, pose in zip(result.balls, BALLS, strict=True):
+        assert np.hypot(*np.subtract(found.centre_mm, pose.centre_mm)) < 0.03
+        assert found.depth_mm == pytest.approx(pose.depth_mm, abs=0.03)
+        assert found.radius_mm == pose.radius_mm
+
+
+def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share() -> None:
+    known = truth(bounce=0.3, decay_mm=0.8)
+    result = refined(known, seed=1)
+    assert result.membrane.gloss < 0.08
+    assert result.membrane.bounce == pytest.approx(0.3, abs=0.1)
+    assert result.cap_bounce == pytest.approx(0.3, abs=0.15)
+    assert result.decay_mm == pytest.approx(0.8, abs=0.02)
+    assert result.membrane.exponent == pytest.approx(1.0, abs=0.03)
+
+
+def test_the_misfit_is_the_noise_of_the_pixels(glossy: tuple[Truth, JointResult]) -> None:
+    _, result = glossy
+    assert result.misfit == pytest.approx(0.003, rel=0.2)
+    assert result.held_out[1] <= result.held_out[0]
+
+
+def test_the_stated_deviations_are_those_that_repeats_show() -> None:
+    """The first two sessions that refine; pixels err in runs, as lens and ball make them."""
+    errors, stated = [], []
+    known = truth(gloss=0.2)
+    for seed in range(12, 20):
+        result = refined(known, seed=seed, count=5)
+        if result.kept == "mirror":
+            continue  # nothing is stated of LEDs that were not refined
+        errors.append(
+            [
+                *(result.led_positions_mm - known.leds).ravel(),
+                result.decay_mm - known.decay_mm,
+                result.membrane.gloss - known.gloss,
+            ]
+        )
+        sd = result.membrane_sd
+        stated.append([*result.led_sd_mm.ravel(), sd["decay_mm"], sd["gloss"]])
+        if len(errors) == 2:
+            break
+    assert len(errors) == 2
+    share = np.array(errors) / np.array(stated)
+    lateral, height, membrane = [0, 1, 3, 4, 6, 7], [2, 5, 8], [9, 10]
+    for columns in (lateral, height, membrane):
+        assert 1 / 2.5 < np.sqrt(np.mean(share[:, columns] ** 2)) < 2.5
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors(seed: int) -> None:
+    """Also where the pictures are nonsense: what is kept is what did better."""
+    random = np.random.default_rng(seed)
+    known = truth()
+    presses = [found_press(pose, random) for pose in BALLS[:4]]
+    pixels = []
+    for pose in BALLS[:4]:
+        # Every press was taken with its own LEDs: no common answer exists.
+        own = replace(known, leds=MIRROR + random.normal(scale=0.6, size=(3, 3)))
+        pixels.append(pixels_of(pose, own, 0.03, random))
+    result = refine_jointly(presses, pixels, MIRROR)
+    before, after = result.held_out
+    if result.kept == "mirror":
+        assert after > before
+        np.testing.assert_array_equal(result.led_positions_mm, MIRROR)
+        assert not result.led_sd_mm.any()
+    else:
+        assert result.kept == "refined"
+        assert after <= before
+
+
+def test_too_few_balls_to_hold_any_back_keep_the_mirrors_leds() -> None:
+    known = truth(gloss=0.2)
+    result = refined(known, count=3)
+    assert result.kept == "mirror"
+    np.testing.assert_array_equal(result.led_positions_mm, MIRROR)
+    assert len(result.balls) == 3
+
+
+def test_pixels_that_do_not_count_change_nothing() -> None:
+    random = np.random.default_rng(8)
+    known = truth()
+    presses = [found_press(pose, random) for pose in BALLS[:3]]
+    pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:3]]
+    spoilt = []
+    for p in pixels:
+        lost = random.uniform(size=p.ratio.shape) < 0.2
+        weight = np.where(lost, 0.0, p.weight)
+        without = replace(p, weight=weight)
+        spoilt.append((without, replace(without, ratio=np.where(lost, 5.0, p.ratio))))
+    clean = refine_jointly(presses, [a for a, _ in spoilt], MIRROR)
+    dirty = refine_jointly(presses, [b for _, b in spoilt], MIRROR)
+    assert clean.membrane == dirty.membrane
+    assert clean.balls == dirty.balls
+
+
+def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
+    random = np.random.default_rng(9)
+    known = truth(decay_mm=0.6)
+    presses = [found_press(pose, random) for pose in BALLS[:6]]
+    pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:6]]
+    dirt = random.uniform(0.3, 1.5, pixels[2].ratio[:60].shape)
+    pixels[2].ratio[:60] = dirt
+    result = refine_jointly(presses, pixels, MIRROR)
+    assert result.decay_mm == pytest.approx(0.6, abs=0.02)
+    assert result.membrane.gloss < 0.1
+    for index in (0, 1, 3, 4, 5):
+        assert np.hypot(*np.subtract(result.balls[index].centre_mm, BALLS[index].centre_mm)) < 0.03
+
+
+def test_views_run_back_along_the_rays() -> None:
+    drift = np.array([[[0.3, -0.1], [0.0, 0.0]]])
+    view = view_directions(drift)
+    np.testing.assert_allclose(view[0, 1], [0.0, 0.0, -1.0])
+    # A step of 1 mm of depth along the view moves sideways by the drift.
+    np.testing.assert_allclose(view[0, 0, :2] / -view[0, 0, 2], drift[0, 0])
+    assert np.linalg.norm(view[0, 0]) == pytest.approx(1.0)
+
+
+def test_the_neighbourhood_is_a_gaussian_average_and_1_where_nothing_is_known() -> None:
+    rows, columns, pitch, reach = 240, 320, 0.05, 1.0
+    x, y = np.meshgrid(pitch * np.arange(columns), pitch * np.arange(rows))
+    ratio = np.ones((rows, columns, 3), np.float32)
+    # A Gaussian spot blurred by a Gaussian is a wider, lower one.
+    wide = 1.2
+    spot = np.exp(-((x - 9.0) ** 2 + (y - 5.0) ** 2) / (2 * wide**2))
+    ratio[..., 1] += 0.5 * spot
+    valid = np.ones((rows, columns), bool)
+    found = neighbourhood(ratio, valid, pitch, reach)
+    both = wide**2 + reach**2
+    blurred = np.exp(-((x - 9.0) ** 2 + (y - 5.0) ** 2) / (2 * both)) * wide**2 / both
+    np.testing.assert_allclose(found[..., 1], 1.0 + 0.5 * blurred, atol=0.01)
+    np.testing.assert_allclose(found[..., 0], 1.0, atol=1e-5)
+    ratio[60:90, 100:140] = np.nan
+    valid[60:90, 100:140] = False
+    assert np.isfinite(neighbourhood(ratio, valid, pitch, reach)).all()

@@ -1,0 +1,164 @@
+"""A pressed ball with its drape as the camera sees it, against the simulator and a ray march."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gelpolight_core.reflectance.ball import BallPose, ball_surface
+from gelpolight_core.reflectance.draped_ball import draped_ball
+from gelpolight_core.simulation.drape import contact_radius, free_profile
+from gelpolight_core.simulation.indenters import Ball
+
+Array = NDArray[np.float64]
+
+
+def simulated_depth(points_mm: Array, pose: BallPose, decay_mm: float) -> Array:
+    """Return the simulator's depth of the membrane at true positions (..., 2)."""
+    ball = Ball(pose.radius_mm, pose.depth_mm)
+    b = contact_radius(ball.profile, ball.reach_mm, decay_mm)
+    r = np.hypot(points_mm[..., 0] - pose.centre_mm[0], points_mm[..., 1] - pose.centre_mm[1])
+    edge, _ = ball.profile(b)
+    outside = free_profile(np.maximum(r, b), b, edge, decay_mm)
+    return np.where(r <= b, ball.obstacle(np.minimum(r, b), 0.0 * r), outside)
+
+
+def marched_depth(point: Array, drift: Array, pose: BallPose, decay_mm: float) -> float:
+    """Return where a ray from the camera first meets the simulator's surface.
+
+    It comes from above the deepest point; between samples of 1/500 of the depth it is halved.
+    """
+
+    def above(depth: Array) -> Array:
+        return depth - simulated_depth(point + depth[:, None] * drift, pose, decay_mm)
+
+    samples = np.linspace(1.01 * pose.depth_mm, 0.0, 500)
+    below = np.flatnonzero(above(samples) <= 0.0)
+    low, high = samples[below[0]], samples[below[0] - 1]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if above(np.array([middle]))[0] <= 0.0:
+            low = middle
+        else:
+            high = middle
+    return float(low)
+
+
+def field(pose: BallPose, spread_mm: float, count: int, seed: int) -> Array:
+    random = np.random.default_rng(seed)
+    return np.asarray(pose.centre_mm) + random.uniform(-spread_mm, spread_mm, (count, 2))
+
+
+# What is pressed in practice: the ball's slope at the contact's edge stays below about 45 degrees,
+# and rays lean at most 20 degrees inside the elastomer.
+poses = st.builds(
+    lambda x, y, radius, share: BallPose((x, y), radius, share * radius),
+    st.floats(-6.0, 6.0),
+    st.floats(-6.0, 6.0),
+    st.floats(2.0, 5.0),
+    st.floats(0.08, 0.35),
+)
+decays = st.floats(0.4, 1.2)
+
+
+@settings(max_examples=40, deadline=None)
+@given(poses, decays, st.integers(0, 99))
+def test_upright_rays_see_the_simulators_drape(pose: BallPose, decay: float, seed: int) -> None:
+    points = field(pose, 2.5 * decay + pose.radius_mm, 200, seed)
+    surface, _, on_ball = draped_ball(points, np.zeros_like(points), pose, decay_mm=decay)
+    np.testing.assert_allclose(surface[:, :2], points, atol=1e-12)
+    np.testing.assert_allclose(-surface[:, 2], simulated_depth(points, pose, decay), atol=1e-7)
+    ball = Ball(pose.radius_mm, pose.depth_mm)
+    b = contact_radius(ball.profile, ball.reach_mm, decay)
+    r = np.linalg.norm(points - pose.centre_mm, axis=1)
+    clear = np.abs(r - b) > 1e-5
+    np.testing.assert_array_equal(on_ball[clear], (r < b)[clear])
+
+
+@settings(max_examples=30, deadline=None)
+@given(poses, decays, st.floats(-0.25, 0.25), st.floats(-0.25, 0.25))
+def test_leaning_rays_end_where_a_ray_march_ends(
+    pose: BallPose, decay: float, drift_x: float, drift_y: float
+) -> None:
+    points = field(pose, 2.0 * decay + pose.radius_mm, 15, 1)
+    drift = np.tile([drift_x, drift_y], (len(points), 1))
+    surface, _, _ = draped_ball(points, drift, pose, decay_mm=decay)
+    expected = [marched_depth(p, w, pose, decay) for p, w in zip(points, drift, strict=True)]
+    # Six rounds, each shrinking the error by drift times slope (at most 0.35 x 1): below 1 um.
+    np.testing.assert_allclose(-surface[:, 2], expected, atol=1e-3)
+    np.testing.assert_allclose(
+        surface[:, :2], points - surface[:, 2:] * drift, atol=1e-12
+    )  # on its own ray
+
+
+@settings(max_examples=30, deadline=None)
+@given(poses, decays, st.floats(-0.25, 0.25))
+def test_normals_are_square_to_the_surface(pose: BallPose, decay: float, lean: float) -> None:
+    points = field(pose, 2.0 * decay + pose.radius_mm, 100, 2)
+    drift = np.tile([lean, -0.5 * lean], (len(points), 1))
+    surface, normals, _ = draped_ball(points, drift, pose, decay_mm=decay)
+    place, step = surface[:, :2], 1e-4
+    ball = Ball(pose.radius_mm, pose.depth_mm)
+    b = contact_radius(ball.profile, ball.reach_mm, decay)
+    r = np.linalg.norm(place - pose.centre_mm, axis=1)
+    clear = (np.abs(r - b) > 3 * step) & (r > 0.05)
+    assert clear.sum() > 50
+    slope = np.stack(
+        [
+            simulated_depth(place + move, pose, decay) - simulated_depth(place - move, pose, decay)
+            for move in (np.array([step, 0.0]), np.array([0.0, step]))
+        ],
+        axis=-1,
+    ) / (2.0 * step)
+    expected = np.concatenate([-slope, -np.ones((len(slope), 1))], axis=1)
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    np.testing.assert_allclose(normals[clear], expected[clear], atol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
+    assert (normals[:, 2] < 0.0).all()
+
+
+def test_the_cap_is_the_ball_that_the_rays_meet() -> None:
+    pose = BallPose((4.0, -3.0), 3.0, 1.0)
+    points = field(pose, 0.8, 200, 3)
+    drift = -points / 40.0
+    surface, normals, on_ball = draped_ball(points, drift, pose, decay_mm=0.7)
+    on_sphere, on_sphere_normals = ball_surface(points, drift, pose)
+    assert on_ball.all()
+    np.testing.assert_allclose(surface, on_sphere, atol=1e-6)
+    np.testing.assert_allclose(normals, on_sphere_normals, atol=1e-6)
+
+
+def test_the_membrane_leaves_the_ball_without_a_kink() -> None:
+    pose, decay = BallPose((0.0, 0.0), 4.0, 1.2), 0.7
+    ball = Ball(4.0, 1.2)
+    b = contact_radius(ball.profile, ball.reach_mm, decay)
+    points = np.array([[b - 1e-6, 0.0], [b + 1e-6, 0.0]])
+    surface, normals, on_ball = draped_ball(points, np.zeros((2, 2)), pose, decay_mm=decay)
+    assert on_ball.tolist() == [True, False]
+    assert surface[0, 2] == pytest.approx(surface[1, 2], abs=1e-5)
+    np.testing.assert_allclose(normals[0], normals[1], atol=1e-5)
+
+
+def test_far_from_the_ball_the_membrane_is_flat() -> None:
+    """Also where the decayed depth is too small for a double."""
+    points = np.array([[9.0, 0.0], [0.0, 200.0], [1e4, 1e4]])
+    surface, normals, on_ball = draped_ball(
+        points, np.full((3, 2), 0.2), BallPose((0.0, 0.0), 3.0, 1.0), decay_mm=0.3
+    )
+    assert np.abs(surface[:, 2]).max() < 1e-6
+    np.testing.assert_allclose(normals, np.tile([0.0, 0.0, -1.0], (3, 1)), atol=1e-6)
+    assert not on_ball.any()
+
+
+def test_the_ball_may_be_seen_exactly_at_its_lowest_point() -> None:
+    surface, normals, on_ball = draped_ball(
+        np.zeros((1, 2)), np.zeros((1, 2)), BallPose((0.0, 0.0), 3.0, 1.0), decay_mm=0.7
+    )
+    assert surface[0].tolist() == pytest.approx([0.0, 0.0, -1.0])
+    assert math.isclose(normals[0, 2], -1.0)
+    assert on_ball[0]

@@ -1,0 +1,125 @@
+"""The figures we promise, on sessions rendered by a path tracer that is not ours.
+
+Bars are those of the project's plan; `pytest -s` prints what was measured. Sizes and heights are
+judged as areas above half height and medians over the plateau, inside 12 mm of the centre.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session
+from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_picture, read_session
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A rendered session, its truth and our calibration of it."""
+
+    folder: Path
+    truth: dict  # type: ignore[type-arg]
+    run: CalibrationRun
+
+
+@pytest.fixture(scope="module", params=["sensor-A", "sensor-B"])
+def sensor(request: pytest.FixtureRequest, shared_data: Path) -> Sensor:
+    """Calibrate a rendered session from its pictures alone."""
+    folder = shared_data / request.param
+    truth = json.loads((folder / "truth.json").read_text())
+    return Sensor(folder, truth, calibrate_session(read_session(folder), model="full"))
+
+
+def test_lens_plane_lights_and_balls_are_where_they_are(sensor: Sensor) -> None:
+    c, truth = sensor.run.calibration, sensor.truth
+    assert c.camera.fx == pytest.approx(truth["camera"]["fx"], rel=1e-3)
+    assert c.plane.distance_mm == pytest.approx(truth["top_plane"]["offset_mm"], rel=1e-3)
+    normal = np.array(truth["top_plane"]["normal_camera"])
+    cosine = normal @ c.plane.normal_camera / np.linalg.norm(normal)
+    assert np.degrees(np.arccos(min(cosine, 1.0))) < 0.05
+    leds = np.array([truth["leds"][k]["camera_mm"] for k in "RGB"])
+    error = c.plane.to_sensor(c.plane.to_camera(c.led_positions_mm)) - c.plane.to_sensor(leds)
+    assert np.hypot(error[:, 0], error[:, 1]).max() < 0.15
+    assert np.linalg.norm(error, axis=1).max() < 0.35
+    assert c.full is not None
+    refined = np.linalg.norm(c.plane.to_camera(c.full.led_positions_mm) - leds, axis=1)
+    assert refined.max() < 0.15
+    centres = {b["file"]: b["centre_sensor_xy_mm"] for b in truth["balls"]}
+    away = [
+        np.hypot(*np.subtract(p.pose.centre_mm, centres[Path(p.name).name]))
+        for p in sensor.run.reflectance.presses
+    ]
+    print(f"\n{sensor.folder.name}: balls {np.median(away):.4f} / {max(away):.4f} mm, ", end="")
+    print(f"LEDs refined {refined.max():.3f} mm")
+    assert np.median(away) < 0.05
+    assert max(away) < 0.15
+
+
+def compared(heightmap: HeightMap, truth: Path, height_mm: float) -> tuple[float, float, float]:
+    """Return the errors of plateau height (%), half-height size (%) and depth (RMS, um)."""
+    with np.load(truth) as data:
+        true = data["depth_mm"].astype(float)
+        pitch, x0, y0 = (float(data[k]) for k in ("pitch_mm", "x0_mm", "y0_mm"))
+    x, y = x0 + pitch * np.arange(true.shape[1]), y0 + pitch * np.arange(true.shape[0])
+    column = (np.meshgrid(x, y)[0] - heightmap.x_mm[0]) / heightmap.pitch_mm
+    row = (np.meshgrid(x, y)[1] - heightmap.y_mm[0]) / heightmap.pitch_mm
+    found = cv2.remap(
+        heightmap.depth_mm, column.astype(np.float32), row.astype(np.float32), cv2.INTER_LINEAR
+    )
+    rows, columns = heightmap.depth_mm.shape
+    near = (column >= 0) & (row >= 0) & (column <= columns - 1) & (row <= rows - 1)
+    near &= np.hypot(*np.meshgrid(x, y)) < 12.0
+    top = near & (true > 0.98 * height_mm)
+    height = 100 * (np.median(found[top]) / np.median(true[top]) - 1)
+    wide = (near & (found > height_mm / 2)).sum() / (near & (true > height_mm / 2)).sum()
+    rms = 1e3 * np.sqrt(np.mean((found - true)[near] ** 2))
+    return float(height), float(100 * (np.sqrt(wide) - 1)), float(rms)
+
+
+# Mean absolute errors: plateau height %, half-height size %, RMS um, measured height %, size %.
+BARS = {
+    ("sensor-A", "paper"): (5.0, 5.0, np.inf, 5.0, 5.0),
+    ("sensor-B", "paper"): (6.0, 6.0, np.inf, 6.0, 6.0),
+    ("sensor-A", "full"): (1.0, 0.5, 8.0, 1.5, 1.0),
+    ("sensor-B", "full"): (2.0, 1.0, 15.0, 2.5, 1.5),
+}
+
+
+@pytest.mark.parametrize("model", ["paper", "full"])
+def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor, model: str) -> None:
+    reconstruct = Reconstructor(sensor.run.calibration, model=model)
+    errors = []
+    with (sensor.folder / "presses" / "truth.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    for row in rows:
+        picture = read_picture(sensor.folder / "presses" / row["file"])
+        heightmap = reconstruct.depth(picture.rgb, name=picture.name)
+        height_mm = float(row["height_mm"])
+        truth = sensor.folder / "truth" / f"{Path(row['file']).stem}.npz"
+        measured = measure_object(
+            heightmap.depth_mm,
+            heightmap.x_mm,
+            heightmap.y_mm,
+            shape=row["shape"],
+            flags=heightmap.flags,
+        )
+        size_mm = float(row["diameter_mm"] or row["side_mm"])
+        errors.append(
+            (
+                *compared(heightmap, truth, height_mm),
+                100 * (measured.height_mm / height_mm - 1),
+                100 * (measured.size_mm / size_mm - 1),
+            )
+        )
+    mean = np.abs(errors).mean(axis=0)
+    print(f"\n{sensor.folder.name} {model}: " + "  ".join(f"{e:.2f}" for e in mean))
+    assert (mean < BARS[sensor.folder.name, model]).all(), mean
