@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import add_model, load_calibration, refuse_overwriting, write_json
+from app.command_line.common import add_model, load_reconstructor, refuse_overwriting, write_json
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
 
@@ -32,11 +31,11 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         refuse_overwriting([options.json], [options.calibration, options.image])
         refuse_unwritable(options.json)
-    calibration = load_calibration(options.calibration, model=options.model)
+    reconstructor = load_reconstructor(options.calibration, model=options.model)
     picture = read_picture(options.image)
     require_colour(picture, where=str(options.image))
     frame = np.round(picture.rgb * (2**picture.bit_depth - 1)).astype(f"u{picture.bit_depth // 8}")
-    result = benchmark_frame(Reconstructor(calibration), frame, repeats=max(options.repeats, 1))
+    result = benchmark_frame(reconstructor, frame, repeats=max(options.repeats, 1))
     rows = [*result.steps, result.total, result.plain]
     print(f"{tr('step'):<26}{tr('median ms'):>12}{tr('p95 ms'):>10}{tr('MB'):>8}")
     for row in rows:
@@ -56,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
                 "steps": [row.as_dict() for row in result.steps],
                 "plain": result.plain.as_dict(),
                 "threads": result.threads,
-                "model": calibration.model,
+                "model": reconstructor.model,
                 "plan": [{"step": row.name, "done": True} for row in result.steps],
                 "versions": result.versions,
             },

@@ -11,11 +11,11 @@ import numpy as np
 from app.command_line.common import (
     StageProgress,
     add_model,
-    check_model,
     quality_lines,
     refuse_overwriting,
     write_json,
 )
+from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import STAGES, CalibrationRun, calibrate_session
 from gelpolight_core.export.atomic import refuse_unwritable
@@ -29,13 +29,12 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("session", type=Path, metavar="SESSION")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="CALIBRATION")
     parser.add_argument("--json", type=Path, metavar="FILE", help=tr("results of every stage"))
-    add_model(parser)
+    add_model(parser, default=MODELS[-1])
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
-    model = check_model(options.model)
     session = read_session(options.session)
     outputs = [path for path in (options.output, options.json) if path is not None]
     used = [path for stage in STAGES for path in session.files(stage)]
@@ -44,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         refuse_unwritable(path)
     refuse_copies(used)
     with StageProgress() as tell:
-        result = calibrate_session(session, model=model, progress=tell)
+        result = calibrate_session(session, model=options.model, progress=tell)
     write_calibration(result.calibration, options.output)
     if options.json:
         write_json(run_as_json(result), options.json)

@@ -12,11 +12,12 @@ from typing import Any, BinaryIO
 
 from tqdm import tqdm
 
-from gelpolight_core.calibration.calibration import MODELS, Calibration
+from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
 
@@ -45,32 +46,22 @@ class StageProgress:
         self._bar.refresh()
 
 
-def add_model(parser: argparse.ArgumentParser) -> None:
-    """Add ``--model``."""
+def add_model(parser: argparse.ArgumentParser, *, default: str | None = None) -> None:
+    """Add ``--model``; without a default, a calibration's own model is used."""
     parser.add_argument(
         "--model",
-        choices=("paper", "full"),
-        default=MODELS[-1],
-        help=tr("paper: lights frozen at the flat membrane, straight integration"),
+        choices=MODELS,
+        default=default,
+        help=tr(
+            "paper: lights frozen at the flat membrane, straight integration; full: near light, "
+            "gloss, light from the surroundings, shadows, along the rays (the default)"
+        ),
     )
 
 
-def check_model(model: str) -> str:
-    """Refuse a model that this version does not have."""
-    if model not in MODELS:
-        raise InputError(
-            tr("this version has no {model} model yet").format(model=model),
-            where="--model",
-            advice=tr("Use --model paper"),
-        )
-    return model
-
-
-def load_calibration(path: Path, *, model: str | None = None) -> Calibration:
-    """Read a calibration, and check that it was made for the wanted model."""
-    if model is not None:
-        check_model(model)
-    return read_calibration(path)
+def load_reconstructor(path: Path, *, model: str | None = None) -> Reconstructor:
+    """Read a calibration and make its reconstructor ready, for its own model or another."""
+    return Reconstructor(read_calibration(path), model=model)
 
 
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -6,13 +6,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import StageProgress, add_model, load_calibration
+from app.command_line.common import StageProgress, add_model, load_reconstructor
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.measurement.evaluation import evaluate_presses
 from gelpolight_core.measurement.evaluation_report import evaluation_table, write_evaluation
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.heightmap import HeightMap
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
 
@@ -29,7 +28,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure every press, write the report's files and print the table."""
-    reconstructor = Reconstructor(load_calibration(options.calibration, model=options.model))
+    reconstructor = load_reconstructor(options.calibration, model=options.model)
     read_truth(options.presses)  # before a folder is made for nothing
     make_folder(options.output)
 

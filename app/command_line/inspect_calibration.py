@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import load_calibration, quality_lines
+from app.command_line.common import quality_lines
+from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.translation import tr
 
 
@@ -21,7 +22,7 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print provenance, geometry and quality table."""
-    c = load_calibration(options.calibration)
+    c = read_calibration(options.calibration)
     grid = c.table.grid
     rows = [
         (tr("calibration"), c.identity),

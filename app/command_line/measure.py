@@ -6,13 +6,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import add_model, load_calibration, refuse_overwriting, write_json
+from app.command_line.common import add_model, load_reconstructor, refuse_overwriting, write_json
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.measurement.measure import SHAPES, measure_object
 from gelpolight_core.measurement.result import Comparison, Measurement, compare
 from gelpolight_core.measurement.truth import read_truth
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
 
@@ -44,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         used = [options.calibration, options.image, options.truth]
         refuse_overwriting([options.json], filter(None, used))
         refuse_unwritable(options.json)
-    calibration = load_calibration(options.calibration, model=options.model)
+    reconstructor = load_reconstructor(options.calibration, model=options.model)
     truth = None
     if options.truth is not None:
         rows = {row.file: row.truth for row in read_truth(options.truth).rows}
@@ -57,9 +56,7 @@ def run(options: argparse.Namespace) -> int:
             )
     picture = read_picture(options.image)
     require_colour(picture, where=str(options.image))
-    heightmap = Reconstructor(calibration).depth(
-        picture.rgb, name=options.image.name, normals=False
-    )
+    heightmap = reconstructor.depth(picture.rgb, name=options.image.name, normals=False)
     measurement = measure_object(
         heightmap.depth_mm,
         heightmap.x_mm,

@@ -10,12 +10,11 @@ from typing import Any
 
 from tqdm import tqdm
 
-from app.command_line.common import add_model, load_calibration, refuse_overwriting
+from app.command_line.common import add_model, load_reconstructor, refuse_overwriting
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.export.preview import write_preview
-from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
 
@@ -60,13 +59,15 @@ def run(options: argparse.Namespace) -> int:
     endings = dict.fromkeys([*formats, *(["png"] if options.pictures else [])])
     outputs = [options.output / f"{path.stem}.{e}" for path in options.images for e in endings]
     refuse_overwriting(outputs, [options.calibration, *options.images])
-    reconstructor = Reconstructor(load_calibration(options.calibration, model=options.model))
+    reconstructor = load_reconstructor(options.calibration, model=options.model)
     make_folder(options.output)
     for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):
         picture = read_picture(path)
         require_colour(picture, where=str(path))
         heightmap = reconstructor.depth(picture.rgb, name=path.name)
         write_heightmap(heightmap, options.output, formats=formats)
+        for note in heightmap.notes:
+            tqdm.write(f"{path}: {note}", file=sys.stderr)
         if options.pictures:
             write_preview(heightmap, picture.rgb, options.output / f"{path.stem}.png")
     print(

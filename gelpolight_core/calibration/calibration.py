@@ -69,7 +69,7 @@ class FullModel:
     misfit : float
         Robust relative misfit of the ball presses.
     held_out : tuple of 2 floats
-        Misfit on presses held out, with the mirror's LEDs and with the refined ones.
+        Mean robust loss on presses held out, with the mirror's LEDs and with the refined ones.
     kept : str
         ``refined`` or ``mirror``: which LEDs `led_positions_mm` holds.
     """

@@ -35,6 +35,7 @@ VERSION = 1
 MANIFEST = "manifest.json"
 MANIFEST_LIMIT = 4_000_000
 NODES_LIMIT = 10_000
+LEAST_BACKGROUND = -0.2
 # A fixed time stamp: the same calibration gives the same bytes.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
@@ -109,7 +110,7 @@ def read_calibration(path: Path) -> Calibration:
         TypeError,
         ValueError,
         AttributeError,
-        OverflowError,
+        ArithmeticError,
     ) as error:
         raise _damaged(path, error) from error
 
@@ -160,6 +161,7 @@ def _manifest_of(c: Calibration) -> dict[str, Any]:
         "sensor": asdict(c.sensor),
         "camera": asdict(c.camera),
         "plane": asdict(c.plane),
+        "grid": _grid_of(c),
         "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
         "provenance": asdict(c.provenance),
     }
@@ -172,6 +174,18 @@ def _manifest_of(c: Calibration) -> dict[str, Any]:
             "kept": c.full.kept,
         }
     return manifest
+
+
+def _grid_of(c: Calibration) -> dict[str, Any]:
+    """Return where the maps' nodes lie; the grid is made anew on reading and must be the same."""
+    grid = c.table.grid
+    return {
+        "rows": grid.shape[0],
+        "columns": grid.shape[1],
+        "x0_mm": float(grid.x_mm[0]),
+        "y0_mm": float(grid.y_mm[0]),
+        "pitch_mm": grid.pitch_mm,
+    }
 
 
 def _read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
@@ -256,6 +270,9 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         full=_read_full(manifest["full"], arrays) if "full" in manifest else None,
     )
     _check(calibration)
+    stated, made = manifest["grid"], _grid_of(calibration)
+    if not np.allclose([float(stated[key]) for key in made], list(made.values()), atol=1e-6):
+        raise ValueError("the maps lie on another grid than this program makes")
     return calibration
 
 
@@ -281,7 +298,14 @@ def _read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMo
         raise ValueError("the membrane is not possible")
     if membrane.exponent <= 0.0 or not 0.0 < membrane.roughness <= 1.0:
         raise ValueError("the membrane is not possible")
+    if membrane.bounce < 0.0 or membrane.bounce_reach_mm <= 0.0:
+        raise ValueError("the membrane is not possible")
     before, after = (float(value) for value in entry["held_out"])
+    lengths = np.array([entry["decay_mm"], entry["misfit"], before, after], float)
+    if not np.isfinite(lengths).all() or lengths.min() < 0.0 or lengths[0] == 0.0:
+        raise ValueError("the joint refinement's figures are not possible")
+    if entry["kept"] not in ("refined", "mirror"):
+        raise ValueError(f"unknown LEDs {entry['kept']!r}")
     return FullModel(
         led_positions_mm=arrays["full_led_positions_mm"],
         led_sd_mm=arrays["full_led_sd_mm"],
@@ -326,7 +350,7 @@ def _check(calibration: Calibration) -> None:
     if c.full is not None:
         expected["full_led_positions_mm"] = ((3, 3), c.full.led_positions_mm)
         expected["full_led_sd_mm"] = ((3, 3), c.full.led_sd_mm)
-        maps["full_background"] = np.maximum(c.full.background, 0.0)
+        maps["full_background"] = c.full.background
     if c.model == "full" and c.full is None:
         raise ValueError("the full model is missing")
     for name, (shape, array) in expected.items():
@@ -336,5 +360,7 @@ def _check(calibration: Calibration) -> None:
     for name, map_ in maps.items():
         if map_.shape != (*rows_columns, 3) or map_.dtype != np.float32:
             raise ValueError(f"{name} does not fit the optics")
-        if not np.isfinite(map_).all() or float(map_.min()) < 0.0:
+        # Crosstalk is taken off the background, which leaves noise about zero where it is dark.
+        least = LEAST_BACKGROUND if name == "full_background" else 0.0
+        if not np.isfinite(map_).all() or float(map_.min()) < least:
             raise ValueError(f"{name} is not possible")

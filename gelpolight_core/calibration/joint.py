@@ -86,7 +86,8 @@ class JointResult:
     misfit : float
         Robust relative misfit over all pixels.
     held_out : tuple of 2 floats
-        Misfit on presses that were held out: with the mirror's LEDs, and with the refined ones.
+        Mean robust loss on presses that were held out: with the mirror's LEDs, and with refined
+        ones.
     kept : str
         ``refined`` or ``mirror``: whose LEDs were the better on what was held out.
     """
@@ -266,7 +267,8 @@ def refine_jointly(
     """
     held_out = _held_out(presses, pixels, led_positions_mm)
     refine = held_out[1] <= held_out[0]
-    x, sd, misfit = _solve(presses, pixels, led_positions_mm, refine=refine)
+    solved = _solve(presses, pixels, led_positions_mm, refine=refine)
+    x, sd = solved.x, solved.sd
     names = ("exponent", "gloss", "roughness", "cap_bounce", "bounce", "decay_mm")
     return JointResult(
         x[:9].reshape(3, 3),
@@ -279,10 +281,20 @@ def refine_jointly(
             BallPose((float(cx), float(cy)), p.radius_mm, float(depth))
             for (cx, cy, depth), p in zip(x[_GLOBAL:].reshape(-1, 3), pixels, strict=True)
         ),
-        misfit,
+        solved.misfit,
         held_out,
         "refined" if refine else "mirror",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Solution:
+    """Parameters, their standard deviations, robust misfit of the ratio, and mean robust loss."""
+
+    x: Array
+    sd: Array
+    misfit: float
+    loss: float
 
 
 def _start(presses: Sequence[BallPress], leds: Array) -> Array:
@@ -297,7 +309,7 @@ def _solve(
     *,
     refine: bool,
     common: Array | None = None,
-) -> tuple[Array, Array, float]:
+) -> _Solution:
     """Solve for all parameters; with `common`, the first 15 are held and only the balls move."""
     start = _start(presses, leds)
     first_free = _GLOBAL if common is not None else (0 if refine else 9)
@@ -329,6 +341,8 @@ def _solve(
         max_nfev=40,
     )
     x = whole(fit.x)
+    scaled = np.concatenate(problem.residuals(x))
+    loss = float(np.mean(np.sqrt(1.0 + scaled**2) - 1.0))
     left = CORRELATION * np.concatenate(problem.residuals(x))
     weight = np.concatenate([p.weight.ravel() for p in pixels])
     seen = (weight > 0.0) & (left != 0.0)
@@ -336,19 +350,22 @@ def _solve(
     curvature = problem.jacobian(x)[:, first_free:]
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.concatenate([np.zeros(first_free), np.sqrt(np.maximum(variance, 0.0))])
-    return x, sd, misfit
+    return _Solution(x, sd, misfit, loss)
 
 
 def _held_out(
     presses: Sequence[BallPress], pixels: Sequence[BallPixels], leds: Array
 ) -> tuple[float, float]:
-    """Return the misfit on every second press, from a fit to the others, without and with LEDs."""
+    """Return the mean robust loss on every second press, from a fit to the others.
+
+    First with the mirror's LEDs, then with refined ones.
+    """
     even, odd = slice(0, None, 2), slice(1, None, 2)
     if len(presses) < 4:
         return 0.0, 1.0  # too few to hold any out: the mirror's LEDs stay
     result: list[float] = []
     for refine in (False, True):
-        x, _, _ = _solve(presses[even], pixels[even], leds, refine=refine)
-        _, _, misfit = _solve(presses[odd], pixels[odd], leds, refine=refine, common=x[:_GLOBAL])
-        result.append(misfit)
+        fitted = _solve(presses[even], pixels[even], leds, refine=refine)
+        judged = _solve(presses[odd], pixels[odd], leds, refine=refine, common=fitted.x[:_GLOBAL])
+        result.append(judged.loss)
     return result[0], result[1]

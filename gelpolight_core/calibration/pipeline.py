@@ -188,7 +188,7 @@ def _full_model(
     joint = refine_jointly(presses, pixels, lights.led_positions_mm)
     return FullModel(
         joint.led_positions_mm,
-        joint.led_sd_mm,
+        joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
         joint.membrane,
         background,
         joint.decay_mm,
@@ -196,6 +196,10 @@ def _full_model(
         joint.held_out,
         joint.kept,
     )
+
+
+def _mirror_sd(lights: LightResult) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)))
 
 
 def _judge_full(full: FullModel) -> QualityTable:
