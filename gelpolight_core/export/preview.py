@@ -21,7 +21,7 @@ COLOURS = "viridis"
 def preview_figure(heightmap: HeightMap, frame: NDArray[np.floating[Any]]) -> Figure:
     """Draw the camera picture, the hill-shaded depth with its scale, and a cross-section.
 
-    The cross-section runs along x through the deepest place.
+    The cross-section runs along x through the middle of what is deep.
 
     Parameters
     ----------
@@ -39,7 +39,8 @@ def preview_figure(heightmap: HeightMap, frame: NDArray[np.floating[Any]]) -> Fi
     depth = np.where(heightmap.flags & int(Flag.OUTSIDE), np.nan, heightmap.depth_mm)
     top = max(float(np.nanmax(depth)), 1e-3)
     _draw_depth(figure, middle, heightmap, depth, top)
-    row = int(np.nanargmax(np.where(np.isfinite(depth), depth, -1.0)) // depth.shape[1])
+    high = np.nan_to_num(depth) > 0.5 * top
+    row = int(np.median(np.nonzero(high)[0])) if high.any() else depth.shape[0] // 2
     middle.axhline(heightmap.y_mm[row], color="white", linewidth=0.8, linestyle="--")
     right.plot(heightmap.x_mm, depth[row], linewidth=1.2)
     right.set_title(tr("Section at y = {y:.2f} mm").format(y=heightmap.y_mm[row]))
