@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from app.command_line.common import quality_lines, refuse_overwriting
 from gelpolight_core.design.check import check_design
+from gelpolight_core.design.reflections import Reflection
 from gelpolight_core.design.sensor_design import read_design
 from gelpolight_core.export.atomic import refuse_unwritable, write_atomically
 from gelpolight_core.simulation.directional import (
@@ -39,11 +41,22 @@ def run(options: argparse.Namespace) -> int:
         refuse_unwritable(options.shadows)
     result = check_design(read_design(options.design))
     print("\n".join(quality_lines({tr("design"): result.quality})))
+    print("\n".join(reflection_lines(result.reflections)))
     if options.shadows:
         comparison = shadow_comparison()
         write_atomically(options.shadows, partial(draw_shadow_comparison, comparison))
         print("\n".join(shadow_lines(comparison)))
     return 0
+
+
+def reflection_lines(reflections: Sequence[Reflection]) -> list[str]:
+    """Return where in the picture a flat face could mirror an LED, were there air behind it."""
+    lines = [tr("where a face would mirror an LED, if there were air behind it:")]
+    for r in reflections:
+        place = tr("pixel ({u:.0f}, {v:.0f})").format(u=r.pixel[0], v=r.pixel[1])
+        seen = tr("in the picture") if r.in_picture else tr("out of the picture")
+        lines.append(f"  {r.led}  {r.face:<18} {place:<22} {seen}, {100 * r.reflectance:.1f} %")
+    return lines
 
 
 def shadow_lines(comparison: ShadowComparison) -> list[str]:

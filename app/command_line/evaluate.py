@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import StageProgress, add_model, load_reconstructor
+from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.measurement.evaluation import evaluate_presses
 from gelpolight_core.measurement.evaluation_report import evaluation_table, write_evaluation
@@ -42,4 +43,12 @@ def run(options: argparse.Namespace) -> int:
     written = write_evaluation(evaluation, options.output)
     print(evaluation_table(evaluation))
     print(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
+    if len(evaluation.failed) == len(evaluation.results):
+        raise InputError(
+            tr("none of the {n} presses could be measured ({reason})").format(
+                n=len(evaluation.results), reason=evaluation.failed[0].failure.rstrip(".")
+            ),
+            where=str(options.presses),
+            advice=tr("Check that the calibration is this sensor's"),
+        )
     return 0

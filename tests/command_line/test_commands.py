@@ -137,6 +137,18 @@ def test_the_evaluation_measures_every_press_of_the_folder(
     assert cv2.imread(str(tmp_path / "e" / "evaluation.png")) is not None
 
 
+def test_an_evaluation_of_which_nothing_could_be_measured_is_refused(
+    session: Path, calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    presses = tmp_path / "presses"
+    presses.mkdir()
+    shutil.copy(next((session / "background").iterdir()), presses / "bare.png")
+    head = "file,shape,diameter_mm,side_mm,height_mm"
+    (presses / "truth.csv").write_text(f"{head}\nbare.png,cylinder,5.0,,1.0\n")
+    line = refusal(capsys, "evaluate", str(calibration), str(presses), "-o", str(tmp_path / "e"))
+    assert "none of the 1 presses" in line
+
+
 def test_the_benchmark_says_where_the_time_goes(
     calibration: Path, press: Path, tmp_path: Path
 ) -> None:
@@ -157,6 +169,7 @@ def test_a_design_is_checked_from_its_file(
     shown = capsys.readouterr().out
     assert "design" in shown
     assert "directional" in shown
+    assert "pixel (" in shown
     assert cv2.imread(str(figure)) is not None
     (tmp_path / "bad.toml").write_text("nonsense = 1\n")
     assert "nonsense" in refusal(capsys, "design", str(tmp_path / "bad.toml"))
