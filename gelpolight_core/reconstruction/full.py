@@ -79,9 +79,8 @@ def reconstruct_full(
     field = shaded_field(rgb, calibration, full)
     pitch = calibration.table.grid.pitch_mm
     depth, (changes, stopped) = coarse_depth(field, full, pitch, workers)
-    slopes, solved = _round(field, depth, full, pitch, workers)
+    slopes, solved, rim = _round(field, depth, full, pitch, workers)
     last = float(np.abs(solved.depth_mm - depth).max())
-    rim = "free" if released_rim(field, pitch).any() else "held"
     return _placed(field, slopes, solved.depth_mm, (*changes, last), (rim, stopped))
 
 
@@ -102,7 +101,7 @@ def coarse_depth(
     changes: list[float] = []
     stopped = "done"
     for _ in range(COARSE_ROUNDS):
-        _, solved = _round(coarse, depth, full, pitch_mm * COARSE, workers)
+        _, solved, _ = _round(coarse, depth, full, pitch_mm * COARSE, workers)
         changes.append(float(np.abs(solved.depth_mm - depth).max()))
         if len(changes) > 2 and changes[-1] > changes[-2]:
             stopped = "grows"
@@ -121,14 +120,15 @@ def as_linear(frame: NDArray[Any]) -> Map:
 
 def _round(
     field: ShadedField, depth_mm: Map, full: FullModel, pitch_mm: float, workers: int
-) -> tuple[RaySlopes, WeightedIntegration]:
-    """One near-light round: normals at the present depth, then the depth of their slopes."""
+) -> tuple[RaySlopes, WeightedIntegration, str]:
+    """One near-light round: normals at the present depth, their depth, and how the rim was held."""
     slopes = solve_near_light(
         field, depth_mm, full.led_positions_mm, full.membrane, workers=workers
     )
     let_go = released_rim(field, pitch_mm)
-    weight, hold = slopes.weight, None
+    weight, hold, rim = slopes.weight, None, "held"
     if let_go.any():
+        rim = "free"
         hold = np.where(let_go, LET_GO, 1.0).astype(np.float32)
         weight = np.where(field.inside, weight, weight * hold)
     solved = integrate_weighted(
@@ -140,7 +140,7 @@ def _round(
         hold=hold,
         workers=workers,
     )
-    return slopes, solved
+    return slopes, solved, rim
 
 
 def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedField:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,12 +57,18 @@ class Reconstructor:
                 where=calibration.identity,
                 advice=tr("Calibrate again with --model full, or use --model paper"),
             )
-        self.maps = shading_maps(calibration)
         self.workers = workers
-        rows, columns = calibration.table.grid.shape
-        self.solver = PoissonSolver(
-            rows, columns, pitch_mm=calibration.table.grid.pitch_mm, workers=workers
-        )
+
+    @cached_property
+    def maps(self) -> ShadingMaps:
+        """The calibration's maps as the paper's fused pass wants them."""
+        return shading_maps(self.calibration)
+
+    @cached_property
+    def solver(self) -> PoissonSolver:
+        """The paper's integration on the calibration's grid."""
+        grid = self.calibration.table.grid
+        return PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=self.workers)
 
     def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
         """Return the depth's slopes of a raw frame (height, width, 3), RGB.
