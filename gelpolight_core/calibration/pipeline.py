@@ -101,6 +101,8 @@ def calibrate_session(
         lens.camera,
         pose.plane,
         led_height_mm=session.sensor.led_height_mm,
+        plane_distance_sd_mm=pose.distance_sd_mm,
+        plane_normal_sd_rad=float(np.radians(pose.normal_sd_deg)),
     )
     tell(tr("light intensity"), 0.45)
     radiance = calibrate_radiance(
