@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from boards import CAMERA, board_pose, render_board
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
@@ -58,6 +58,8 @@ def angle_deg(plane: TopPlane, other: TopPlane) -> float:
     return float(np.degrees(np.arcsin(np.linalg.norm(across))))
 
 
+# Squares in line with the pixels: the corners' errors are then alike, and do not average out.
+@example(tilt_deg=2.93, towards_deg=0.0, roll_deg=0.0, distance_mm=35.759)
 @settings(max_examples=6, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
     tilt_deg=st.floats(0.0, 8.0),
@@ -77,7 +79,10 @@ def test_the_surface_is_found_however_it_is_mounted(
     # Squares of 19 px at 55 mm carry a third of what the rendered sessions' do.
     assert angle_deg(result.plane, truth) < 0.2
     assert angle_deg(result.plane, truth) < 5.0 * result.normal_sd_deg
-    assert abs(result.plane.distance_mm - truth.distance_mm) < 5.0 * result.distance_sd_mm
+    # A fiftieth of a pixel that all corners share on a board of 200 px is no scatter: no sd tells.
+    common_mm = 1e-4 * truth.distance_mm
+    away_mm = abs(result.plane.distance_mm - truth.distance_mm)
+    assert away_mm < 5.0 * result.distance_sd_mm + common_mm
     assert result.plane.normal_camera[2] > 0.9
 
 
