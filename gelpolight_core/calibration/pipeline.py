@@ -8,42 +8,43 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.calibration.calibration import (
-    MODELS,
-    Calibration,
-    FullModel,
-    Provenance,
-    sensor_stack,
+from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
+from gelpolight_core.calibration.stages import (
+    FOLDERS,
+    Stage,
+    StageResults,
+    press_noise,
+    require_balls,
+    run_stage,
 )
-from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
 from gelpolight_core.errors import InputError
-from gelpolight_core.factors.background import FactorResult, calibrate_factors
-from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
-from gelpolight_core.lights.mirror import find_mirror_spots
-from gelpolight_core.lights.positions import LightResult, locate_leds
-from gelpolight_core.optics.lens import LensResult, calibrate_lens
-from gelpolight_core.optics.pose import TopPoseResult, estimate_top_pose
-from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.factors.background import FactorResult
+from gelpolight_core.lights.crosstalk import crosstalk_from_spots
+from gelpolight_core.lights.positions import LightResult
+from gelpolight_core.optics.lens import LensResult
+from gelpolight_core.optics.pose import TopPoseResult
 from gelpolight_core.quality import QualityTable, judge
-from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radiance
-from gelpolight_core.reflectance.press import BallPress, find_ball
-from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
-from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import (
-    ONE_IMAGE_STAGES,
-    Session,
-    file_hash,
-    read_picture,
-    require_colour,
-)
+from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reflectance.stage import ReflectanceResult
+from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
+from gelpolight_core.session.session import Session, file_hash, refuse_copies
 from gelpolight_core.translation import tr
 
-Map = NDArray[np.float32]
 Progress = Callable[[str, float], None]
-STAGES = ("checkerboard", "top_pose", *ONE_IMAGE_STAGES, "balls")
+STAGES = tuple(FOLDERS.values())
+_SHARES = {
+    Stage.LENS: ("lens", 0.0),
+    Stage.TOP_POSE: ("top surface", 0.3),
+    Stage.LIGHTS: ("lights", 0.4),
+    Stage.RADIANCE: ("light intensity", 0.45),
+    Stage.BACKGROUND: ("background", 0.48),
+    Stage.BALLS: ("ball presses", 0.5),
+    Stage.REFLECTANCE: ("reflectance", 0.8),
+    Stage.JOINT: ("joint refinement", 0.85),
+}
+"""Name of each stage, and how much of the whole work is done when it begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ def calibrate_session(
     Parameters
     ----------
     session : Session
-        What was captured.
+        What was captured, and what a person decided about it.
     model : str, optional
         The model to calibrate for.
     progress : callable, optional
@@ -79,47 +80,64 @@ def calibrate_session(
         If a stage is missing or cannot be used; the message names the file.
     """
     tell = progress or (lambda _stage, _share: None)
-    for stage in STAGES:
-        session.files(stage)
-    tell(tr("lens"), 0.0)
-    lens = calibrate_lens(session.pictures("checkerboard"), session.checkerboard)
-    tell(tr("top surface"), 0.3)
-    pose_pictures = session.pictures("top_pose")
-    _same_size(pose_pictures[0], lens.camera.width, lens.camera.height, "top_pose")
-    pose = estimate_top_pose(
-        pose_pictures, session.top_pose, lens.camera, focal_sd_px=lens.focal_sd_px[0]
-    )
-    table = build_resampling_table(
-        lens.camera,
-        pose.plane,
-        sensor_stack(session.sensor, pose.plane),
-        working_diameter_mm=session.sensor.working_diameter_mm,
-    )
-    tell(tr("lights"), 0.4)
-    lights = locate_leds(
-        find_mirror_spots(_stage_picture(session, "mirror", lens)),
-        lens.camera,
-        pose.plane,
-        led_height_mm=session.sensor.led_height_mm,
-        plane_distance_sd_mm=pose.distance_sd_mm,
-        plane_normal_sd_rad=float(np.radians(pose.normal_sd_deg)),
-    )
-    tell(tr("light intensity"), 0.45)
-    radiance = calibrate_radiance(
-        _stage_picture(session, "whiteboard", lens), table, lights.led_positions_mm
-    )
-    background = _stage_picture(session, "background", lens)
-    _refuse_unlit(background)
-    bare = table.apply(background.rgb)
-    presses, pictures = _find_balls(session, bare, table, lights, lens, radiance, tell)
-    tell(tr("reflectance"), 0.8)
-    reflectance, factors = _reflectance_and_factors(
-        presses, pictures, bare, table, lights, radiance
-    )
-    full = None
-    if model == "full":
-        tell(tr("joint refinement"), 0.85)
-        full = _full_model(presses, pictures, bare, table, lights, factors)
+    refuse_copies(path for stage in STAGES for path in session.files(stage))
+    results = StageResults()
+    stages = stages_of(model)
+    ends = [_SHARES[stage][1] for stage in stages[1:]] + [1.0]
+    for stage, end in zip(stages, ends, strict=True):
+        name, begin = tr(_SHARES[stage][0]), _SHARES[stage][1]
+        tell(name, begin)
+
+        def within(share: float, name: str = name, begin: float = begin, end: float = end) -> None:
+            tell(name, begin + share * (end - begin))
+
+        results = run_stage(stage, session, results, tell=within)
+        if stage is Stage.BALLS:
+            require_balls(results)
+    tell(tr("done"), 1.0)
+    return assemble(session, results, model=model)
+
+
+def stages_of(model: str) -> tuple[Stage, ...]:
+    """Return the stages of a model's calibration, in order."""
+    return tuple(stage for stage in Stage if model == "full" or stage is not Stage.JOINT)
+
+
+def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]) -> CalibrationRun:
+    """Put the results of all stages together.
+
+    Parameters
+    ----------
+    session : Session
+        What they were made from.
+    results : StageResults
+        Of every stage that the model needs.
+    model : str, optional
+        The model to calibrate for.
+
+    Raises
+    ------
+    InputError
+        If a stage was not run, or a picture of a ball shows none.
+    """
+    require_balls(results)
+    lens, pose, lights = results.lens, results.top_pose, results.lights
+    radiance, reflectance, factors = results.radiance, results.reflectance, results.factors
+    full = results.full if model == "full" else None
+    if (
+        lens is None
+        or pose is None
+        or lights is None
+        or radiance is None
+        or reflectance is None
+        or factors is None
+        or (full is None and model == "full")
+    ):
+        raise InputError(
+            tr("not every stage has a result"),
+            where=str(session.folder),
+            advice=tr("Complete the stages that are still open"),
+        )
     calibration = Calibration(
         sensor=session.sensor,
         model=model,
@@ -131,7 +149,7 @@ def calibrate_session(
         radiance=radiance.radiance,
         factors=factors.factors,
         reflectance=reflectance.table,
-        noise=_press_noise(presses),
+        noise=press_noise(results.presses),
         quality={
             "lens": lens.quality,
             "top_pose": pose.quality,
@@ -139,72 +157,16 @@ def calibrate_session(
             "radiance": radiance.quality,
             "reflectance": reflectance.quality,
             "factors": factors.quality,
-            **({} if full is None else {"joint": _judge_full(full)}),
+            **({} if full is None else {"joint": judge_joint(full)}),
         },
         provenance=_provenance(session),
         full=full,
     )
-    tell(tr("done"), 1.0)
     return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
 
 
-def _reflectance_and_factors(
-    presses: tuple[BallPress, ...],
-    pictures: tuple[Map, ...],
-    bare: Map,
-    table: ResamplingTable,
-    lights: LightResult,
-    radiance: RadianceResult,
-) -> tuple[ReflectanceResult, FactorResult]:
-    """Fit the table, then the factors, and feed these back once (section V-E)."""
-    leds = lights.led_positions_mm
-    first = calibrate_reflectance(presses, pictures, table, leds, radiance)
-    factors = calibrate_factors(bare, table, leds, radiance, first.table)
-    second = calibrate_reflectance(presses, pictures, table, leds, radiance, factors.factors)
-    return second, calibrate_factors(bare, table, leds, radiance, second.table)
-
-
-def _press_noise(presses: tuple[BallPress, ...]) -> NDArray[np.float64]:
-    """Return the noise of press minus background, per channel, over all presses."""
-    return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
-
-
-def _full_model(
-    presses: tuple[BallPress, ...],
-    pictures: tuple[Map, ...],
-    bare: Map,
-    table: ResamplingTable,
-    lights: LightResult,
-    factors: FactorResult,
-) -> FullModel:
-    """Refine LEDs and membrane on the presses, and keep the background to compare with."""
-    crosstalk = crosstalk_from_spots(lights.spots)
-    background = unmix(bare, crosstalk)
-    noise = _press_noise(presses)
-    pixels = [
-        gather_ball_pixels(
-            press, unmix(picture, crosstalk), background, table, factors.usable, noise
-        )
-        for press, picture in zip(presses, pictures, strict=True)
-    ]
-    joint = refine_jointly(presses, pixels, lights.led_positions_mm)
-    return FullModel(
-        joint.led_positions_mm,
-        joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
-        joint.membrane,
-        background,
-        joint.decay_mm,
-        joint.misfit,
-        joint.held_out,
-        joint.kept,
-    )
-
-
-def _mirror_sd(lights: LightResult) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)))
-
-
-def _judge_full(full: FullModel) -> QualityTable:
+def judge_joint(full: FullModel) -> QualityTable:
+    """Judge the joint refinement."""
     return QualityTable(
         (
             judge(
@@ -232,81 +194,13 @@ def _judge_full(full: FullModel) -> QualityTable:
     )
 
 
-def _find_balls(
-    session: Session,
-    bare: Map,
-    table: ResamplingTable,
-    lights: LightResult,
-    lens: LensResult,
-    radiance: RadianceResult,
-    tell: Progress,
-) -> tuple[tuple[BallPress, ...], tuple[Map, ...]]:
-    crosstalk = crosstalk_from_spots(lights.spots)
-    clean = unmix(bare, crosstalk)
-    presses, pictures = [], []
-    files = session.files("balls")
-    for index, path in enumerate(files):
-        tell(tr("ball presses"), 0.5 + 0.3 * index / len(files))
-        picture = read_picture(path)
-        radius = session.ball_radius_mm(path.name)
-        require_colour(picture, where=str(path))
-        _same_size(picture, lens.camera.width, lens.camera.height, "balls")
-        seen = table.apply(picture.rgb)
-        presses.append(
-            find_ball(
-                unmix(seen, crosstalk),
-                clean,
-                table,
-                lights.led_positions_mm,
-                radius_mm=radius,
-                name=f"balls/{path.name}",
-                usable=radiance.usable,
-            )
-        )
-        pictures.append(seen)
-    return tuple(presses), tuple(pictures)
-
-
-def _stage_picture(session: Session, stage: str, lens: LensResult) -> Picture:
-    picture = session.averaged(stage)
-    require_colour(picture, where=f"{stage}/{picture.name}")
-    _same_size(picture, lens.camera.width, lens.camera.height, stage)
-    return picture
-
-
-def _same_size(picture: Picture, width: int, height: int, stage: str) -> None:
-    if picture.size != (width, height):
-        raise InputError(
-            tr("the picture is {w}x{h} pixels, the checkerboard pictures are {cw}x{ch}").format(
-                w=picture.size[0], h=picture.size[1], cw=width, ch=height
-            ),
-            where=f"{stage}/{picture.name}",
-            advice=tr("Capture all stages at one picture size"),
-        )
-
-
-def _refuse_unlit(picture: Picture) -> None:
-    brightest = np.percentile(picture.rgb, 99.5, axis=(0, 1))
-    if brightest.min() < 0.05:
-        raise InputError(
-            tr("the picture is dark (a channel reaches only {v:.1%})").format(v=brightest.min()),
-            where=f"background/{picture.name}",
-            advice=tr("Switch all three LEDs on, or expose longer"),
-        )
-    saturated = float((picture.rgb >= 0.995).any(axis=2).mean())
-    if saturated > 0.2:
-        raise InputError(
-            tr("{share:.0%} of the picture is saturated").format(share=saturated),
-            where=f"background/{picture.name}",
-            advice=tr("Shorten the exposure"),
-        )
-
-
 def _provenance(session: Session) -> Provenance:
     sources = {
         f"{stage}/{path.name}": file_hash(path) for stage in STAGES for path in session.files(stage)
     }
-    sources["session.toml"] = file_hash(session.folder / "session.toml")
+    for name in ("session.toml", DECISIONS_FILE):
+        if (session.folder / name).is_file():
+            sources[name] = file_hash(session.folder / name)
     try:
         operator = getpass.getuser()
     except (KeyError, OSError):  # a container without a user database has no name to give

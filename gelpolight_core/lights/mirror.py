@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -24,6 +25,9 @@ MERGED_SHARE = 0.6
 COLOUR_TOP = 0.97
 COLOUR_SHARES = (0.5, 0.15)
 COLOUR_PIXELS = 5
+# A place that was read off a found spot names it; a hand on a magnified picture is as sure as this.
+SAME_PLACE_PX = 0.05
+PLACED_SD_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +89,18 @@ class MirrorSpots:
         return np.array([s.centre_px for s in self.spots])
 
 
-def find_mirror_spots(picture: Picture) -> MirrorSpots:
+def find_mirror_spots(
+    picture: Picture, *, placed: Mapping[int, tuple[float, float]] | None = None
+) -> MirrorSpots:
     """Find the three LEDs' reflections in the mirror picture.
 
     Parameters
     ----------
     picture : Picture
         The mirror on the top surface, all three LEDs on, room dark.
+    placed : mapping of int to (u, v), optional
+        Spots that a person has placed, by LED, in pixels. One placed on the centroid of what was
+        found is that spot; elsewhere the place itself is taken, as sure as a hand is.
 
     Raises
     ------
@@ -106,15 +115,41 @@ def find_mirror_spots(picture: Picture) -> MirrorSpots:
     _refuse_hopeless(brightest, where)
     noise = _noise(rgb)
     candidates = _find_candidates(rgb, noise)
-    _refuse_merged(candidates, where)
+    placed = placed or {}
+    if not placed:
+        _refuse_merged(candidates, where)
     chosen = []
     rejected: list[tuple[Spot, str]] = []
     for channel in range(3):
+        if channel in placed:
+            chosen.append(_placed_spot(candidates, placed[channel], rgb))
+            continue
         spot, others = _choose(candidates, channel, where)
         chosen.append(spot)
         rejected += others
     spots = (chosen[0], chosen[1], chosen[2])
+    rejected = [(spot, reason) for spot, reason in rejected if spot not in spots]
     return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected))
+
+
+def spot_near(
+    picture: Picture, place_px: tuple[float, float], *, reach_px: float = 8.0
+) -> tuple[float, float] | None:
+    """Return the centroid of the spot at a place, of whatever colour, or None where there is none.
+
+    Parameters
+    ----------
+    picture : Picture
+        The mirror.
+    place_px : (u, v)
+        Where a person points.
+    reach_px : float, optional
+        How far off a centroid may be.
+    """
+    rgb = picture.rgb.astype(np.float64)
+    centres = [spot.centre_px for spot in _find_candidates(rgb, _noise(rgb))]
+    near = min(centres, key=lambda centre: math.dist(centre, place_px), default=None)
+    return near if near is not None and math.dist(near, place_px) <= reach_px else None
 
 
 def _refuse_hopeless(brightest: Array, where: str) -> None:
@@ -215,6 +250,18 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 def _dominant(spot: Spot) -> int:
     return int(np.argmax(spot.flux))
+
+
+def _placed_spot(candidates: list[Spot], place: tuple[float, float], rgb: Array) -> Spot:
+    """Return the spot that a person points at; no colour is read where none was found."""
+    for spot in candidates:
+        if math.dist(spot.centre_px, place) < SAME_PLACE_PX:
+            return spot
+    rows, columns = rgb.shape[:2]
+    v = min(max(round(place[1]), 0), rows - 1)
+    u = min(max(round(place[0]), 0), columns - 1)
+    nothing = (math.nan, math.nan, math.nan)
+    return Spot(place, PLACED_SD_PX, 1, _triple(rgb[v, u]), (0.0, 0.0, 0.0), nothing, 1.0, False)
 
 
 def _refuse_merged(candidates: list[Spot], where: str) -> None:

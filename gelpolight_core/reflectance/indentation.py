@@ -41,6 +41,9 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
+# A careful hand on a magnified picture.
+PLACED_SD_PX = 0.5
+LEAST_PLACED_INSIDE = 0.9
 _BLUR_PX = 0.8
 # What a Gaussian leaves of white noise of variance 1, in three channels.
 _NOISE_LEFT = 3.0 / (4.0 * np.pi * _BLUR_PX**2)
@@ -157,6 +160,59 @@ def find_indentation(
     check_round(contour, name)
     check_ball(sharp, contour.circle, name, noise_variance=_NOISE_LEFT)
     check_order(press, background, area, contour.circle, name, background_name)
+    return _result(press, change, contour, region, reaches, drift)
+
+
+def indentation_at(
+    press: Array,
+    background: Array,
+    circle: Circle,
+    *,
+    valid: Mask | None = None,
+    name: str = "press",
+    background_name: str = "background",
+) -> Indentation:
+    """Describe an indentation whose contact a person has placed.
+
+    Parameters
+    ----------
+    press, background, valid, name, background_name
+        As in :func:`find_indentation`.
+    circle : Circle
+        The contact's edge as placed, pixels.
+
+    Returns
+    -------
+    Indentation
+        With the placed circle as its contour and a centre that is as sure as a hand is.
+
+    Raises
+    ------
+    InputError
+        If the pictures cannot be compared, or the circle reaches beyond the working area.
+    """
+    press, background, area = prepare_pair(
+        press, background, valid, name=name, background_name=background_name
+    )
+    change = scale_difference(press, background, area)
+    within = distance_in_radii(area.shape, circle) < 1.0
+    if not within.any() or np.count_nonzero(within & area) < LEAST_PLACED_INSIDE * np.pi * (
+        circle.radius**2
+    ):
+        raise InputError(
+            tr("the contact placed by hand reaches beyond the working area"),
+            where=name,
+            advice=tr("Move it inside, or leave this picture out"),
+        )
+    turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    points = np.stack(
+        [circle.x + circle.radius * np.cos(turns), circle.y + circle.radius * np.sin(turns)], axis=1
+    )
+    contour = Contour(circle, points, 0.0, 1.0, 1.0, PLACED_SD_PX)
+    region = np.asarray(change.scaled > DETECTION)
+    far = area & (distance_in_radii(area.shape, circle) > 2.0)
+    drift = change_where(change, background, far)
+    reaches = reaches_border(region, change.valid_small)
     return _result(press, change, contour, region, reaches, drift)
 
 

@@ -16,7 +16,12 @@ from gelpolight_core.reflectance.ball import (
     ball_depth_from_contact,
     refine_centre,
 )
-from gelpolight_core.reflectance.indentation import Indentation, find_indentation
+from gelpolight_core.reflectance.contour import Circle
+from gelpolight_core.reflectance.indentation import (
+    Indentation,
+    find_indentation,
+    indentation_at,
+)
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -69,6 +74,22 @@ class BallPress:
         return centre - float(self.pose.depth_mm - sagitta) * drift
 
 
+@dataclass(frozen=True, slots=True)
+class PlacedContact:
+    """A contact placed by a person, where it is seen on the undeformed top surface.
+
+    Attributes
+    ----------
+    centre_mm : tuple of 2 floats
+        Sensor frame.
+    radius_mm : float
+        Of the contact's edge.
+    """
+
+    centre_mm: tuple[float, float]
+    radius_mm: float
+
+
 def find_ball(
     picture: Map,
     background: Map,
@@ -78,6 +99,7 @@ def find_ball(
     radius_mm: float,
     name: str,
     usable: NDArray[np.bool_] | None = None,
+    placed: PlacedContact | None = None,
 ) -> BallPress:
     """Find a pressed ball and place it.
 
@@ -95,6 +117,9 @@ def find_ball(
         The picture's file, for messages.
     usable : (rows, columns) bool, optional
         Nodes with light; by default all that the camera sees.
+    placed : PlacedContact, optional
+        The contact as a person has placed it; by default it is looked for. Its centre is refined
+        on the shading either way.
 
     Raises
     ------
@@ -102,7 +127,11 @@ def find_ball(
         If no single round indentation is found, or its contact is larger than the ball.
     """
     usable = table.valid if usable is None else usable & table.valid
-    found = find_indentation(picture, background, valid=table.valid, name=name)
+    if placed is None:
+        found = find_indentation(picture, background, valid=table.valid, name=name)
+    else:
+        circle = _on_grid(placed, table)
+        found = indentation_at(picture, background, circle, valid=table.valid, name=name)
     pitch = table.grid.pitch_mm
     origin = np.array([table.grid.x_mm[0], table.grid.y_mm[0]])
     seen = origin + pitch * np.asarray(found.centre)
@@ -127,6 +156,11 @@ def find_ball(
     return BallPress(
         name, pose, contact, sd, misfit, found, _judge(found, contact, radius_mm, moved, misfit)
     )
+
+
+def _on_grid(placed: PlacedContact, table: ResamplingTable) -> Circle:
+    x, y = table.grid.to_index(np.asarray(placed.centre_mm))
+    return Circle(float(x), float(y), placed.radius_mm / table.grid.pitch_mm)
 
 
 def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.wholeness import is_whole_picture
 from gelpolight_core.translation import tr
@@ -42,7 +43,11 @@ class SensorData:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """A session folder whose description was read and checked; pictures are read on demand."""
+    """A session folder whose description was read and checked; pictures are read on demand.
+
+    What a person decided about the pictures (``decisions.toml``) is honoured: excluded ones are not
+    among a stage's files.
+    """
 
     folder: Path
     sensor: SensorData
@@ -50,6 +55,17 @@ class Session:
     top_pose: BoardSpec
     ball_radii_mm: Mapping[str, float] = field(default_factory=dict)
     ball_default_radius_mm: float | None = None
+    decisions: Decisions = field(default_factory=Decisions)
+
+    def captured(self, stage: str) -> tuple[Path, ...]:
+        """Return all picture files of a stage in the order of their names, excluded ones too."""
+        folder = self.folder / stage
+        return tuple(sorted(p for p in folder.glob("[!.]*") if p.suffix.lower() in SUFFIXES))
+
+    def found(self, stage: str) -> tuple[Path, ...]:
+        """Return the picture files of a stage that are to be used; there may be none."""
+        excluded = self.decisions.excluded
+        return tuple(p for p in self.captured(stage) if f"{stage}/{p.name}" not in excluded)
 
     def files(self, stage: str) -> tuple[Path, ...]:
         """Return the picture files of a stage in the order of their names.
@@ -57,21 +73,22 @@ class Session:
         Raises
         ------
         InputError
-            If the stage's folder is missing or holds no PNG or TIFF picture.
+            If the stage's folder is missing or holds no PNG or TIFF picture, or all are excluded.
         """
-        folder = self.folder / stage
-        found = tuple(sorted(p for p in folder.glob("[!.]*") if p.suffix.lower() in SUFFIXES))
+        found = self.found(stage)
         if not found:
             raise InputError(
-                tr("the stage has no pictures"),
-                where=str(folder),
+                tr("the stage has no pictures")
+                if not self.captured(stage)
+                else tr("all pictures of the stage are excluded"),
+                where=str(self.folder / stage),
                 advice=tr("Capture the stage, or copy its PNG or TIFF pictures there"),
             )
         return found
 
     def pictures(self, stage: str) -> tuple[Picture, ...]:
         """Return the pictures of a stage; all must have one size."""
-        pictures = tuple(read_picture(path) for path in self.files(stage))
+        pictures = tuple(self.picture(path) for path in self.files(stage))
         for picture in pictures[1:]:
             if picture.size != pictures[0].size:
                 raise InputError(
@@ -84,6 +101,10 @@ class Session:
                     advice=tr("Capture all pictures of a session at one size"),
                 )
         return pictures
+
+    def picture(self, path: Path) -> Picture:
+        """Return one of the session's pictures."""
+        return read_picture(path)
 
     def averaged(self, stage: str) -> Picture:
         """Return the average of a one-image stage's frames."""
@@ -314,7 +335,8 @@ def _parse(content: dict[str, Any], path: Path) -> Session:
     radii = {str(name): balls.number(str(name), 0.05, 500.0) for name in balls.content}
     top.no_more("format", "version", "sensor", "checkerboard", "top_pose", "balls")
     default = radii.pop("default", None)
-    return Session(path.parent, sensor, checkerboard, pose, radii, default)
+    decisions = read_decisions(path.parent)
+    return Session(path.parent, sensor, checkerboard, pose, radii, default, decisions)
 
 
 def _parse_sensor(table: _Table) -> SensorData:

@@ -1,0 +1,460 @@
+"""The stages of a calibration: what each needs, and one function that runs it.
+
+The command line runs them one after the other; the desktop program runs each as soon as it has
+what it needs, keeps the results, and runs again only what a new picture or decision has made
+stale. Both call :func:`run_stage` and therefore come to the same numbers.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import FullModel, sensor_stack
+from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.background import FactorResult, calibrate_factors
+from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
+from gelpolight_core.lights.mirror import find_mirror_spots
+from gelpolight_core.lights.positions import LightResult, locate_leds
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.lens import LensResult, calibrate_lens
+from gelpolight_core.optics.pose import TopPoseResult, estimate_top_pose
+from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane
+from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radiance
+from gelpolight_core.reflectance.press import BallPress, PlacedContact, find_ball
+from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
+from gelpolight_core.session.decisions import PlacedCircle
+from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.session import (
+    Session,
+    file_hash,
+    require_colour,
+)
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+Progress = Callable[[float], None]
+T = TypeVar("T")
+
+
+class Stage(StrEnum):
+    """A stage, in the order in which a calibration goes through them."""
+
+    LENS = "lens"
+    TOP_POSE = "top_pose"
+    LIGHTS = "lights"
+    RADIANCE = "radiance"
+    BACKGROUND = "background"
+    BALLS = "balls"
+    REFLECTANCE = "reflectance"
+    JOINT = "joint"
+
+
+FOLDERS = MappingProxyType(
+    {
+        Stage.LENS: "checkerboard",
+        Stage.TOP_POSE: "top_pose",
+        Stage.LIGHTS: "mirror",
+        Stage.RADIANCE: "whiteboard",
+        Stage.BACKGROUND: "background",
+        Stage.BALLS: "balls",
+    }
+)
+"""Folder of the pictures of each stage that has its own."""
+
+NEEDS = MappingProxyType(
+    {
+        Stage.LENS: (),
+        Stage.TOP_POSE: (Stage.LENS,),
+        Stage.LIGHTS: (Stage.TOP_POSE,),
+        Stage.RADIANCE: (Stage.LIGHTS,),
+        Stage.BACKGROUND: (Stage.TOP_POSE,),
+        Stage.BALLS: (Stage.RADIANCE, Stage.BACKGROUND),
+        Stage.REFLECTANCE: (Stage.BALLS,),
+        Stage.JOINT: (Stage.REFLECTANCE,),
+    }
+)
+"""Stages whose results a stage builds on, directly."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeenBall:
+    """What was made of one picture of a ball press.
+
+    Attributes
+    ----------
+    file : str
+        Its name in ``balls``.
+    key : str
+        Changes with anything that the finding rests on.
+    picture : (rows, columns, 3) float32
+        Resampled onto the grid.
+    press : BallPress or None
+        The ball; None where none was found.
+    fault : InputError or None
+        Why not.
+    """
+
+    file: str
+    key: str
+    picture: Map
+    press: BallPress | None
+    fault: InputError | None
+
+
+@dataclass(frozen=True, slots=True)
+class StageResults:
+    """The results of all stages that were run; None where a stage was not."""
+
+    lens: LensResult | None = None
+    top_pose: TopPoseResult | None = None
+    table: ResamplingTable | None = None
+    lights: LightResult | None = None
+    radiance: RadianceResult | None = None
+    background: Map | None = None
+    balls: tuple[SeenBall, ...] = ()
+    reflectance: ReflectanceResult | None = None
+    factors: FactorResult | None = None
+    full: FullModel | None = None
+
+    @property
+    def presses(self) -> tuple[BallPress, ...]:
+        """The balls that were found."""
+        return tuple(ball.press for ball in self.balls if ball.press is not None)
+
+    @property
+    def pictures(self) -> tuple[Map, ...]:
+        """Their pictures, resampled."""
+        return tuple(ball.picture for ball in self.balls if ball.press is not None)
+
+
+def run_stage(
+    stage: Stage, session: Session, results: StageResults, *, tell: Progress | None = None
+) -> StageResults:
+    """Run one stage on the results of the earlier ones.
+
+    Parameters
+    ----------
+    stage : Stage
+        Which.
+    session : Session
+        Pictures and decisions.
+    results : StageResults
+        Those of all stages that this one needs; balls found earlier are used again where nothing
+        they rest on has changed.
+    tell : callable, optional
+        Told the share of this stage done, 0..1.
+
+    Returns
+    -------
+    StageResults
+        With this stage's result in place.
+
+    Raises
+    ------
+    InputError
+        If the stage's pictures are missing or cannot be used. A picture of a ball without a ball
+        is kept in the results with its fault; :func:`require_balls` raises it.
+    """
+    return _RUNS[stage](session, results, tell or (lambda _share: None))
+
+
+def require_balls(results: StageResults) -> None:
+    """Raise the fault of the first picture in which no ball was found."""
+    for ball in results.balls:
+        if ball.fault is not None:
+            raise ball.fault
+
+
+def fingerprints(session: Session, hashes: Callable[[Path], str] = file_hash) -> dict[Stage, str]:
+    """Return for each stage a text that changes with all that its result rests on.
+
+    Parameters
+    ----------
+    session : Session
+        Pictures, description and decisions.
+    hashes : callable, optional
+        File to hash; one that remembers saves reading every picture again.
+    """
+    found: dict[Stage, str] = {}
+    for stage in Stage:
+        digest = hashlib.sha256(stage.value.encode())
+        for need in NEEDS[stage]:
+            digest.update(found[need].encode())
+        digest.update(repr(_stated(stage, session)).encode())
+        if stage in FOLDERS:
+            for path in session.found(FOLDERS[stage]):
+                digest.update(f"{path.name} {hashes(path)}\n".encode())
+        found[stage] = digest.hexdigest()
+    return found
+
+
+def _stated(stage: Stage, session: Session) -> object:
+    """Return what a person stated or decided that a stage uses."""
+    sensor, decisions = session.sensor, session.decisions
+    match stage:
+        case Stage.LENS:
+            return session.checkerboard
+        case Stage.TOP_POSE:
+            return (
+                session.top_pose,
+                sensor.elastomer_thickness_mm,
+                sensor.elastomer_refractive_index,
+                sensor.window_thickness_mm,
+                sensor.window_refractive_index,
+                sensor.working_diameter_mm,
+            )
+        case Stage.LIGHTS:
+            return sensor.led_height_mm, sorted(decisions.spots_px.items())
+        case Stage.BALLS:
+            radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
+            return radii, sorted(decisions.balls.items())
+        case _:
+            return None
+
+
+def _need(value: T | None, what: str) -> T:
+    if value is None:
+        raise InputError(
+            tr("an earlier stage has no result yet"),
+            where=what,
+            advice=tr("Complete the earlier stages first"),
+        )
+    return value
+
+
+def _run_lens(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    lens = calibrate_lens(session.pictures("checkerboard"), session.checkerboard)
+    return replace(results, lens=lens)
+
+
+def _run_top_pose(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    lens = _need(results.lens, "top_pose")
+    pictures = session.pictures("top_pose")
+    _same_size(pictures[0], lens, "top_pose")
+    pose = estimate_top_pose(
+        pictures, session.top_pose, lens.camera, focal_sd_px=lens.focal_sd_px[0]
+    )
+    table = build_resampling_table(
+        lens.camera,
+        pose.plane,
+        sensor_stack(session.sensor, pose.plane),
+        working_diameter_mm=session.sensor.working_diameter_mm,
+    )
+    return replace(results, top_pose=pose, table=table)
+
+
+def _run_lights(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    lens, pose = _need(results.lens, "mirror"), _need(results.top_pose, "mirror")
+    spots = find_mirror_spots(
+        _stage_picture(session, "mirror", lens), placed=session.decisions.spots_px
+    )
+    lights = locate_leds(
+        spots,
+        lens.camera,
+        pose.plane,
+        led_height_mm=session.sensor.led_height_mm,
+        plane_distance_sd_mm=pose.distance_sd_mm,
+        plane_normal_sd_rad=float(np.radians(pose.normal_sd_deg)),
+    )
+    return replace(results, lights=lights)
+
+
+def _run_radiance(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    lens, table = _need(results.lens, "whiteboard"), _need(results.table, "whiteboard")
+    lights = _need(results.lights, "whiteboard")
+    whiteboard = _stage_picture(session, "whiteboard", lens)
+    return replace(results, radiance=calibrate_radiance(whiteboard, table, lights.led_positions_mm))
+
+
+def _run_background(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    lens, table = _need(results.lens, "background"), _need(results.table, "background")
+    background = _stage_picture(session, "background", lens)
+    _refuse_unlit(background)
+    return replace(results, background=table.apply(background.rgb))
+
+
+def _run_balls(session: Session, results: StageResults, tell: Progress) -> StageResults:
+    known = {ball.key: ball for ball in results.balls}
+    rests_on = fingerprints(session)
+    files = session.files("balls")
+    balls = []
+    for index, path in enumerate(files):
+        tell(index / len(files))
+        key = _ball_key(path, session, rests_on)
+        balls.append(known[key] if key in known else _look_for_ball(path, key, session, results))
+    return replace(results, balls=tuple(balls))
+
+
+def _ball_key(path: Path, session: Session, rests_on: Mapping[Stage, str]) -> str:
+    parts = [rests_on[need] for need in NEEDS[Stage.BALLS]]
+    stated = (path.name, session.ball_radius_mm(path.name), session.decisions.balls.get(path.name))
+    return hashlib.sha256(repr((parts, stated, file_hash(path))).encode()).hexdigest()
+
+
+def _look_for_ball(path: Path, key: str, session: Session, results: StageResults) -> SeenBall:
+    lens, table = _need(results.lens, "balls"), _need(results.table, "balls")
+    lights, radiance = _need(results.lights, "balls"), _need(results.radiance, "balls")
+    bare = _need(results.background, "balls")
+    crosstalk = crosstalk_from_spots(lights.spots)
+    picture = session.picture(path)
+    radius = session.ball_radius_mm(path.name)
+    require_colour(picture, where=str(path))
+    _same_size(picture, lens, "balls")
+    seen = table.apply(picture.rgb)
+    pose = _need(results.top_pose, "balls")
+    stack = sensor_stack(session.sensor, pose.plane)
+    placed = session.decisions.balls.get(path.name)
+    try:
+        contact = None
+        if placed is not None:
+            contact = placed_contact(placed, lens.camera, pose.plane, stack)
+        press = find_ball(
+            unmix(seen, crosstalk),
+            unmix(bare, crosstalk),
+            table,
+            lights.led_positions_mm,
+            radius_mm=radius,
+            name=f"balls/{path.name}",
+            usable=radiance.usable,
+            placed=contact,
+        )
+    except InputError as fault:
+        return SeenBall(path.name, key, seen, None, fault)
+    return SeenBall(path.name, key, seen, press, None)
+
+
+def placed_contact(
+    circle: PlacedCircle, camera: Camera, plane: TopPlane, stack: LayerStack
+) -> PlacedContact:
+    """Return where on the undeformed membrane a circle placed in the raw picture is seen.
+
+    Raises
+    ------
+    InputError
+        If it reaches beyond what the camera can see of the membrane.
+    """
+    turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    u = circle.u_px + circle.radius_px * np.cos(turns)
+    v = circle.v_px + circle.radius_px * np.sin(turns)
+    edge_mm, _ = camera_to_membrane(camera.directions(np.stack([u, v], axis=-1)), plane, stack)
+    if not np.isfinite(edge_mm).all():
+        raise InputError(
+            tr("the circle placed by hand reaches beyond what the camera sees of the membrane"),
+            where=tr("balls"),
+            advice=tr("Move it inside the working area, or leave the picture out"),
+        )
+    middle = edge_mm.mean(axis=0)
+    radius_mm = float(np.hypot(*(edge_mm - middle).T).mean())
+    return PlacedContact((float(middle[0]), float(middle[1])), radius_mm)
+
+
+def _run_reflectance(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    """Fit the table, then the factors, and feed these back once (section V-E)."""
+    del session
+    table, lights = _need(results.table, "balls"), _need(results.lights, "balls")
+    radiance, bare = _need(results.radiance, "balls"), _need(results.background, "balls")
+    leds, presses, pictures = lights.led_positions_mm, results.presses, results.pictures
+    first = calibrate_reflectance(presses, pictures, table, leds, radiance)
+    factors = calibrate_factors(bare, table, leds, radiance, first.table)
+    second = calibrate_reflectance(presses, pictures, table, leds, radiance, factors.factors)
+    factors = calibrate_factors(bare, table, leds, radiance, second.table)
+    return replace(results, reflectance=second, factors=factors)
+
+
+def _run_joint(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    """Refine LEDs and membrane on the presses, and keep the background to compare with."""
+    del session
+    table, lights = _need(results.table, "balls"), _need(results.lights, "balls")
+    bare, factors = _need(results.background, "balls"), _need(results.factors, "balls")
+    crosstalk = crosstalk_from_spots(lights.spots)
+    background = unmix(bare, crosstalk)
+    noise = press_noise(results.presses)
+    pixels = [
+        gather_ball_pixels(
+            press, unmix(picture, crosstalk), background, table, factors.usable, noise
+        )
+        for press, picture in zip(results.presses, results.pictures, strict=True)
+    ]
+    joint = refine_jointly(results.presses, pixels, lights.led_positions_mm)
+    full = FullModel(
+        joint.led_positions_mm,
+        joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
+        joint.membrane,
+        background,
+        joint.decay_mm,
+        joint.misfit,
+        joint.held_out,
+        joint.kept,
+    )
+    return replace(results, full=full)
+
+
+_RUNS: Mapping[Stage, Callable[[Session, StageResults, Progress], StageResults]] = MappingProxyType(
+    {
+        Stage.LENS: _run_lens,
+        Stage.TOP_POSE: _run_top_pose,
+        Stage.LIGHTS: _run_lights,
+        Stage.RADIANCE: _run_radiance,
+        Stage.BACKGROUND: _run_background,
+        Stage.BALLS: _run_balls,
+        Stage.REFLECTANCE: _run_reflectance,
+        Stage.JOINT: _run_joint,
+    }
+)
+
+
+def press_noise(presses: tuple[BallPress, ...]) -> NDArray[np.float64]:
+    """Return the noise of press minus background, per channel, over all presses."""
+    return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
+
+
+def _mirror_sd(lights: LightResult) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)))
+
+
+def _stage_picture(session: Session, stage: str, lens: LensResult) -> Picture:
+    picture = session.averaged(stage)
+    require_colour(picture, where=f"{stage}/{picture.name}")
+    _same_size(picture, lens, stage)
+    return picture
+
+
+def _same_size(picture: Picture, lens: LensResult, stage: str) -> None:
+    width, height = lens.camera.width, lens.camera.height
+    if picture.size != (width, height):
+        raise InputError(
+            tr("the picture is {w}x{h} pixels, the checkerboard pictures are {cw}x{ch}").format(
+                w=picture.size[0], h=picture.size[1], cw=width, ch=height
+            ),
+            where=f"{stage}/{picture.name}",
+            advice=tr("Capture all stages at one picture size"),
+        )
+
+
+def _refuse_unlit(picture: Picture) -> None:
+    brightest = np.percentile(picture.rgb, 99.5, axis=(0, 1))
+    if brightest.min() < 0.05:
+        raise InputError(
+            tr("the picture is dark (a channel reaches only {v:.1%})").format(v=brightest.min()),
+            where=f"background/{picture.name}",
+            advice=tr("Switch all three LEDs on, or expose longer"),
+        )
+    saturated = float((picture.rgb >= 0.995).any(axis=2).mean())
+    if saturated > 0.2:
+        raise InputError(
+            tr("{share:.0%} of the picture is saturated").format(share=saturated),
+            where=f"background/{picture.name}",
+            advice=tr("Shorten the exposure"),
+        )

@@ -1,0 +1,174 @@
+"""What a person decided about a session's pictures: ``decisions.toml`` beside ``session.toml``.
+
+Detection proposes; where it is wrong a person corrects it. The corrections are kept apart from
+what was captured, so that they can be taken back, and every way of calibrating the same folder
+honours them: the desktop program and the command line give the same calibration.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import tomli_w
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.translation import tr
+
+FILE_NAME = "decisions.toml"
+FORMAT = "gelpolight-decisions"
+VERSION = 1
+CHANNEL_KEYS = ("red", "green", "blue")
+MOST_NODES = 200
+SIZE_LIMIT = 4_000_000
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedCircle:
+    """The picture of a contact's edge, placed by hand in the raw picture; pixels."""
+
+    u_px: float
+    v_px: float
+    radius_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class Decisions:
+    """A person's corrections.
+
+    Attributes
+    ----------
+    excluded : frozenset of str
+        Pictures not to be used, such as ``balls/ball_03.png``.
+    spots_px : mapping of int to (u, v)
+        Mirror spot of an LED (0, 1, 2), placed by hand in the raw picture.
+    balls : mapping of str to PlacedCircle
+        Contact placed by hand, by the file's name in ``balls``.
+    curves : mapping of int to nodes
+        Reflectance of a channel as edited by hand: (cosine, value) nodes, both rising.
+    """
+
+    excluded: frozenset[str] = frozenset()
+    spots_px: Mapping[int, Point] = field(default_factory=dict)
+    balls: Mapping[str, PlacedCircle] = field(default_factory=dict)
+    curves: Mapping[int, tuple[Point, ...]] = field(default_factory=dict)
+
+
+def read_decisions(folder: Path) -> Decisions:
+    """Read a session's decisions; none where there is no such file.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, of a newer version, or holds what no decision is.
+    """
+    path = folder / FILE_NAME
+    if not path.is_file():
+        return Decisions()
+    try:
+        if path.stat().st_size > SIZE_LIMIT:
+            raise ValueError(f"it is larger than {SIZE_LIMIT} bytes")
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        version = content.get("version")
+        if content.get("format") == FORMAT and type(version) is int and version > VERSION:
+            raise InputError(
+                tr("the decisions have version {v} and this program knows version {k}").format(
+                    v=version, k=VERSION
+                ),
+                where=str(path),
+                advice=tr("Use a newer version of GelPoLight Studio"),
+            )
+        if content.get("format") != FORMAT or version != VERSION:
+            raise ValueError("it is not marked as decisions of version 1")
+        return _parse(content)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise InputError(
+            tr("the decisions cannot be used ({reason})").format(reason=error),
+            where=str(path),
+            advice=tr("Mend the file, or move it away to go back to what was detected"),
+        ) from error
+
+
+def write_decisions(decisions: Decisions, folder: Path) -> None:
+    """Write a session's decisions, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "excluded": sorted(decisions.excluded),
+        "mirror_spots_px": {
+            CHANNEL_KEYS[led]: list(point) for led, point in sorted(decisions.spots_px.items())
+        },
+        "balls_px": {
+            name: [circle.u_px, circle.v_px, circle.radius_px]
+            for name, circle in sorted(decisions.balls.items())
+        },
+        "reflectance_nodes": {
+            CHANNEL_KEYS[channel]: [list(node) for node in nodes]
+            for channel, nodes in sorted(decisions.curves.items())
+        },
+    }
+
+    def write(stream: BinaryIO) -> None:
+        tomli_w.dump(content, stream)
+
+    write_atomically(folder / FILE_NAME, write)
+
+
+def _parse(content: Mapping[str, Any]) -> Decisions:
+    excluded = content.get("excluded", [])
+    if not all(isinstance(name, str) for name in excluded):
+        raise ValueError("excluded is not a list of names")
+    return Decisions(
+        frozenset(excluded),
+        {
+            CHANNEL_KEYS.index(key): _numbers(point, 2)
+            for key, point in content.get("mirror_spots_px", {}).items()
+        },
+        {
+            str(name): PlacedCircle(*_circle(circle))
+            for name, circle in content.get("balls_px", {}).items()
+        },
+        {
+            CHANNEL_KEYS.index(key): _nodes(nodes)
+            for key, nodes in content.get("reflectance_nodes", {}).items()
+        },
+    )
+
+
+def _numbers(values: Any, count: int) -> Any:
+    if not isinstance(values, list) or len(values) != count:
+        raise ValueError(f"{values!r} is not {count} numbers"[:80])
+    if not all(type(v) in (int, float) and math.isfinite(v) for v in values):
+        raise ValueError(f"{values!r} is not {count} numbers"[:80])
+    return tuple(float(v) for v in values)
+
+
+def _circle(values: Any) -> tuple[float, float, float]:
+    u, v, radius = _numbers(values, 3)
+    if radius <= 0.0:
+        raise ValueError(f"a radius of {radius:g} px")
+    return u, v, radius
+
+
+def _nodes(values: Any) -> tuple[Point, ...]:
+    if not isinstance(values, list) or not 2 <= len(values) <= MOST_NODES:
+        raise ValueError(f"a curve needs 2 to {MOST_NODES} nodes")
+    nodes = tuple(_numbers(node, 2) for node in values)
+    for (c0, v0), (c1, v1) in pairwise(nodes):
+        if not (c1 > c0 and v1 >= v0):
+            raise ValueError("the nodes of a curve do not rise")
+    return nodes
