@@ -11,9 +11,8 @@ import numpy as np
 
 from gelpolight_core import __version__
 from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.stages import (
-    FOLDERS,
-    Stage,
     StageResults,
     press_noise,
     require_balls,

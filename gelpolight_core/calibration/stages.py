@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import FullModel, sensor_stack
+from gelpolight_core.calibration.inputs import NEEDS, Stage, inputs_of
 from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
@@ -46,46 +46,6 @@ from gelpolight_core.translation import tr
 Map = NDArray[np.float32]
 Progress = Callable[[float], None]
 T = TypeVar("T")
-
-
-class Stage(StrEnum):
-    """A stage, in the order in which a calibration goes through them."""
-
-    LENS = "lens"
-    TOP_POSE = "top_pose"
-    LIGHTS = "lights"
-    RADIANCE = "radiance"
-    BACKGROUND = "background"
-    BALLS = "balls"
-    REFLECTANCE = "reflectance"
-    JOINT = "joint"
-
-
-FOLDERS = MappingProxyType(
-    {
-        Stage.LENS: "checkerboard",
-        Stage.TOP_POSE: "top_pose",
-        Stage.LIGHTS: "mirror",
-        Stage.RADIANCE: "whiteboard",
-        Stage.BACKGROUND: "background",
-        Stage.BALLS: "balls",
-    }
-)
-"""Folder of the pictures of each stage that has its own."""
-
-NEEDS = MappingProxyType(
-    {
-        Stage.LENS: (),
-        Stage.TOP_POSE: (Stage.LENS,),
-        Stage.LIGHTS: (Stage.TOP_POSE,),
-        Stage.RADIANCE: (Stage.LIGHTS,),
-        Stage.BACKGROUND: (Stage.TOP_POSE,),
-        Stage.BALLS: (Stage.RADIANCE, Stage.BACKGROUND),
-        Stage.REFLECTANCE: (Stage.BALLS,),
-        Stage.JOINT: (Stage.REFLECTANCE,),
-    }
-)
-"""Stages whose results a stage builds on, directly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,53 +137,6 @@ def require_balls(results: StageResults) -> None:
             raise ball.fault
 
 
-def fingerprints(session: Session, hashes: Callable[[Path], str] = file_hash) -> dict[Stage, str]:
-    """Return for each stage a text that changes with all that its result rests on.
-
-    Parameters
-    ----------
-    session : Session
-        Pictures, description and decisions.
-    hashes : callable, optional
-        File to hash; one that remembers saves reading every picture again.
-    """
-    found: dict[Stage, str] = {}
-    for stage in Stage:
-        digest = hashlib.sha256(stage.value.encode())
-        for need in NEEDS[stage]:
-            digest.update(found[need].encode())
-        digest.update(repr(_stated(stage, session)).encode())
-        if stage in FOLDERS:
-            for path in session.found(FOLDERS[stage]):
-                digest.update(f"{path.name} {hashes(path)}\n".encode())
-        found[stage] = digest.hexdigest()
-    return found
-
-
-def _stated(stage: Stage, session: Session) -> object:
-    """Return what a person stated or decided that a stage uses."""
-    sensor, decisions = session.sensor, session.decisions
-    match stage:
-        case Stage.LENS:
-            return session.checkerboard
-        case Stage.TOP_POSE:
-            return (
-                session.top_pose,
-                sensor.elastomer_thickness_mm,
-                sensor.elastomer_refractive_index,
-                sensor.window_thickness_mm,
-                sensor.window_refractive_index,
-                sensor.working_diameter_mm,
-            )
-        case Stage.LIGHTS:
-            return sensor.led_height_mm, sorted(decisions.spots_px.items())
-        case Stage.BALLS:
-            radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
-            return radii, sorted(decisions.balls.items())
-        case _:
-            return None
-
-
 def _need(value: T | None, what: str) -> T:
     if value is None:
         raise InputError(
@@ -287,7 +200,7 @@ def _run_background(session: Session, results: StageResults, _tell: Progress) ->
 
 def _run_balls(session: Session, results: StageResults, tell: Progress) -> StageResults:
     known = {ball.key: ball for ball in results.balls}
-    rests_on = fingerprints(session)
+    rests_on = {stage: inputs.fingerprint for stage, inputs in inputs_of(session).items()}
     files = session.files("balls")
     balls = []
     for index, path in enumerate(files):

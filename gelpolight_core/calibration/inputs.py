@@ -1,0 +1,146 @@
+"""What each stage of a calibration rests on, so that what has become stale is known."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from types import MappingProxyType
+
+from gelpolight_core.session.session import Session, file_hash
+from gelpolight_core.translation import tr
+
+
+class Stage(StrEnum):
+    """A stage, in the order in which a calibration goes through them."""
+
+    LENS = "lens"
+    TOP_POSE = "top_pose"
+    LIGHTS = "lights"
+    RADIANCE = "radiance"
+    BACKGROUND = "background"
+    BALLS = "balls"
+    REFLECTANCE = "reflectance"
+    JOINT = "joint"
+
+
+FOLDERS = MappingProxyType(
+    {
+        Stage.LENS: "checkerboard",
+        Stage.TOP_POSE: "top_pose",
+        Stage.LIGHTS: "mirror",
+        Stage.RADIANCE: "whiteboard",
+        Stage.BACKGROUND: "background",
+        Stage.BALLS: "balls",
+    }
+)
+"""Folder of the pictures of each stage that has its own."""
+
+NEEDS = MappingProxyType(
+    {
+        Stage.LENS: (),
+        Stage.TOP_POSE: (Stage.LENS,),
+        Stage.LIGHTS: (Stage.TOP_POSE,),
+        Stage.RADIANCE: (Stage.LIGHTS,),
+        Stage.BACKGROUND: (Stage.TOP_POSE,),
+        Stage.BALLS: (Stage.RADIANCE, Stage.BACKGROUND),
+        Stage.REFLECTANCE: (Stage.BALLS,),
+        Stage.JOINT: (Stage.REFLECTANCE,),
+    }
+)
+"""Stages whose results a stage builds on, directly."""
+
+
+@dataclass(frozen=True, slots=True)
+class StageInputs:
+    """All that a stage's result rests on.
+
+    Attributes
+    ----------
+    pictures : tuple of (name, SHA-256)
+        Its own pictures, those that are not excluded.
+    stated : str
+        What a person stated or decided that it uses.
+    earlier : tuple of str
+        Fingerprints of the stages that it needs.
+    """
+
+    pictures: tuple[tuple[str, str], ...]
+    stated: str
+    earlier: tuple[str, ...]
+
+    @property
+    def fingerprint(self) -> str:
+        """A text that changes with any of them."""
+        return hashlib.sha256(repr((self.pictures, self.stated, self.earlier)).encode()).hexdigest()
+
+
+def inputs_of(
+    session: Session, hashes: Callable[[Path], str] = file_hash
+) -> dict[Stage, StageInputs]:
+    """Return what every stage rests on at present.
+
+    Parameters
+    ----------
+    session : Session
+        Pictures, description and decisions.
+    hashes : callable, optional
+        File to hash; one that remembers saves reading every picture again.
+    """
+    found: dict[Stage, StageInputs] = {}
+    for stage in Stage:
+        files = session.found(FOLDERS[stage]) if stage in FOLDERS else ()
+        found[stage] = StageInputs(
+            tuple((path.name, hashes(path)) for path in files),
+            repr(_stated(stage, session)),
+            tuple(found[need].fingerprint for need in NEEDS[stage]),
+        )
+    return found
+
+
+def changes_between(before: StageInputs, now: StageInputs) -> tuple[str, ...]:
+    """Say in words what has changed since a result was made."""
+    old, new = dict(before.pictures), dict(now.pictures)
+    said = []
+    added = [name for name in new if name not in old]
+    gone = [name for name in old if name not in new]
+    other = [name for name in new if name in old and new[name] != old[name]]
+    for names, text in (
+        (added, tr("{names} added")),
+        (gone, tr("{names} left out")),
+        (other, tr("{names} changed")),
+    ):
+        if names:
+            more = tr(" and {n} more").format(n=len(names) - 3) if len(names) > 3 else ""
+            said.append(text.format(names=", ".join(names[:3]) + more))
+    if before.stated != now.stated:
+        said.append(tr("a stated value or a correction by hand changed"))
+    if before.earlier != now.earlier:
+        said.append(tr("an earlier stage changed"))
+    return tuple(said)
+
+
+def _stated(stage: Stage, session: Session) -> object:
+    """Return what a person stated or decided that a stage uses."""
+    sensor, decisions = session.sensor, session.decisions
+    match stage:
+        case Stage.LENS:
+            return session.checkerboard
+        case Stage.TOP_POSE:
+            return (
+                session.top_pose,
+                sensor.elastomer_thickness_mm,
+                sensor.elastomer_refractive_index,
+                sensor.window_thickness_mm,
+                sensor.window_refractive_index,
+                sensor.working_diameter_mm,
+            )
+        case Stage.LIGHTS:
+            return sensor.led_height_mm, sorted(decisions.spots_px.items())
+        case Stage.BALLS:
+            radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
+            return radii, sorted(decisions.balls.items())
+        case _:
+            return None

@@ -1,0 +1,205 @@
+"""A calibration in the making: nothing is lost, what is stale is known, and hands may correct."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import CalibrationProject, Cancelled, StageState
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.decisions import PlacedCircle
+from gelpolight_core.session.description import create_session
+from gelpolight_core.session.session import read_session
+
+
+@pytest.fixture(scope="module")
+def computed(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> CalibrationProject:
+    """Return a project on a copy of the virtual session with every stage computed."""
+    folder = tmp_path_factory.mktemp("project") / "session"
+    shutil.copytree(virtual_session, folder)
+    project = CalibrationProject(folder)
+    while project.stale():
+        project.compute(project.stale()[0])
+    return project
+
+
+@pytest.fixture
+def project(computed: CalibrationProject, tmp_path: Path) -> CalibrationProject:
+    """Return a copy of the computed project in a folder of its own."""
+    folder = tmp_path / "session"
+    shutil.copytree(computed.session.folder, folder)
+    copied = CalibrationProject(folder)
+    copied._results, copied._outcomes = computed._results, dict(computed._outcomes)
+    return copied
+
+
+def test_step_by_step_gives_the_same_calibration_as_all_at_once(
+    computed: CalibrationProject, virtual_calibration: Calibration
+) -> None:
+    made = computed.finish().calibration
+    np.testing.assert_array_equal(made.radiance, virtual_calibration.radiance)
+    np.testing.assert_array_equal(made.factors, virtual_calibration.factors)
+    np.testing.assert_array_equal(made.led_positions_mm, virtual_calibration.led_positions_mm)
+    assert made.full is not None
+    assert virtual_calibration.full is not None
+    np.testing.assert_array_equal(
+        made.full.led_positions_mm, virtual_calibration.full.led_positions_mm
+    )
+    assert made.full.membrane == virtual_calibration.full.membrane
+
+
+def test_everything_passes_or_says_what_to_do(computed: CalibrationProject) -> None:
+    for status in computed.statuses().values():
+        assert status.state in (StageState.PASS, StageState.WARN)
+        assert status.sentence
+
+
+def test_a_change_makes_stale_what_rests_on_it_and_nothing_else(
+    project: CalibrationProject,
+) -> None:
+    project.exclude(Stage.BALLS, project.session.found("balls")[0].name)
+    states = {stage: status.state for stage, status in project.statuses().items()}
+    late = {Stage.BALLS, Stage.REFLECTANCE, Stage.JOINT}
+    assert {s for s, state in states.items() if state is StageState.STALE} == late
+    assert project.stale() == tuple(s for s in Stage if s in late)
+    assert "left out" in project.statuses()[Stage.BALLS].sentence
+
+
+def test_taking_a_change_back_makes_the_result_present_again(project: CalibrationProject) -> None:
+    name = project.session.found("balls")[0].name
+    project.exclude(Stage.BALLS, name)
+    project.exclude(Stage.BALLS, name, False)
+    assert project.stale() == ()
+
+
+def test_another_led_height_makes_all_after_the_lights_stale(project: CalibrationProject) -> None:
+    sensor = replace(project.session.sensor, led_height_mm=15.0)
+    project.set_sensor(sensor)
+    stale = set(project.stale())
+    assert Stage.LIGHTS in stale
+    assert Stage.JOINT in stale
+    assert Stage.TOP_POSE not in stale
+    assert read_session(project.session.folder).sensor.led_height_mm == 15.0
+
+
+def test_captures_and_decisions_are_on_disk_at_once(project: CalibrationProject) -> None:
+    frames = [np.full((480, 640, 3), value, np.uint8) for value in (10, 13)]
+    name = project.add_capture(Stage.BALLS, frames)
+    project.set_ball_radius(name, 2.5)
+    project.place_ball(name, PlacedCircle(320.5, 200.25, 40.0))
+    project.place_spot(1, (100.25, 50.5))
+    other = CalibrationProject(project.session.folder)
+    assert other.session == project.session
+    raw = cv2.imread(str(other.session.folder / "balls" / name), cv2.IMREAD_UNCHANGED)
+    assert raw.dtype == np.uint16
+    assert np.all(raw == round(11.5 * 257))
+
+
+def test_a_new_capture_of_a_single_view_takes_the_place_of_the_former(
+    project: CalibrationProject,
+) -> None:
+    before = project.session.captured("mirror")
+    name = project.add_capture(Stage.LIGHTS, [np.zeros((480, 640, 3), np.uint8)])
+    assert [p.name for p in project.session.found("mirror")] == [name]
+    assert all(path.is_file() for path in before)
+
+
+def test_a_name_is_never_given_twice(project: CalibrationProject) -> None:
+    frame = [np.zeros((480, 640, 3), np.uint8)]
+    first = project.add_capture(Stage.LENS, frame)
+    project.exclude(Stage.LENS, first)
+    assert project.add_capture(Stage.LENS, frame) != first
+
+
+def test_a_picture_without_a_ball_fails_and_can_be_left_out(project: CalibrationProject) -> None:
+    bare = project.session.found("background")[0]
+    raw = cv2.imread(str(bare), cv2.IMREAD_UNCHANGED)[..., ::-1]
+    name = project.add_capture(Stage.BALLS, [raw])
+    project.set_ball_radius(name, 3.0)
+    status = project.compute(Stage.BALLS)
+    assert status.state is StageState.FAIL
+    assert name in status.sentence
+    with pytest.raises(InputError):
+        project.finish()
+    project.exclude(Stage.BALLS, name)
+    assert project.compute(Stage.BALLS).state in (StageState.PASS, StageState.WARN)
+
+
+def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
+    project: CalibrationProject,
+) -> None:
+    project.add_capture(Stage.LIGHTS, [np.zeros((480, 640, 3), np.uint8)])
+    status = project.compute(Stage.LIGHTS)
+    assert status.state is StageState.FAIL
+    assert "black" in status.sentence
+    assert project.results.lens is not None
+    assert Stage.RADIANCE not in project.stale()
+    assert project.statuses()[Stage.RADIANCE].state is StageState.STALE
+
+
+def test_a_ball_placed_by_hand_is_taken_where_it_was_placed(project: CalibrationProject) -> None:
+    """A circle drawn where the detection found one gives the same ball within the hand's skill."""
+    found = project.results.presses[0]
+    name = project.results.balls[0].file
+    table, lens = project.results.table, project.results.lens
+    assert table is not None
+    assert lens is not None
+    column, row = (round(c) for c in found.indentation.centre)
+    centre = np.array([table.u_px[row, column], table.v_px[row, column]], float)
+    reach = round(found.indentation.contact_radius_px)
+    radius = float(table.u_px[row, column + reach] - centre[0])
+    project.place_ball(name, PlacedCircle(float(centre[0]), float(centre[1]), radius))
+    project.compute(Stage.BALLS)
+    placed = project.results.presses[0]
+    assert np.hypot(*(np.array(placed.pose.centre_mm) - found.pose.centre_mm)) < 0.05
+    assert placed.contact_radius_mm == pytest.approx(found.contact_radius_mm, rel=0.03)
+    assert placed.indentation.coverage == 1.0
+
+
+def test_a_spot_placed_by_hand_moves_its_led(project: CalibrationProject) -> None:
+    lights = project.results.lights
+    assert lights is not None
+    u, v = lights.spots.spots[2].centre_px
+    project.place_spot(2, (u + 5.0, v))
+    project.compute(Stage.LIGHTS)
+    moved = project.results.lights
+    assert moved is not None
+    assert moved.spots.spots[2].centre_px == (u + 5.0, v)
+    assert moved.spots.spots[2].centre_sd_px == 0.5
+    assert moved.led_positions_mm[2, 0] != lights.led_positions_mm[2, 0]
+    np.testing.assert_array_equal(moved.led_positions_mm[:2], lights.led_positions_mm[:2])
+
+
+def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
+    project: CalibrationProject,
+) -> None:
+    project.set_ball_radius(project.session.found("balls")[0].name, 2.9)
+
+    def stop(_share: float) -> None:
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        project.compute(Stage.BALLS, stop)
+    assert project.statuses()[Stage.BALLS].state is StageState.STALE
+    assert project.compute(Stage.BALLS).state is not StageState.STALE
+
+
+def test_an_unfinished_session_says_which_stage_is_open(
+    virtual_session: Path, tmp_path: Path
+) -> None:
+    session = read_session(virtual_session)
+    create_session(replace(session, folder=tmp_path / "new"))
+    project = CalibrationProject(tmp_path / "new")
+    assert project.stale() == ()
+    assert {s.state for s in project.statuses().values()} == {StageState.EMPTY}
+    with pytest.raises(InputError, match="lens has no present result"):
+        project.finish()
+    with pytest.raises(InputError, match="already holds a session"):
+        create_session(replace(session, folder=tmp_path / "new"))
