@@ -25,7 +25,7 @@ class RayTable:
 
     Attributes
     ----------
-    x_mm, y_mm : (rows, columns)
+    x_mm, y_mm : (rows, columns), or the shape of the points traced
         Point on the undeformed top surface, sensor frame.
     slope_x, slope_y : (rows, columns)
         Sideways move per mm of depth: the ray is at ``x_mm - depth * slope_x`` at a depth below the
@@ -214,6 +214,24 @@ def trace_pixels(camera: CameraDesign, layers: LayerDesign) -> RayTable:
         One entry per pixel; NaN where a ray never reaches the layers.
     """
     v, u = np.mgrid[: camera.height_px, : camera.width_px].astype(np.float64)
+    return trace_points(camera, layers, u, v)
+
+
+def trace_points(camera: CameraDesign, layers: LayerDesign, u: Array, v: Array) -> RayTable:
+    """Trace the rays of any points of the picture to the undeformed top surface.
+
+    Parameters
+    ----------
+    camera, layers : CameraDesign, LayerDesign
+        The sensor.
+    u, v : (...)
+        Pixel coordinates; they need not lie inside the picture.
+
+    Returns
+    -------
+    RayTable
+        One entry per point; NaN where a ray never reaches the layers.
+    """
     direction = pixel_directions(camera, u, v) @ sensor_axes(layers).T
     sideways = np.hypot(direction[..., 0], direction[..., 1])
     length = np.hypot(sideways, direction[..., 2])

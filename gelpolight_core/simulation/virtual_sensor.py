@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.boards import BoardPose, board_on_top, board_picture
+from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
 from gelpolight_core.simulation.lamps import Lamp, PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.membrane import reflectance_factor
@@ -102,7 +103,7 @@ class VirtualSensor:
         self._cover = self._rim_cover()
         self._membrane = self._flat(self.material) * self._factor_seen()[..., None]
 
-    def brightness(self, state: State, *, samples: int = 3) -> Array:
+    def brightness(self, state: State, *, samples: int = 3, interrupt: Interrupt = never) -> Array:
         """Return the exact picture (rows, columns, 3), linear, before noise and saturation.
 
         Parameters
@@ -111,6 +112,8 @@ class VirtualSensor:
             What is before the camera.
         samples : int, optional
             Rays per pixel and side at the edges of what is pressed; 1 is fastest.
+        interrupt : callable, optional
+            Called now and then; what it raises stops the work.
         """
         camera, photometry = self.design.camera, self.design.photometry
         if isinstance(state, (Checkerboard, BoardOnTop)):
@@ -126,8 +129,9 @@ class VirtualSensor:
             if isinstance(state, PressedMembrane):
                 shade_pressed(
                     light, self.rays, state.surface, self.factors, self._table, self.material,
-                    samples=samples,
+                    samples=samples, interrupt=interrupt,
                 )  # fmt: skip
+            interrupt()
             light *= self.exposure
         return blurred(mixed(light, photometry.crosstalk), camera.blur_sigma_px)
 
