@@ -93,12 +93,12 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         self.selected = name
         self.update()
 
-    def boundingRect(self) -> QRectF:  # noqa: D102, N802
+    def boundingRect(self) -> QRectF:  # noqa: D102
         width, height = self._size
         # Marks have a width on the screen, of which the picture's coordinates know nothing.
         return QRectF(-0.5 * width, -0.5 * height, 2.0 * width, 2.0 * height)
 
-    def hoverEvent(self, event: Any) -> None:  # noqa: D102, N802
+    def hoverEvent(self, event: Any) -> None:  # noqa: D102
         over = None if event.isExit() else self._grip_at(event.pos())
         if over is None:
             self.unsetCursor()
@@ -108,7 +108,7 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         resizes = over[1] is Grip.RADIUS
         self.setCursor(Qt.CursorShape.SizeHorCursor if resizes else Qt.CursorShape.SizeAllCursor)
 
-    def mouseClickEvent(self, event: Any) -> None:  # noqa: D102, N802
+    def mouseClickEvent(self, event: Any) -> None:  # noqa: D102
         over = self._grip_at(event.pos())
         if over is None or event.button() != Qt.MouseButton.LeftButton or event.double():
             event.ignore()
@@ -117,7 +117,7 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         self._take(over)
         self._held = None
 
-    def mouseDragEvent(self, event: Any) -> None:  # noqa: D102, N802
+    def mouseDragEvent(self, event: Any) -> None:  # noqa: D102
         if event.isStart():
             over = self._grip_at(event.buttonDownPos())
             if over is None or event.button() != Qt.MouseButton.LeftButton:
@@ -204,9 +204,7 @@ def _paint_line(painter: QPainter, line: Line, to_screen: QTransform) -> None:
     _stroke(painter, line.role, lambda: draw(polygon))
 
 
-def _paint_circle(
-    painter: QPainter, circle: Circle, to_screen: QTransform, selected: bool
-) -> None:
+def _paint_circle(painter: QPainter, circle: Circle, to_screen: QTransform, selected: bool) -> None:
     centre = to_screen.map(QPointF(circle.u, circle.v))
     edge = to_screen.map(QPointF(circle.u + circle.radius_px, circle.v))
     radius = abs(edge.x() - centre.x())
@@ -224,9 +222,7 @@ def _paint_grip(painter: QPainter, at: QPointF, role: Role, selected: bool) -> N
     painter.drawRect(box)
 
 
-def _paint_marker(
-    painter: QPainter, marker: Marker, to_screen: QTransform, selected: bool
-) -> None:
+def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, selected: bool) -> None:
     at = to_screen.map(QPointF(marker.u, marker.v))
     x, y, s = at.x(), at.y(), MARKER_PX
 

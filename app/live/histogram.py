@@ -31,7 +31,7 @@ class Histogram(QWidget):
         self.resize(self.sizeHint())
         self._counts: NDArray[np.int64] | None = None
 
-    def sizeHint(self) -> QSize:  # noqa: D102, N802
+    def sizeHint(self) -> QSize:  # noqa: D102
         return QSize(232, 104)
 
     def show_counts(self, counts: NDArray[np.int64] | None) -> None:
@@ -39,7 +39,7 @@ class Histogram(QWidget):
         self._counts = counts
         self.update()
 
-    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
+    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)

@@ -87,9 +87,7 @@ def measure_exposure(rgb: Rgb) -> Exposure:
         return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * share)))
     if brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
-        text = tr(
-            "Too dark: the brightest places reach {p} % of the scale. Lengthen the exposure."
-        )
+        text = tr("Too dark: the brightest places reach {p} % of the scale. Lengthen the exposure.")
         return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * brightest)))
     text = tr("Exposure is good: the brightest places reach {p} % of the scale.")
     return Exposure(share, brightest, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))

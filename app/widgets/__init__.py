@@ -1,1 +1,1 @@
-"""Small widgets shared by all pages."""
+"""Small widgets that several pages share."""

@@ -1,4 +1,4 @@
-"""Names for controls: for tests and style sheets, for screen readers, and for the pointer."""
+"""Names for widgets: one for tests and scripts, one for screen readers, a tip for everybody."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ from typing import TypeVar
 
 from PySide6.QtWidgets import QWidget
 
-Named = TypeVar("Named", bound=QWidget)
+W = TypeVar("W", bound=QWidget)
 
 
-def named(widget: Named, name: str, accessible: str, tip: str = "") -> Named:
-    """Name a control and return it.
+def named(widget: W, name: str, accessible: str, tip: str = "") -> W:
+    """Give a widget its names and return it.
 
     Parameters
     ----------
     widget : QWidget
-        The control.
+        To be named.
     name : str
-        Dotted path, such as ``calibrate.capture``.
+        A dotted path such as ``calibrate.capture``.
     accessible : str
-        What a screen reader says, translated.
+        What a screen reader says.
     tip : str, optional
-        What the pointer shows, translated; for whom a word is not enough.
+        What the pointer shows, where a word is not enough.
     """
     widget.setObjectName(name)
     widget.setAccessibleName(accessible)
-    widget.setToolTip(tip)
+    if tip:
+        widget.setToolTip(tip)
     return widget
