@@ -38,7 +38,7 @@ class LibraryModel(QAbstractTableModel):
         Returns the age beyond which a calibration is marked.
     """
 
-    TITLES = ("Sensor", "Made", "Age", "Verdict", "Validated", "Model", "In use", "Identity")
+    TITLES = ("", "Sensor", "Made", "Age", "Verdict", "Validated", "Model", "Identity")
 
     def __init__(self, oldest_days: Callable[[], float]) -> None:
         super().__init__()
@@ -71,7 +71,7 @@ class LibraryModel(QAbstractTableModel):
     ) -> Any:
         """Return a column's title."""
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return tr(self.TITLES[section])
+            return self.TITLES[section] and tr(self.TITLES[section])
         return None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
@@ -86,6 +86,8 @@ class LibraryModel(QAbstractTableModel):
                 return theme.colour(cell.role)
             case Qt.ItemDataRole.ToolTipRole:
                 return cell.tip or None
+            case Qt.ItemDataRole.AccessibleTextRole:
+                return cell.text or cell.tip
             case Qt.ItemDataRole.UserRole:
                 return cell.key or cell.text
         return None
@@ -96,17 +98,18 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
     if entry.summary is None:
         nothing = Cell("")
         return (
+            _in_use(entry),
             Cell(entry.serial),
             nothing,
             nothing,
             Cell(tr("Broken"), "broken", "fail", entry.broken, key=3),
             nothing,
             nothing,
-            _in_use(entry),
             Cell(entry.path.name, tip=str(entry.path)),
         )
     verdict = entry.summary.verdict
     return (
+        _in_use(entry),
         Cell(entry.serial),
         made_cell(entry),
         age_cell(entry.age_days(now), oldest_days),
@@ -118,7 +121,6 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
         ),
         validated_cell(entry),
         Cell(entry.summary.model),
-        _in_use(entry),
         Cell(entry.summary.identity, tip=str(entry.path)),
     )
 
@@ -157,4 +159,4 @@ def validated_cell(entry: Entry) -> Cell:
 
 
 def _in_use(entry: Entry) -> Cell:
-    return Cell(tr("In use"), "use", "accent", key=1) if entry.in_use else Cell("", key=0)
+    return Cell("", "use", "accent", tr("In use"), key=1) if entry.in_use else Cell("", key=0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
 
 from app.shell.icons import application_icon
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
+
+WIDTH = 480
 
 
 class Welcome(QWidget):
@@ -35,20 +37,27 @@ class Welcome(QWidget):
         )
         text.setWordWrap(True)
         text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        text.setMinimumWidth(460)
-        column = QVBoxLayout(self)
+        middle = QWidget(self)
+        middle.setFixedWidth(WIDTH)
+        column = QVBoxLayout(middle)
         column.addStretch(2)
-        for widget in (sign, title, text):
-            column.addWidget(widget, 0, Qt.AlignmentFlag.AlignHCenter)
+        column.addWidget(sign, 0, Qt.AlignmentFlag.AlignHCenter)
+        column.addWidget(title, 0, Qt.AlignmentFlag.AlignHCenter)
+        column.addWidget(text)
         column.addSpacing(16)
         for way in ways:
-            button = named(
-                QToolButton(self), f"welcome.{way.objectName()}", way.text().replace("&", "")
-            )
-            button.setDefaultAction(way)
-            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-            button.setIconSize(QSize(24, 24))
-            button.setMinimumSize(320, 44)
-            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-            column.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
+            column.addWidget(_button(way), 0, Qt.AlignmentFlag.AlignHCenter)
         column.addStretch(3)
+        layout = QHBoxLayout(self)
+        layout.addWidget(middle)
+
+
+def _button(way: QAction) -> QToolButton:
+    button = QToolButton()
+    named(button, f"welcome.{way.objectName()}", way.text().replace("&", ""))
+    button.setDefaultAction(way)
+    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+    button.setIconSize(QSize(24, 24))
+    button.setMinimumSize(320, 44)
+    button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+    return button

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
+    QLabel,
     QLineEdit,
     QPushButton,
     QWidget,
@@ -87,7 +88,9 @@ class PreferencesDialog(QDialog):
         row = QHBoxLayout()
         row.addWidget(self._folder, 1)
         row.addWidget(choose)
-        self._form.addRow(tr("&Workspace folder"), row)
+        label = QLabel(tr("&Workspace folder"), self)
+        label.setBuddy(self._folder)
+        self._form.addRow(label, row)
 
     def _number(
         self, key: str, label: str, unit: str, low: float, high: float, decimals: int

@@ -34,7 +34,7 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
         if keys and action.objectName() and action.isEnabled():
             group = action.objectName().partition(".")[0]
             found.append(Shortcut(group, keys, action.text().replace("&", "").rstrip(".… ")))
-    return tuple(sorted(found, key=lambda s: s.group))
+    return tuple(sorted(dict.fromkeys(found), key=lambda s: s.group))
 
 
 class ShortcutSheet(QDialog):

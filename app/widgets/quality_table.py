@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QEvent, QSize, Qt
-from PySide6.QtGui import QGuiApplication, QKeySequence, QResizeEvent
+from PySide6.QtCore import QEvent, QRect, QSize, Qt
+from PySide6.QtGui import QGuiApplication, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -25,6 +25,8 @@ from gelpolight_core.translation import tr
 
 VERDICT_COLUMN, LABEL_COLUMN, VALUE_COLUMN, LIMIT_COLUMN = range(4)
 COLUMNS = 4
+ROW_HEIGHT = 24
+MARGIN = 6
 
 
 def verdict_word(verdict: Verdict) -> str:
@@ -81,9 +83,8 @@ class QualityTableWidget(QWidget):
         self._shown: tuple[tuple[str, bool], ...] = ()
         self._table = QualityTable()
         self._grid = named(QTableWidget(0, COLUMNS, self), f"{name}.table", accessible)
-        self._grid.setHorizontalHeaderLabels(
-            [tr("Verdict"), tr("Figure"), tr("Value"), tr("Limit")]
-        )
+        # Verdict, figure, value and limit say themselves what they are.
+        self._grid.horizontalHeader().hide()
         self._grid.verticalHeader().hide()
         self._grid.setShowGrid(False)
         self._grid.setWordWrap(True)
@@ -96,8 +97,9 @@ class QualityTableWidget(QWidget):
         header = self._grid.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(LABEL_COLUMN, QHeaderView.ResizeMode.Stretch)
-        header.setHighlightSections(False)
         header.setMinimumSectionSize(80)
+        header.sectionResized.connect(self._fit)
+        self._grid.verticalHeader().setMinimumSectionSize(1)
         copy = make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
         copy.setShortcut(QKeySequence.StandardKey.Copy)
         copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
@@ -145,7 +147,9 @@ class QualityTableWidget(QWidget):
         verdict.setText(verdict_word(figure.verdict))
         verdict.setIcon(icon(figure.verdict.value, figure.verdict.value))
         verdict.setForeground(theme.colour(figure.verdict.value))
-        self._item(row, LABEL_COLUMN).setText(figure.label)
+        label = self._item(row, LABEL_COLUMN)
+        label.setText(figure.label)
+        label.setToolTip(figure.label)
         for column, text in (
             (VALUE_COLUMN, value_text(figure)),
             (LIMIT_COLUMN, limit_text(figure)),
@@ -168,16 +172,21 @@ class QualityTableWidget(QWidget):
             self._grid.setItem(row, column, item)
         return item
 
-    def _fit(self) -> None:
-        self._grid.resizeRowsToContents()
-        self._grid.setFixedHeight(
-            self._grid.horizontalHeader().sizeHint().height() + self._grid.verticalHeader().length()
-        )
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Wrap the advice to the new width."""
-        super().resizeEvent(event)
-        self._fit()
+    def _fit(self, *_: int) -> None:
+        """Wrap the advice to the width, and be as high as all rows."""
+        columns = range(LABEL_COLUMN, COLUMNS)
+        width = sum(self._grid.columnWidth(column) for column in columns) - 2 * MARGIN
+        metrics = self._grid.fontMetrics()
+        wrap = int(Qt.TextFlag.TextWordWrap)
+        line = max(ROW_HEIGHT, metrics.height() + MARGIN)
+        for row in range(self._grid.rowCount()):
+            item = self._grid.item(row, LABEL_COLUMN)
+            height = line
+            if item is not None and self._grid.columnSpan(row, LABEL_COLUMN) > 1:
+                area = QRect(0, 0, max(width, 50), 10_000)
+                height = metrics.boundingRect(area, wrap, item.text()).height() + MARGIN
+            self._grid.setRowHeight(row, height)
+        self._grid.setFixedHeight(self._grid.verticalHeader().length())
 
     def changeEvent(self, event: QEvent) -> None:
         """Take the colours of a new theme."""
