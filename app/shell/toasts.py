@@ -52,6 +52,7 @@ class Toast(QWidget):
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         sign = QLabel(self)
+        self._label.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
         sign.setPixmap(icon(*ICONS[kind]).pixmap(22, 22))
         sign.setAlignment(Qt.AlignmentFlag.AlignTop)
         close = named(QToolButton(self), "toast.close", tr("Close the message"), tr("Close"))
@@ -78,6 +79,16 @@ class Toast(QWidget):
         self._timer.setSingleShot(True)
         self._timer.timeout.connect(self.dismiss)
         self._restart()
+
+    def height_for(self, width: int) -> int:
+        """Return the height that the message needs at a width."""
+        layout = self.layout()
+        layout.activate()
+        return (
+            layout.totalHeightForWidth(width)
+            if layout.hasHeightForWidth()
+            else (layout.totalSizeHint().height())
+        )
 
     def again(self) -> None:
         """Count the same message instead of showing it twice."""
@@ -192,7 +203,7 @@ class Toasts(QObject):
         width = min(WIDTH, self._host.width() - 2 * MARGIN)
         bottom = self._host.height() - MARGIN
         for toast in reversed(self.shown()):
-            height = max(toast.heightForWidth(width), toast.sizeHint().height())
+            height = toast.height_for(width)
             bottom -= height
             toast.setGeometry(self._host.width() - width - MARGIN, bottom, width, height)
             toast.raise_()
