@@ -1,0 +1,136 @@
+"""Long work of the calibration in one thread, one job after the other."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from gelpolight_core.calibration.project import Cancelled
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+_LOG = logging.getLogger(__name__)
+POLL_MS = 50
+
+
+@dataclass
+class Job:
+    """One piece of work.
+
+    Attributes
+    ----------
+    title : str
+        What is shown while it runs.
+    work : callable
+        Gets a function to tell the share done to, which also stops the work when it was cancelled.
+    done : callable
+        Called in the GUI thread with what `work` returned.
+    """
+
+    title: str
+    work: Callable[[Callable[[float], None]], Any]
+    done: Callable[[Any], None] = field(default=lambda _result: None)
+    failed: Callable[[str], None] | None = None
+    share: float = 0.0
+    future: Future[Any] | None = None
+    cancel: threading.Event = field(default_factory=threading.Event)
+
+
+class Jobs(QObject):
+    """Runs jobs in their order; tells in the GUI thread how they fare.
+
+    Signals
+    -------
+    progressed(str, float)
+        Title and share of the job that runs; an empty title when there is none.
+    refused(str)
+        A sentence: why a job came to nothing.
+    """
+
+    progressed = Signal(str, float)
+    refused = Signal(str)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="calibration")
+        self._waiting: deque[Job] = deque()
+        self._timer = QTimer(self)
+        self._timer.setInterval(POLL_MS)
+        self._timer.timeout.connect(self._poll)
+        self._said = ("", 0.0)
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything runs or waits."""
+        return bool(self._waiting)
+
+    def submit(self, job: Job) -> None:
+        """Add a job to the end."""
+        job.future = self._pool.submit(job.work, lambda share: self._tell(job, share))
+        self._waiting.append(job)
+        self._timer.start()
+        self._say()
+
+    def cancel(self) -> None:
+        """Stop the job that runs, at its next step, and drop those that wait."""
+        for job in self._waiting:
+            job.cancel.set()
+            if job.future is not None:
+                job.future.cancel()
+
+    def close(self) -> None:
+        """Cancel everything and end the thread."""
+        self.cancel()
+        self._timer.stop()
+        self._pool.shutdown(wait=True)
+        self._waiting.clear()
+
+    def _tell(self, job: Job, share: float) -> None:
+        """Keep the share done; called in the working thread."""
+        if job.cancel.is_set():
+            raise Cancelled
+        job.share = share
+
+    def _poll(self) -> None:
+        while self._waiting and self._waiting[0].future is not None:
+            job = self._waiting[0]
+            assert job.future is not None
+            if not job.future.done():
+                break
+            self._waiting.popleft()
+            self._finish(job)
+        self._say()
+        if not self._waiting:
+            self._timer.stop()
+
+    def _finish(self, job: Job) -> None:
+        assert job.future is not None
+        if job.future.cancelled():
+            return
+        error = job.future.exception()
+        if error is None:
+            job.done(job.future.result())
+        elif isinstance(error, Cancelled):
+            self.refused.emit(tr("{title}: stopped").format(title=job.title))
+        elif isinstance(error, InputError):
+            (job.failed or self.refused.emit)(str(error))
+        else:
+            _LOG.error("%s failed", job.title, exc_info=error)
+            self.refused.emit(
+                tr("{title}: a fault of this program ({kind}); the log has it").format(
+                    title=job.title, kind=type(error).__name__
+                )
+            )
+
+    def _say(self) -> None:
+        said = (self._waiting[0].title, self._waiting[0].share) if self._waiting else ("", 0.0)
+        if said != self._said:
+            self._said = said
+            self.progressed.emit(*said)

@@ -1,0 +1,162 @@
+"""The last look at a calibration: every stage with its figures, and the button that saves it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.calibrate.states import is_done, state_colour, state_icon, state_word
+from app.calibrate.steps import Step
+from app.widgets.naming import named
+from app.widgets.quality_table import QualityTableWidget
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import StageState, StageStatus
+from gelpolight_core.translation import tr
+
+
+class ResultView(QWidget):
+    """All stages, and what can be done with the calibration.
+
+    Signals
+    -------
+    save_wanted(), report_wanted()
+        The buttons.
+    step_wanted(str)
+        Key of a step to go to.
+    """
+
+    save_wanted = Signal()
+    report_wanted = Signal()
+    step_wanted = Signal(str)
+
+    def __init__(self, steps: Sequence[Step], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "result", tr("Calibration"))
+        self._rows: dict[Stage, _StageRow] = {}
+        column = QVBoxLayout(self)
+        self.headline = named(QLabel(), "result.headline", tr("Verdict"))
+        self.headline.setWordWrap(True)
+        font = self.headline.font()
+        font.setPointSizeF(font.pointSizeF() * 1.2)
+        font.setBold(True)
+        self.headline.setFont(font)
+        column.addWidget(self.headline)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        inside = QWidget()
+        rows = QVBoxLayout(inside)
+        for step in steps:
+            for stage in step.stages:
+                if stage not in self._rows:
+                    self._rows[stage] = _StageRow(step)
+                    self._rows[stage].step_wanted.connect(self.step_wanted)
+                    rows.addWidget(self._rows[stage])
+        rows.addStretch(1)
+        scroll.setWidget(inside)
+        column.addWidget(scroll, 1)
+        buttons = QHBoxLayout()
+        self.save = named(
+            QPushButton(tr("&Save the calibration")), "result.save", tr("Save the calibration")
+        )
+        self.report = named(
+            QPushButton(tr("Write the &report…")), "result.report", tr("Write the report")
+        )
+        for button, signal in ((self.save, self.save_wanted), (self.report, self.report_wanted)):
+            button.setMinimumHeight(38)
+            button.clicked.connect(signal)
+            buttons.addWidget(button)
+        column.addLayout(buttons)
+        self.saved = named(QLabel(), "result.saved", tr("Where it was saved"))
+        self.saved.setWordWrap(True)
+        self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        column.addWidget(self.saved)
+
+    def show_statuses(self, statuses: Mapping[Stage, StageStatus], running: Stage | None) -> None:
+        """Show how every stage stands."""
+        for stage, row in self._rows.items():
+            row.show_status(statuses[stage], running=stage is running)
+        done = all(is_done(statuses[stage].state.value) for stage in self._rows)
+        made = all(
+            is_done(statuses[stage].state.value) or statuses[stage].state is StageState.FAIL
+            for stage in self._rows
+        )
+        open_steps = [s for s in statuses.values() if not is_done(s.state.value)]
+        if done:
+            warned = sum(s.state is StageState.WARN for s in statuses.values())
+            text = tr("Every stage is complete. Save the calibration, then validate it.")
+            if warned:
+                text = tr(
+                    "Every stage is complete, {n} with a warning. Look at the advice, then save."
+                ).format(n=warned)
+        elif running is not None:
+            text = tr("Computing: one moment.")
+        else:
+            text = tr("{n} stages are still open.").format(n=len(open_steps))
+        self.headline.setText(text)
+        self.save.setEnabled(done or (made and running is None))
+        self.report.setEnabled(self.save.isEnabled())
+
+
+class _StageRow(QWidget):
+    """One stage: sign, word, sentence, and its figures on demand."""
+
+    step_wanted = Signal(str)
+
+    def __init__(self, step: Step) -> None:
+        super().__init__()
+        self._step = step
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 2, 0, 2)
+        row = QHBoxLayout()
+        self._sign, self._word, self._said = QLabel(), QLabel(), QLabel()
+        self._said.setWordWrap(True)
+        self._word.setMinimumWidth(96)
+        self.more = named(
+            QToolButton(),
+            f"result.{step.key}.more",
+            tr("Figures of {title}").format(title=step.title),
+        )
+        self.more.setText(tr("Figures"))
+        self.more.setCheckable(True)
+        title = named(
+            QPushButton(step.title),
+            f"result.{step.key}",
+            tr("Go to {title}").format(title=step.title),
+        )
+        title.setFlat(True)
+        title.setMinimumWidth(130)
+        title.setStyleSheet("text-align: left;")
+        title.clicked.connect(lambda: self.step_wanted.emit(step.key))
+        row.addWidget(self._sign)
+        row.addWidget(title)
+        row.addWidget(self._word)
+        row.addWidget(self._said, 1)
+        row.addWidget(self.more)
+        column.addLayout(row)
+        self.table = QualityTableWidget(
+            f"result.{step.key}.quality", tr("Figures of {title}").format(title=step.title)
+        )
+        self.table.hide()
+        self.more.toggled.connect(self.table.setVisible)
+        column.addWidget(self.table)
+
+    def show_status(self, status: StageStatus, *, running: bool) -> None:
+        state = "running" if running else status.state.value
+        self._sign.setPixmap(state_icon(state).pixmap(18, 18))
+        self._word.setText(state_word(state).capitalize())
+        self._word.setStyleSheet(f"color: {state_colour(state).name()}; font-weight: bold;")
+        self._said.setText(status.sentence)
+        self.table.set_table(status.quality)
+        self.more.setVisible(bool(status.quality.figures))

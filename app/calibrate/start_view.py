@@ -1,0 +1,86 @@
+"""Where a calibration begins: a new sensor, a session folder, or one of the last ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QLabel, QPushButton, QVBoxLayout, QWidget
+
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+MOST_RECENT = 6
+
+
+class StartView(QWidget):
+    """Offers the ways to begin.
+
+    Signals
+    -------
+    new_wanted(), open_wanted(), demo_wanted()
+        The buttons.
+    recent_wanted(str)
+        Folder of a recent session.
+    """
+
+    new_wanted = Signal()
+    open_wanted = Signal()
+    demo_wanted = Signal()
+    recent_wanted = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "start", tr("Begin a calibration"))
+        column = QVBoxLayout(self)
+        column.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        column.setSpacing(10)
+        title = QLabel(tr("Calibrate a sensor"))
+        font = title.font()
+        font.setPointSizeF(font.pointSizeF() * 1.6)
+        font.setBold(True)
+        title.setFont(font)
+        said = QLabel(
+            tr(
+                "The program leads you through the lens, the top surface, the lights and the"
+                " membrane, and judges every stage while you can still repeat it."
+            )
+        )
+        said.setWordWrap(True)
+        said.setFixedWidth(460)
+        column.addWidget(title)
+        column.addWidget(said)
+        for name, text, signal in (
+            ("new", tr("&New calibration"), self.new_wanted),
+            ("open", tr("&Open a session folder…"), self.open_wanted),
+            ("demo", tr("Try it on the &virtual sensor"), self.demo_wanted),
+        ):
+            button = named(QPushButton(text), f"start.{name}", text.replace("&", ""))
+            button.setMinimumHeight(40)
+            button.setFixedWidth(460)
+            button.clicked.connect(signal)
+            column.addWidget(button)
+        self._recent = QVBoxLayout()
+        column.addSpacing(12)
+        column.addLayout(self._recent)
+
+    def show_recent(self, folders: Sequence[Path]) -> None:
+        """Offer these sessions."""
+        while self._recent.count():
+            old = self._recent.takeAt(0).widget()
+            if old is not None:
+                old.deleteLater()
+        if folders:
+            self._recent.addWidget(QLabel(tr("Go on with a recent session")))
+        for number, folder in enumerate(folders[:MOST_RECENT]):
+            text = f"{folder.parent.parent.name} / {folder.name}"
+            button = named(
+                QPushButton(text), f"start.recent.{number}", tr("Go on with {s}").format(s=text)
+            )
+            button.setToolTip(str(folder))
+            button.setFlat(True)
+            button.setFixedWidth(460)
+            button.setStyleSheet("text-align: left;")
+            button.clicked.connect(lambda _=False, f=folder: self.recent_wanted.emit(str(f)))
+            self._recent.addWidget(button)

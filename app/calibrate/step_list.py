@@ -1,0 +1,59 @@
+"""The list of steps at the side: where one is, how each stands, a click goes there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
+
+from app.calibrate.states import state_icon, state_word
+from app.calibrate.steps import Step
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+WIDTH = 176
+
+
+class StepList(QListWidget):
+    """The steps.
+
+    Signals
+    -------
+    chosen(int)
+        The step that the person goes to.
+    """
+
+    chosen = Signal(int)
+
+    def __init__(self, steps: Sequence[Step], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "calibrate.steps", tr("Steps of the calibration"))
+        self._steps = steps
+        self.setFixedWidth(WIDTH)
+        self.setIconSize(QSize(18, 18))
+        self.setSpacing(1)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        for number, step in enumerate(steps):
+            item = QListWidgetItem(f"{number}  {step.title}")
+            item.setSizeHint(QSize(WIDTH - 12, 34))
+            self.addItem(item)
+        self.currentRowChanged.connect(self._on_row)
+
+    def show_states(self, states: Mapping[str, tuple[str, str]]) -> None:
+        """Show how each step stands: (state, sentence) by the step's key."""
+        for row, step in enumerate(self._steps):
+            state, sentence = states.get(step.key, ("empty", ""))
+            item = self.item(row)
+            item.setIcon(state_icon(state))
+            item.setToolTip(f"{step.title}: {state_word(state)}. {sentence}".strip())
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
+
+    def go_to(self, row: int) -> None:
+        """Show a step as the one that is open."""
+        if row != self.currentRow():
+            self.setCurrentRow(row)
+
+    def _on_row(self, row: int) -> None:
+        if row >= 0:
+            self.chosen.emit(row)

@@ -1,0 +1,174 @@
+"""Try a saved calibration on an object of known size, and record how that went."""
+
+from __future__ import annotations
+
+import getpass
+from collections.abc import Callable
+from concurrent.futures import Future
+from datetime import UTC, datetime
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer
+
+from app.calibrate.controller import CalibrationController
+from app.calibrate.jobs import Job
+from app.calibrate.maps import Panel
+from app.calibrate.trial import Trial, run_trial
+from app.calibrate.validation_panel import ValidationPanel
+from app.shell.context import AppContext
+from app.sources.source import Frame
+from app.workspace.validation import Validation, read_validation, write_validation
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.translation import tr
+
+FRAMES = 4
+POLL_MS = 50
+
+
+class Validating(QObject):
+    """The validation step behind its panel."""
+
+    def __init__(
+        self, controller: CalibrationController, panel: ValidationPanel, *, context: AppContext
+    ) -> None:
+        super().__init__(panel)
+        self._controller, self._panel, self._context = controller, panel, context
+        self._path: Path | None = None
+        self._reconstructor: Reconstructor | None = None
+        self._trial: Trial | None = None
+        self._capture: Future[list[Frame]] | None = None
+        self._shown: Callable[[Panel], None] = lambda _panel: None
+        self._poll = QTimer(self)
+        self._poll.setInterval(POLL_MS)
+        self._poll.timeout.connect(self._on_poll)
+        limits = context.settings.limits
+        panel.size_limit.setValue(limits.size_percent)
+        panel.height_limit.setValue(limits.height_percent)
+        panel.trial_wanted.connect(self.measure)
+        panel.keep_wanted.connect(self.keep)
+        panel.show_calibration("")
+
+    def show_pictures_in(self, shown: Callable[[Panel], None]) -> None:
+        """Hand the shaded depth of every trial to `shown`."""
+        self._shown = shown
+
+    @property
+    def state(self) -> tuple[str, str]:
+        """How the step stands: state and sentence."""
+        found = self._recorded()
+        if found is None:
+            return "empty", tr("Not validated yet")
+        if found.passed:
+            return "pass", tr("Validated")
+        return "fail", tr("The last validation failed")
+
+    def take(self, path: str) -> None:
+        """Try this saved calibration from now on."""
+        self._path, self._reconstructor, self._trial = Path(path), None, None
+        self._panel.show_calibration(Path(path).stem)
+        self._panel.show_trial(None)
+        self._show_verdict()
+
+    def measure(self) -> None:
+        """Capture the press, then measure it."""
+        stream = self._controller.stream
+        if stream is None:
+            self._context.toasts.show(tr("There is no camera. Choose a source first."), "warn")
+            return
+        if self._capture is None and self._path is not None:
+            self._capture = stream.capture(FRAMES)
+            self._panel.show_work(0.0)
+            self._poll.start()
+
+    def _on_poll(self) -> None:
+        if self._capture is None or not self._capture.done():
+            return
+        self._poll.stop()
+        future, self._capture = self._capture, None
+        error = future.exception()
+        if error is not None:
+            self._refuse(str(error))
+            return
+        frames = [frame.rgb for frame in future.result()]
+        panel = self._panel
+        known, path = panel.known(), self._path
+        size_limit, height_limit = panel.size_limit.value(), panel.height_limit.value()
+
+        def work(tell: Callable[[float], None]) -> Trial:
+            if self._reconstructor is None:
+                assert path is not None
+                self._reconstructor = Reconstructor(read_calibration(path))
+            return run_trial(
+                frames,
+                self._reconstructor,
+                known,
+                size_limit_percent=size_limit,
+                height_limit_percent=height_limit,
+                tell=tell,
+            )
+
+        self._controller.jobs.submit(Job(tr("Measuring the press"), work, self._show, self._refuse))
+
+    def _show(self, trial: Trial) -> None:
+        self._trial = trial
+        self._panel.show_work(None)
+        self._panel.show_trial(trial)
+        self._shown(Panel(tr("Depth as measured"), trial.shaded))
+
+    def _refuse(self, sentence: str) -> None:
+        self._panel.show_work(None)
+        self._panel.show_trial(None)
+        self._panel.result.setText(sentence)
+
+    def keep(self) -> None:
+        """Record the trial beside the calibration."""
+        if self._trial is None or self._path is None or self._reconstructor is None:
+            return
+        known = self._panel.known()
+        text = tr("{shape}, {size:g} mm").format(
+            shape=self._panel.shape.currentText(), size=known.size_mm
+        )
+        validation = Validation(
+            self._reconstructor.calibration.identity,
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            _who(),
+            text,
+            self._trial.comparisons,
+        )
+        try:
+            write_validation(validation, self._path)
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+            return
+        self._context.requests.library_changed.emit()
+        self._show_verdict()
+        self._controller.changed.emit()
+
+    def _recorded(self) -> Validation | None:
+        if self._path is None:
+            return None
+        try:
+            return read_validation(self._path)
+        except InputError as error:
+            self._context.toasts.show(str(error), "warn")
+            return None
+
+    def _show_verdict(self) -> None:
+        found = self._recorded()
+        if found is None:
+            self._panel.show_verdict(tr("Not validated."), passed=False)
+        elif found.passed:
+            self._panel.show_verdict(tr("This calibration is validated."), passed=True)
+        else:
+            self._panel.show_verdict(
+                tr("Not validated: the recorded trial is beyond its limits."), passed=False
+            )
+
+
+def _who() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):  # a system without a user database has no name to give
+        return ""

@@ -1,0 +1,207 @@
+"""The validation step's side panel: what is pressed, its true size, and how it was measured."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QFrame,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.calibrate.assembly import AssemblyPicture
+from app.calibrate.states import state_colour
+from app.calibrate.step_panel import WIDTH
+from app.calibrate.steps import Step
+from app.calibrate.trial import KnownObject, Trial
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+
+class ValidationPanel(QScrollArea):
+    """Asks for the known object, and shows how the trial went.
+
+    Signals
+    -------
+    trial_wanted()
+        Capture and measure now.
+    keep_wanted()
+        Record the trial as this calibration's validation.
+    """
+
+    trial_wanted = Signal()
+    keep_wanted = Signal()
+
+    def __init__(self, step: Step, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "validation", tr("Validation"))
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setMinimumWidth(WIDTH)
+        self.setMaximumWidth(WIDTH + 60)
+        inside = QWidget()
+        self.setWidget(inside)
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(12, 10, 12, 10)
+        title = QLabel(step.title)
+        font = title.font()
+        font.setPointSizeF(font.pointSizeF() * 1.35)
+        font.setBold(True)
+        title.setFont(font)
+        picture = AssemblyPicture()
+        picture.show_assembly(step.assembly)
+        task = QLabel(step.task)
+        task.setWordWrap(True)
+        self.calibration = named(QLabel(), "validation.calibration", tr("Calibration tried"))
+        self.calibration.setWordWrap(True)
+        for widget in (title, picture, task, self.calibration):
+            column.addWidget(widget)
+        column.addLayout(self._build_form())
+        self.measure = named(
+            QPushButton(tr("&Measure the press")),
+            "validation.measure",
+            tr("Measure what is pressed in"),
+        )
+        self.measure.setMinimumHeight(38)
+        self.measure.clicked.connect(self.trial_wanted)
+        column.addWidget(self.measure)
+        self.progress = named(QProgressBar(), "validation.progress", tr("Progress"))
+        self.progress.setRange(0, 100)
+        keep = self.progress.sizePolicy()
+        keep.setRetainSizeWhenHidden(True)
+        self.progress.setSizePolicy(keep)
+        self.progress.hide()
+        column.addWidget(self.progress)
+        self.result = named(QLabel(), "validation.result", tr("Result"))
+        self.result.setWordWrap(True)
+        self.result.setTextFormat(Qt.TextFormat.RichText)
+        column.addWidget(self.result)
+        self.keep = named(
+            QPushButton(tr("&Record this validation")),
+            "validation.keep",
+            tr("Record this validation"),
+        )
+        self.keep.setMinimumHeight(34)
+        self.keep.clicked.connect(self.keep_wanted)
+        column.addWidget(self.keep)
+        self.verdict = named(QLabel(), "validation.verdict", tr("Validated or not"))
+        self.verdict.setWordWrap(True)
+        column.addWidget(self.verdict)
+        column.addStretch(1)
+        self.show_trial(None)
+
+    def _build_form(self) -> QFormLayout:
+        form = QFormLayout()
+        self.shape = named(QComboBox(), "validation.shape", tr("Shape"))
+        for name, text in (
+            ("cylinder", tr("Cylinder, flat end")),
+            ("cuboid", tr("Cuboid, flat end")),
+            ("ball", tr("Ball")),
+        ):
+            self.shape.addItem(text, name)
+        self.size = _length("validation.size", tr("True diameter or side"), 5.0)
+        self.height_known = named(
+            QCheckBox(tr("Depth is known")),
+            "validation.height_known",
+            tr("The depth of the press is known"),
+        )
+        self.height = _length("validation.height", tr("True depth of the press"), 1.0)
+        self.height.setEnabled(False)
+        self.height_known.toggled.connect(self.height.setEnabled)
+        self.size_limit = _percent("validation.size_limit", tr("Limit of the size"), 5.0)
+        self.height_limit = _percent("validation.height_limit", tr("Limit of the depth"), 8.0)
+        form.addRow(tr("Shape"), self.shape)
+        form.addRow(tr("True diameter or side"), self.size)
+        form.addRow(self.height_known, self.height)
+        form.addRow(tr("Largest error of the size"), self.size_limit)
+        form.addRow(tr("Largest error of the depth"), self.height_limit)
+        return form
+
+    def known(self) -> KnownObject:
+        """Return the object as stated."""
+        height = self.height.value() if self.height_known.isChecked() else None
+        return KnownObject(self.shape.currentData(), self.size.value(), height)
+
+    def show_known(self, known: KnownObject) -> None:
+        """State an object, as where the virtual bench knows what lies there."""
+        self.shape.setCurrentIndex(max(self.shape.findData(known.shape), 0))
+        self.size.setValue(known.size_mm)
+        self.height_known.setChecked(known.height_mm is not None)
+        if known.height_mm is not None:
+            self.height.setValue(known.height_mm)
+
+    def show_calibration(self, name: str) -> None:
+        """Say which calibration is tried; an empty name: none is saved yet."""
+        self.calibration.setText(
+            tr("Calibration: {name}").format(name=name)
+            if name
+            else tr("Save the calibration first: a validation belongs to a saved one.")
+        )
+        self.measure.setEnabled(bool(name))
+
+    def show_work(self, share: float | None) -> None:
+        """Show progress; None when nothing runs."""
+        self.progress.setVisible(share is not None)
+        self.progress.setValue(round(100 * (share or 0.0)))
+
+    def show_trial(self, trial: Trial | None) -> None:
+        """Show how a trial went."""
+        self.keep.setEnabled(trial is not None)
+        if trial is None:
+            self.result.setText("")
+            return
+        rows = []
+        for c in trial.comparisons:
+            state = "pass" if c.passed else "fail"
+            word = tr("within") if c.passed else tr("beyond")
+            rows.append(
+                tr(
+                    "<b>{what}</b>: measured {m:.3f} mm, true {t:.3f} mm, error"
+                    " <span style='color:{c}'><b>{e:+.2f} %</b>, {word} ±{limit:g} %</span>"
+                ).format(
+                    what=c.quantity.capitalize(),
+                    m=c.measured_mm,
+                    t=c.true_mm,
+                    e=c.error_percent,
+                    c=state_colour(state).name(),
+                    word=word,
+                    limit=c.limit_percent,
+                )
+            )
+        if trial.measurement.verdict != "ok":
+            rows.append(tr("Doubtful: {reason}").format(reason=trial.measurement.reason))
+        self.result.setText("<br>".join(rows))
+
+    def show_verdict(self, text: str, *, passed: bool) -> None:
+        """Say whether the calibration is validated."""
+        state = "pass" if passed else "fail"
+        self.verdict.setText(text)
+        self.verdict.setStyleSheet(f"color: {state_colour(state).name()}; font-weight: bold;")
+
+
+def _length(name: str, accessible: str, value: float) -> QDoubleSpinBox:
+    box = named(QDoubleSpinBox(), name, tr("{what} in mm").format(what=accessible))
+    box.setDecimals(3)
+    box.setRange(0.01, 500.0)
+    box.setSingleStep(0.1)
+    box.setSuffix(tr(" mm"))
+    box.setValue(value)
+    return box
+
+
+def _percent(name: str, accessible: str, value: float) -> QDoubleSpinBox:
+    box = named(QDoubleSpinBox(), name, tr("{what} in percent").format(what=accessible))
+    box.setDecimals(1)
+    box.setRange(0.1, 100.0)
+    box.setSuffix(tr(" %"))
+    box.setValue(value)
+    return box
