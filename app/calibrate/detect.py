@@ -51,11 +51,15 @@ from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-# The slow search is asked about so small a picture that a frame without a board stays quick.
-SEARCHED_PX = 320
-# The lens stage advises 15 to 40 degrees; of flatter views two show the lens, the rest add little.
-LEAST_TILT_DEG = 15.0
+# The slow search looks at so small a copy that a frame without a board stays quick; below 400
+# pixels it begins to miss boards that the border cuts off, and then takes longer.
+GLANCE_PX = 480
+# The lens stage advises 15 to 40 degrees. Below 10 a board is foreshortened by less than 2 %: two such
+# views show the distortion, more add little.
+LEAST_TILT_DEG = 10.0
 FLAT_VIEWS = 2
+# A tilt by ten degrees or a shift by half a square moves the corners by more.
+SAME_VIEW_OF_SQUARE = 0.5
 # A mirror image this far from its expected place is more than any mounting is off.
 LED_OFF_OF_WIDTH = 0.05
 
@@ -80,9 +84,7 @@ def detect_board(
 
     def look() -> Detection:
         picture = as_picture(rgb)
-        if not patient:
-            _refuse_without_board(picture, board)
-        view = find_board(picture, board)
+        view = find_board(picture, board, rough=None if patient else _glance(picture, board))
         marks = Overlay(
             markers=board_corners(view), lines=(*faint.lines, board_outline(view, "good"))
         )
@@ -92,18 +94,16 @@ def detect_board(
     return or_refusal(look, marks=faint)
 
 
-def _refuse_without_board(picture: Picture, board: BoardSpec) -> None:
-    """Refuse a frame in which the quick detectors see nothing; what they see is not yet a board."""
+def _glance(picture: Picture, board: BoardSpec) -> Array:
+    """Return rough corners by the quick detectors, which is not yet a board, or refuse."""
     red, green, blue = cv2.split(picture.rgb)
     grey = np.asarray((red + green + blue) / np.float32(3.0), np.float32)
     check_exposure(grey, picture.name)
-    if find_rough_corners(grey, board.inner_corners) is not None:
-        return
-    shrink = max(picture.size) / SEARCHED_PX
-    size = (round(picture.size[0] / shrink), round(picture.size[1] / shrink))
-    small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
-    if search_rough_corners(small, board.inner_corners) is not None:
-        return
+    rough = find_rough_corners(grey, board.inner_corners)
+    if rough is None:
+        rough = search_rough_corners(grey, board.inner_corners, longest_px=GLANCE_PX)
+    if rough is not None:
+        return rough
     width_px = sharpest_edge_px(grey)
     if width_px > edge_limit_px(picture.size[0]):
         raise blur_error(width_px, edge_limit_px(picture.size[0]), picture.name)
@@ -118,7 +118,7 @@ def _refuse_without_board(picture: Picture, board: BoardSpec) -> None:
 
 def _next_view(view: BoardView, earlier: Sequence[BoardView]) -> tuple[str, bool]:
     """Return what to say about a view that was found, and whether it adds something."""
-    if any(_moved_px(view, other) < view.square_px for other in earlier):
+    if any(_moved_px(view, other) < SAME_VIEW_OF_SQUARE * view.square_px for other in earlier):
         return tr("Board found, but as in an earlier view. Move it or tilt it."), False
     if view.saturated_share > 0.0:
         text = tr(
@@ -192,7 +192,7 @@ def detect_top_pose(
     def look() -> Detection:
         picture = as_picture(rgb, tr("frame"))
         if not patient:
-            _refuse_without_board(picture, board)
+            _glance(picture, board)
         pose = estimate_top_pose([picture], board, camera)
         view = pose.views[0].board
         markers = () if view is None else board_corners(view)
