@@ -54,8 +54,8 @@ Array = NDArray[np.float64]
 # The slow search looks at so small a copy that a frame without a board stays quick; below 400
 # pixels it begins to miss boards that the border cuts off, and then takes longer.
 GLANCE_PX = 480
-# The lens stage advises 15 to 40 degrees. Below 10 a board is foreshortened by less than 2 %: two such
-# views show the distortion, more add little.
+# The lens stage advises 15 to 40 degrees. Below 10 a board is foreshortened by less than 2 %: two
+# such views show the distortion, more add little.
 LEAST_TILT_DEG = 10.0
 FLAT_VIEWS = 2
 # A tilt by ten degrees or a shift by half a square moves the corners by more.

@@ -55,11 +55,13 @@ def detect_whiteboard(rgb: Rgb, *, table: ResamplingTable | None = None) -> Dete
         area, small = _prepare(rgb, table)
         unlit = area & (small.min(axis=2) < LEAST_LIGHT)
         lit = area & ~unlit
-        specks = lit & (_local_change(small, lit, SPECK_OF_WIDTH * small.shape[1]) > SPECK_CHANGE)
+        inner = _without_rim(lit)
+        change = _local_change(small, inner, SPECK_OF_WIDTH * small.shape[1])
+        specks = inner & (change > SPECK_CHANGE)
         full = saturated(rgb) > 0
         marks = Overlay(
             lines=rim.lines,
-            masks=(Mask(full, "bad"), Mask(_enlarge(specks, rgb), "expected")),
+            masks=_masks(full, _enlarge(specks, rgb)),
         )
         figures = (
             *_brightness_figures(small, area),
@@ -104,7 +106,7 @@ def detect_background(
             pressed = _find_pressed(small, white, area)
         marks = Overlay(
             lines=rim.lines,
-            masks=(Mask(full, "bad"), Mask(_enlarge(pressed, rgb), "expected")),
+            masks=_masks(full, _enlarge(pressed, rgb)),
         )
         figures = (
             *_brightness_figures(small, area),
@@ -147,6 +149,12 @@ def _enlarge(mask: Mask2, rgb: Rgb) -> Mask2:
     return np.asarray(cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)) > 0
 
 
+def _masks(full: Mask2, doubtful: Mask2) -> tuple[Mask, ...]:
+    """Return what is saturated and what is doubtful, where there is any."""
+    both = (Mask(full, "bad"), Mask(doubtful, "expected"))
+    return tuple(mask for mask in both if mask.area.any())
+
+
 def _brightness_figures(small: Float, area: Mask2) -> tuple[Figure, ...]:
     names = (tr("red"), tr("green"), tr("blue"))
     brightest = 100.0 * np.percentile(small[area], 99.0, axis=0)
@@ -165,6 +173,13 @@ def _saturated_figure(full: Mask2, area: Mask2, *, warn: float, fail: float) -> 
     percent = 100.0 * float(np.asarray(part)[area].mean())
     return judge("saturated", tr("Saturated share"), percent, "%", warn=warn, fail=fail,
                  advice=tr("Shorten the exposure until nothing is saturated"))  # fmt: skip
+
+
+def _without_rim(lit: Mask2) -> Mask2:
+    """Return the lit area without the mixed pixels along the board's rim; specks stay in it."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    whole = cv2.morphologyEx(lit.astype(np.uint8), cv2.MORPH_CLOSE, disc)
+    return np.asarray(cv2.erode(whole, disc, borderType=cv2.BORDER_REPLICATE)) > 0
 
 
 def _light_range(small: Float, lit: Mask2) -> float:
