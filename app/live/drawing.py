@@ -249,19 +249,20 @@ def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, sele
             width=2.4 if selected else 1.0,
         )
     if marker.text:
-        _paint_text(painter, QPointF(x + s + 5.0, y - s), marker.text, marker.role)
+        # What is expected lies near what was found: their words must not lie on each other.
+        beside = QPointF(x, y + s + 6.0 if marker.role == "expected" else y - s)
+        _paint_text(painter, beside, marker.text, marker.role, gap=s + 5.0)
 
 
-def _paint_text(painter: QPainter, at: QPointF, text: str, role: Role) -> None:
-    """Write on a dark plate whose left border's middle is `at`, moved into the view if need be."""
+def _paint_text(painter: QPainter, at: QPointF, text: str, role: Role, *, gap: float = 0.0) -> None:
+    """Write on a dark plate, `gap` to the right of a point, or to its left where the view ends."""
     metrics = QFontMetricsF(painter.font())
     width, height = metrics.horizontalAdvance(text) + 8.0, metrics.height() + 2.0
-    right, bottom = painter.device().width(), painter.device().height()
-    left = min(max(at.x(), 0.0), max(right / painter.device().devicePixelRatio() - width, 0.0))
-    top = min(
-        max(at.y() - height / 2, 0.0),
-        max(bottom / painter.device().devicePixelRatio() - height, 0.0),
-    )
+    view = QRectF(painter.window())
+    left, top = at.x() + gap, at.y() - height / 2
+    if left + width > view.right():
+        left = at.x() - gap - width
+    top = min(max(top, 0.0), view.bottom() - height)
     plate = QRectF(left, top, width, height)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(PLATE)

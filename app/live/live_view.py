@@ -144,6 +144,7 @@ class LiveView(QWidget):
         """Show the newest frames of `stream` from now on; None: none, the picture goes."""
         self._stream = stream
         self._best_focus = BestFocus()
+        self._checks.focus.show()
         self._tick.stop()
         if stream is None:
             self._rgb = None
@@ -163,7 +164,7 @@ class LiveView(QWidget):
     def show_picture(self, rgb: Rgb) -> None:
         """Show a still, (rows, columns, 3) uint8 or uint16, and check it at once."""
         self._checked_s = -math.inf
-        self._best_focus = BestFocus()
+        self._checks.focus.hide()
         self._show(rgb)
 
     def set_overlay(self, overlay: Overlay | None) -> None:
@@ -255,7 +256,7 @@ class LiveView(QWidget):
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
         thin = np.ascontiguousarray(rgb[::CHECK_STRIDE, ::CHECK_STRIDE])
-        self._checks.show_exposure(measure_exposure(thin))
+        self._checks.show_exposure(measure_exposure(rgb))
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():
             self._histogram.show_counts(channel_histograms(thin))

@@ -2,6 +2,7 @@
 
 Positions are picture pixels (u, v) with pixel centres at whole numbers, as everywhere in the core.
 An item with a `handle` can be dragged; :class:`app.live.live_view.LiveView` tells where it went.
+Items that hold an array are equal to themselves only, for arrays are not compared at a glance.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class Circle:
     handle: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Line:
     """A line through `points` (N, 2) of (u, v); `closed` joins the last to the first."""
 
@@ -62,7 +63,7 @@ class Line:
     closed: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Mask:
     """Pixels, `area` (rows, columns) bool of the picture's size, shown as a tint."""
 

@@ -19,8 +19,9 @@ SATURATED_WARN = 0.0005
 SATURATED_FAIL = 0.01
 # Eight bits below a quarter of the scale leave fewer than 64 steps.
 DARK_SHARE_OF_SCALE = 0.25
-# Three mirror spots are a few ten-thousandths of a picture, and are all that there is to expose.
-BRIGHTEST_SHARE = 0.0002
+# A mirror spot may be a dozen pixels of a million, and is all that there is to expose; hot pixels
+# at a short exposure are fewer.
+BRIGHTEST_PIXELS = 12
 # Seconds in which a best focus that was left behind loses half of its lead.
 BEST_HALF_LIFE_S = 20.0
 
@@ -34,7 +35,7 @@ class Exposure:
     saturated_share : float
         Pixels with a channel at the end of scale, 0..1.
     brightest : float
-        What all but the very brightest pixels stay below, share of the scale.
+        What all but a few pixels stay below, share of the scale.
     verdict : Verdict
         The judgement.
     advice : str
@@ -75,12 +76,11 @@ def measure_exposure(rgb: Rgb) -> Exposure:
     Parameters
     ----------
     rgb : (rows, columns, 3) uint8 or uint16
-        The picture, or evenly chosen pixels of it.
+        The whole picture.
     """
-    top = brightest_channel(rgb)
-    share = cv2.countNonZero(saturated(rgb)) / top.size
-    rank = max(int(BRIGHTEST_SHARE * top.size), 1)
-    brightest = float(np.partition(top.ravel(), -rank)[-rank]) / end_of_scale(rgb)
+    full = saturated(rgb)
+    share = cv2.countNonZero(full) / full.size
+    brightest = _level_of_brightest(rgb)
     if share > SATURATED_WARN:
         verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
         text = tr("Too bright: {p} % of the pixels are at the end of scale. Shorten the exposure.")
@@ -91,6 +91,16 @@ def measure_exposure(rgb: Rgb) -> Exposure:
         return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * brightest)))
     text = tr("Exposure is good: the brightest places reach {p} % of the scale.")
     return Exposure(share, brightest, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))
+
+
+def _level_of_brightest(rgb: Rgb) -> float:
+    """Return which share of the scale the brightest pixels reach, but for a few."""
+    counts = np.cumsum(np.bincount(_high_byte(brightest_channel(rgb)).ravel(), minlength=256)[::-1])
+    return float(255 - int(np.searchsorted(counts, BRIGHTEST_PIXELS))) / 255.0
+
+
+def _high_byte(values: Rgb) -> NDArray[np.uint8]:
+    return np.asarray(values >> (8 * values.dtype.itemsize - 8), np.uint8)
 
 
 def _percent(value: float) -> str:
