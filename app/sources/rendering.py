@@ -114,6 +114,7 @@ class Renderer:
             while (scene := self._next(done)) is not None:
                 try:
                     self._publish(makers.preview(scene, self._check_open))
+                    makers.get_ready(self._check_open)
                     self._publish(makers.exact(scene, partial(self._check_newest, scene)))
                 except _Superseded:
                     continue
@@ -145,7 +146,7 @@ class Renderer:
 
 
 class _Makers:
-    """The virtual sensor in the picture's own size and, for previews, in a small one."""
+    """The virtual sensor in the picture's own size, and in a small one for previews."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
@@ -156,11 +157,16 @@ class _Makers:
         self._bare: Array | None = None
         self._shape: tuple[Scene, State] | None = None
 
+    def get_ready(self, interrupt: Interrupt) -> None:
+        """Make the sensor of the picture's own size, once."""
+        if self._large is None:
+            design, seed = self._bench.design, self._bench.seed
+            self._large = VirtualSensor(design, seed, interrupt=interrupt)
+
     def exact(self, scene: Scene, interrupt: Interrupt) -> Rendering:
         """Return the exact picture."""
+        assert self._large is not None
         interrupt()
-        if self._large is None:
-            self._large = VirtualSensor(self._bench.design, self._bench.seed)
         state = state_of(self._bench, self._bench.design, scene, interrupt)
         return Rendering(scene, _light(self._large, state, scene, interrupt), True)
 
@@ -169,7 +175,7 @@ class _Makers:
         if self._small_design is None:
             return None
         if self._small is None:
-            self._small = VirtualSensor(self._small_design, self._bench.seed)
+            self._small = VirtualSensor(self._small_design, self._bench.seed, interrupt=interrupt)
         state = self._coarse_state(self._small_design, scene, interrupt)
         small = _light(self._small, state, scene, interrupt, samples=1)
         return Rendering(scene, self._full_size(small, scene), False)

@@ -79,6 +79,8 @@ class VirtualSensor:
         Of the membrane's pattern and of the noise; one seed gives one sequence of bytes.
     lamps : tuple of PointLamp or ParallelLamp, optional
         Other lights in place of the design's three LEDs.
+    interrupt : callable, optional
+        Called now and then while the sensor is made; what it raises stops the work.
 
     Raises
     ------
@@ -87,7 +89,12 @@ class VirtualSensor:
     """
 
     def __init__(
-        self, design: SensorDesign, seed: int = 0, *, lamps: tuple[Lamp, ...] | None = None
+        self,
+        design: SensorDesign,
+        seed: int = 0,
+        *,
+        lamps: tuple[Lamp, ...] | None = None,
+        interrupt: Interrupt = never,
     ) -> None:
         self.design = validate_design(design)
         self.seed = seed
@@ -95,11 +102,13 @@ class VirtualSensor:
         self.material = Material.of_membrane(design.membrane)
         self._table = lamp_table(self.lamps)
         self._count = 0
-        self.rays = trace_pixels(design.camera, design.layers)
+        self.rays = trace_pixels(design.camera, design.layers, interrupt=interrupt)
         self.factors = reflectance_factor(
             design.membrane, np.random.default_rng([seed, zlib.crc32(b"membrane")])
         )
+        interrupt()
         self.exposure = self._exposure()
+        interrupt()
         self._cover = self._rim_cover()
         self._membrane = self._flat(self.material) * self._factor_seen()[..., None]
 
@@ -118,8 +127,8 @@ class VirtualSensor:
         camera, photometry = self.design.camera, self.design.photometry
         if isinstance(state, (Checkerboard, BoardOnTop)):
             pose = state.pose if isinstance(state, Checkerboard) else self.top_pose
-            grey = blurred(board_picture(camera, pose), camera.blur_sigma_px)
-            return np.repeat(grey[..., None], 3, axis=2)
+            grey = board_picture(camera, pose, interrupt=interrupt)
+            return np.repeat(blurred(grey, camera.blur_sigma_px)[..., None], 3, axis=2)
         if isinstance(state, Mirror):
             light = self._mirror() * photometry.mirror_peak
         elif isinstance(state, Whiteboard):
