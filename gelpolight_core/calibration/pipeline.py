@@ -18,7 +18,7 @@ from gelpolight_core.calibration.calibration import (
     Provenance,
     sensor_stack,
 )
-from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
+from gelpolight_core.calibration.joint import JointResult, gather_ball_pixels, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -48,7 +48,10 @@ STAGES = ("checkerboard", "top_pose", *ONE_IMAGE_STAGES, "balls")
 
 @dataclass(frozen=True, slots=True)
 class CalibrationRun:
-    """A calibration with the results of every stage, as the pages and the report show them."""
+    """A calibration with the results of every stage, as the pages and the report show them.
+
+    `joint` is None where the calibration was made for the paper's model alone.
+    """
 
     calibration: Calibration
     lens: LensResult
@@ -57,6 +60,7 @@ class CalibrationRun:
     radiance: RadianceResult
     reflectance: ReflectanceResult
     factors: FactorResult
+    joint: JointResult | None
 
 
 def calibrate_session(
@@ -116,10 +120,10 @@ def calibrate_session(
     reflectance, factors = _reflectance_and_factors(
         presses, pictures, bare, table, lights, radiance
     )
-    full = None
+    full = joint = None
     if model == "full":
         tell(tr("joint refinement"), 0.85)
-        full = _full_model(presses, pictures, bare, table, lights, factors)
+        full, joint = _full_model(presses, pictures, bare, table, lights, factors)
     calibration = Calibration(
         sensor=session.sensor,
         model=model,
@@ -145,7 +149,7 @@ def calibrate_session(
         full=full,
     )
     tell(tr("done"), 1.0)
-    return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
+    return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors, joint)
 
 
 def _reflectance_and_factors(
@@ -176,7 +180,7 @@ def _full_model(
     table: ResamplingTable,
     lights: LightResult,
     factors: FactorResult,
-) -> FullModel:
+) -> tuple[FullModel, JointResult]:
     """Refine LEDs and membrane on the presses, and keep the background to compare with."""
     crosstalk = crosstalk_from_spots(lights.spots)
     background = unmix(bare, crosstalk)
@@ -188,7 +192,7 @@ def _full_model(
         for press, picture in zip(presses, pictures, strict=True)
     ]
     joint = refine_jointly(presses, pixels, lights.led_positions_mm)
-    return FullModel(
+    full = FullModel(
         joint.led_positions_mm,
         joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
         joint.membrane,
@@ -198,6 +202,7 @@ def _full_model(
         joint.held_out,
         joint.kept,
     )
+    return full, joint
 
 
 def _mirror_sd(lights: LightResult) -> NDArray[np.float64]:
