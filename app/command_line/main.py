@@ -45,6 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
         inspect_calibration,
         measure,
         reconstruct,
+        report,
         simulate,
     )
 
@@ -61,6 +62,7 @@ def build_parser() -> argparse.ArgumentParser:
         reconstruct,
         measure,
         evaluate,
+        report,
         benchmark,
         design,
     ):

@@ -30,6 +30,7 @@ from gelpolight_core.report.drawing import (
     grid_extent,
     show_picture,
 )
+from gelpolight_core.report.typeface import printable
 from gelpolight_core.translation import tr
 
 BALLS_ACROSS = 5
@@ -73,10 +74,12 @@ def _draw_ball(axes: Axes, press: BallPress, picture: Map, table: ResamplingTabl
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     show_picture(axes, picture, width_px=700, extent=grid_extent(grid))
     contour = origin + grid.pitch_mm * found.contour
-    axes.plot(contour[:, 0], contour[:, 1], ".", color="white", markersize=1.4)
+    axes.plot(contour[:, 0], contour[:, 1], ".", color="white", markersize=1.8, mew=0.0)
     centre = origin + grid.pitch_mm * np.asarray(found.centre)
     radius = grid.pitch_mm * found.contact_radius_px
-    axes.add_patch(Circle((centre[0], centre[1]), radius, fill=False, color=ACCENT, lw=0.8))
+    axes.add_patch(
+        Circle((centre[0], centre[1]), radius, fill=False, color=ACCENT, lw=0.7, zorder=3)
+    )
     axes.plot(*press.pose.centre_mm, "+", color=ACCENT, markersize=7, mew=1.0)
     reach = 2.2 * radius
     axes.set_xlim(centre[0] - reach, centre[0] + reach)
@@ -85,7 +88,7 @@ def _draw_ball(axes: Axes, press: BallPress, picture: Map, table: ResamplingTabl
     axes.set_title(
         tr("{mark} {name}\nR {radius:.2f}, depth {depth:.2f} mm").format(
             mark=MARKS[verdict],
-            name=PurePath(press.name).name,
+            name=printable(PurePath(press.name).name),
             radius=press.pose.radius_mm,
             depth=press.pose.depth_mm,
         ),
@@ -166,7 +169,7 @@ def draw_misfits(presses: Sequence[BallPress], joint: JointResult) -> Drawing:
     joint : JointResult
         With the misfit of each press after the refinement of all together.
     """
-    names = [PurePath(press.name).name for press in presses]
+    names = [printable(PurePath(press.name).name) for press in presses]
     places = np.arange(len(names))
 
     def paint(figure: Figure) -> None:
@@ -177,7 +180,7 @@ def draw_misfits(presses: Sequence[BallPress], joint: JointResult) -> Drawing:
             places + 0.2,
             100.0 * joint.ball_misfits,
             0.38,
-            color="#1f4fbf",
+            color="0.25",
             label=tr("all together, with their drapes"),
         )
         left.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")

@@ -263,10 +263,10 @@ def _validation(evaluation: Evaluation | None) -> tuple[str, Listing | None]:
 
 
 def _validation_listing(evaluation: Evaluation) -> Listing:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for result in evaluation.results:
         truth, found = result.press.truth, result.measurement
-        row = (result.press.file, tr(truth.shape), f"{truth.size_mm:.3f}")
+        row: tuple[str, ...] = (result.press.file, tr(truth.shape), f"{truth.size_mm:.3f}")
         if found is None:
             row += ("", "", f"{truth.height_mm:.3f}", "", "", result.failure)
         else:

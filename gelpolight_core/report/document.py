@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.translation import tr
 
+ROUNDING = 1e-12
 MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}
 """A sign beside each verdict's word, so that colour is not the only carrier."""
 
@@ -127,7 +128,9 @@ def verdict_word(verdict: Verdict) -> str:
 
 def value_text(figure: Figure) -> str:
     """Return a figure's value with its unit."""
-    number = f"{figure.value:.4g}" if math.isfinite(figure.value) else tr("not a number")
+    # What rounding leaves of a zero is a zero.
+    value = 0.0 if abs(figure.value) < ROUNDING else figure.value
+    number = f"{value:.4g}" if math.isfinite(value) else tr("not a number")
     return f"{number} {figure.unit}".rstrip()
 
 

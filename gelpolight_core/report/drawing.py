@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -21,14 +23,14 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 FULL_MM = 180.0
 """The width between the margins of an A4 page."""
-DPI = 170
+DPI = 200
 CHANNELS = ("red", "green", "blue")
 COLOURS = ("#c62828", "#2e7d32", "#1f4fbf")
 MARKERS = ("o", "s", "^")
 """A shape beside each channel's colour, for colour-blind readers and grey printers."""
 ACCENT = "#e69f00"
 MAP_COLOURS = "cividis"
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "font.size": 8.0,
     "axes.titlesize": 8.5,
     "axes.titleweight": "bold",
@@ -56,6 +58,12 @@ def draw(
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=DPI)
     return Drawing(caption, stream.getvalue(), width_mm, height_mm)
+
+
+def round_to_one_digit(value: float) -> float:
+    """Return a positive value with one digit that counts, for magnifications."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(round(value / power), 1) * power
 
 
 def channel_name(channel: int) -> str:

@@ -37,21 +37,21 @@ p { margin: 0 0 3mm; }
   margin: 3mm 0; break-inside: avoid; }
 table { border-collapse: collapse; width: 100%; font-size: 8.5pt; margin: 1mm 0 3mm; }
 th { text-align: left; font-weight: 600; border-bottom: 1pt solid #1b1f24; }
-th, td { padding: 0.8mm 2mm 0.8mm 0; vertical-align: top; }
-td { border-bottom: 0.5pt solid #dde2e7; overflow-wrap: anywhere; }
+th, td { padding: 0.8mm 2mm 0.8mm 0; vertical-align: top; overflow-wrap: break-word; }
+td { border-bottom: 0.5pt solid #dde2e7; }
 tr { break-inside: avoid; }
 thead { display: table-header-group; }
 .facts th { width: 34%; font-weight: 400; color: #4a535e; border-bottom: 0.5pt solid #dde2e7; }
 .number { white-space: nowrap; font-variant-numeric: tabular-nums; }
 .advice { color: #8a5200; }
+.fixed td { overflow-wrap: anywhere; }
 .fixed td:last-child { font: 7.2pt "DejaVu Sans Mono", Consolas, monospace; }
 figure { margin: 3mm 0; break-inside: avoid; }
 figure img { width: 100%; height: auto; display: block; }
 figcaption { font-size: 8.5pt; margin-top: 1mm; }
-nav { font-size: 9pt; margin: 4mm 0; }
-nav a { color: #1f4fbf; margin-right: 4mm; white-space: nowrap; text-decoration: none; }
+a { color: #1f4fbf; text-decoration: none; }
 @page { size: A4; margin: 14mm 15mm; }
-@media print { body { padding: 0; max-width: none; } nav { display: none; } }
+@media print { body { padding: 0; max-width: none; } }
 """
 
 

@@ -9,7 +9,7 @@ from matplotlib.patches import Circle, Ellipse
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import Calibration
-from gelpolight_core.lights.mirror import MirrorSpots
+from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.report.document import Drawing
 from gelpolight_core.report.drawing import (
@@ -19,12 +19,16 @@ from gelpolight_core.report.drawing import (
     Map,
     channel_name,
     draw,
+    round_to_one_digit,
     show_picture,
     three_maps,
 )
 from gelpolight_core.translation import tr
 
-CROP_HALF_PX = 24
+LEAST_CROP_PX = 6
+ELLIPSE_MM = 2.0
+FAINT = 0.4
+"""The mirror picture is dark by purpose: shown brighter, so that glints can be seen too."""
 
 
 def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
@@ -42,7 +46,7 @@ def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
     def paint(figure: Figure) -> None:
         grid = figure.add_gridspec(3, 2, width_ratios=(3.4, 1.0))
         whole = figure.add_subplot(grid[:, 0])
-        show_picture(whole, picture)
+        show_picture(whole, picture**FAINT)
         for k, spot in enumerate(spots.spots):
             whole.add_patch(Circle(spot.centre_px, reach, fill=False, color=COLOURS[k], lw=1.2))
             whole.annotate(
@@ -52,7 +56,7 @@ def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
                 color="white",
                 ha="center",
             )
-            _draw_spot(figure.add_subplot(grid[k, 1]), picture, spot.centre_px, k)
+            _draw_spot(figure.add_subplot(grid[k, 1]), picture, spot, k)
         for number, (spot, _) in enumerate(spots.rejected, start=1):
             whole.plot(*spot.centre_px, "x", color="0.75", markersize=6)
             whole.annotate(f" {number}", spot.centre_px, color="0.75", fontsize=7)
@@ -60,19 +64,21 @@ def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
     caption = tr("The mirror picture with the LEDs' spots, and each spot near with its centroid")
     if spots.rejected:
         caption += "; " + tr("grey crosses are glints that were rejected (table below)")
-    return draw(caption, 98.0, paint)
+    return draw(caption, 80.0, paint)
 
 
-def _draw_spot(axes: Axes, picture: Map, centre_px: Array, channel: int) -> None:
+def _draw_spot(axes: Axes, picture: Map, spot: Spot, channel: int) -> None:
+    centre_px = spot.centre_px
     u, v = round(float(centre_px[0])), round(float(centre_px[1]))
-    rows = slice(max(v - CROP_HALF_PX, 0), v + CROP_HALF_PX + 1)
-    columns = slice(max(u - CROP_HALF_PX, 0), u + CROP_HALF_PX + 1)
+    half = max(LEAST_CROP_PX, round(2.0 * spot.area_px**0.5))
+    rows = slice(max(v - half, 0), v + half + 1)
+    columns = slice(max(u - half, 0), u + half + 1)
     crop = picture[rows, columns]
     left, top = columns.start - 0.5, rows.start - 0.5
     extent = (left, left + crop.shape[1], top + crop.shape[0], top)
     show_picture(axes, crop, extent=extent)
-    axes.plot(*centre_px, "+", color="white", markersize=14, mew=1.6)
-    axes.plot(*centre_px, "+", color=COLOURS[channel], markersize=12, mew=0.8)
+    axes.axvline(float(centre_px[0]), color="white", lw=0.5, alpha=0.8)
+    axes.axhline(float(centre_px[1]), color="white", lw=0.5, alpha=0.8)
     axes.set_title(
         f"{channel_name(channel)} ({centre_px[0]:.2f}, {centre_px[1]:.2f}) px",
         fontsize=6.5,
@@ -92,11 +98,11 @@ def draw_led_plan(calibration: Calibration, bright_points_mm: Array | None = Non
     """
     covariance = calibration.led_covariance_mm2
     largest = float(np.sqrt(np.linalg.eigvalsh(covariance[:, :2, :2]).max()))
-    factor = 10.0 ** np.floor(np.log10(max(1.2 / max(largest, 1e-6), 1.0)))
+    factor = max(round_to_one_digit(ELLIPSE_MM / max(largest, 1e-6)), 1.0)
 
     def paint(figure: Figure) -> None:
         plan, side = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
-        _draw_plan(plan, calibration, bright_points_mm, float(factor))
+        _draw_plan(plan, calibration, bright_points_mm, factor)
         _draw_side(side, calibration)
         plan.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4)
 
@@ -105,7 +111,7 @@ def draw_led_plan(calibration: Calibration, bright_points_mm: Array | None = Non
             "LED positions in the sensor frame (x and y as in the picture). Ellipses: one standard "
             "deviation, drawn {factor:.0f} times as large; bars: one standard deviation"
         ).format(factor=factor),
-        86.0,
+        80.0,
         paint,
     )
 
@@ -159,6 +165,8 @@ def _draw_side(axes: Axes, calibration: Calibration) -> None:
     axes.annotate(tr("top surface"), (0.02, 0.0), (0.02, 0.4), xycoords=("axes fraction", "data"))
     top = 1.15 * float(np.max(-leds[:, 2] + sd[:, 2]))
     axes.set_ylim(top, -0.06 * top)
+    axes.set_aspect("equal")
+    axes.margins(x=0.1)
     axes.set_title(tr("From the side"))
     axes.set_xlabel("x (mm)")
     axes.set_ylabel(tr("below the top surface (mm)"))
@@ -214,6 +222,7 @@ def draw_led_moves(calibration: Calibration) -> Drawing:
         plans[0].set_ylabel(tr("moved in y (mm)"))
         for k in range(3):
             before, after = k - 0.15, k + 0.15
+            heights.set_xlim(-0.6, 2.6)
             heights.errorbar(before, -mirror[k, 2], yerr=sd[k, 2], fmt="+", color="0.4", capsize=2)
             heights.errorbar(
                 after,
@@ -257,7 +266,11 @@ def draw_radiance(calibration: Calibration, result: RadianceResult | None = None
 
     def paint(figure: Figure) -> None:
         panels = three_maps(
-            figure, radiance, (radiance > 0.0).all(axis=2), calibration.table.grid, "|L|"
+            figure,
+            radiance,
+            np.asarray((radiance > 0.0).all(axis=2)),
+            calibration.table.grid,
+            "|L|",
         )
         for axes in panels:
             _outline(axes, filled, calibration)
@@ -294,4 +307,5 @@ def draw_factors(calibration: Calibration) -> Drawing:
 
 
 def _paint_factors(figure: Figure, factors: Map, calibration: Calibration) -> None:
-    three_maps(figure, factors, (factors > 0.0).all(axis=2), calibration.table.grid, tr("factor"))
+    known = np.asarray((factors > 0.0).all(axis=2))
+    three_maps(figure, factors, known, calibration.table.grid, tr("factor"))

@@ -13,7 +13,16 @@ from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.lens_views import LensView
 from gelpolight_core.optics.pose import TopPoseResult, TopPoseView
 from gelpolight_core.report.document import Drawing
-from gelpolight_core.report.drawing import ACCENT, FULL_MM, Array, Map, draw, show_picture
+from gelpolight_core.report.drawing import (
+    ACCENT,
+    FULL_MM,
+    Array,
+    Map,
+    draw,
+    round_to_one_digit,
+    show_picture,
+)
+from gelpolight_core.report.typeface import printable
 from gelpolight_core.translation import tr
 
 VIEWS_ACROSS = 4
@@ -53,11 +62,15 @@ def _draw_view(axes: Axes, view: LensView, picture: Map) -> None:
         corners = view.board.corners_px
         axes.plot(corners[:, 0], corners[:, 1], "+", color=ACCENT, markersize=2.6, mew=0.6)
     if view.used:
-        axes.set_title(f"{view.name}\n{view.rms_px:.3f} px", fontsize=6.5, fontweight="normal")
+        axes.set_title(
+            f"{printable(view.name)}\n{view.rms_px:.3f} px", fontsize=6.5, fontweight="normal"
+        )
         return
     height, width = picture.shape[:2]
     axes.plot([0, width], [0, height], [0, width], [height, 0], color="#c62828", linewidth=1.2)
-    axes.set_title(tr("{name}\nleft out").format(name=view.name), fontsize=6.5, color="#c62828")
+    axes.set_title(
+        tr("{name}\nleft out").format(name=printable(view.name)), fontsize=6.5, color="#c62828"
+    )
 
 
 def draw_lens_residuals(result: LensResult) -> Drawing:
@@ -77,7 +90,7 @@ def draw_lens_residuals(result: LensResult) -> Drawing:
             vmin=0,
             aspect="equal",
         )
-        factor = _draw_arrows(left, corners, off, 0.02 * camera.width)
+        factor = _draw_arrows(left, corners, off, 0.03 * camera.width)
         left.set_title(
             tr("Residuals, {factor:.0f} times, over corners per part").format(factor=factor)
         )
@@ -106,7 +119,7 @@ def draw_lens_residuals(result: LensResult) -> Drawing:
 def _draw_arrows(axes: Axes, at: Array, off: Array, length_px: float) -> float:
     """Draw residuals so that a typical one has the given length; return the magnification."""
     typical = max(float(np.percentile(np.hypot(off[:, 0], off[:, 1]), 90.0)), 1e-9)
-    factor = _round_to_one_digit(length_px / typical)
+    factor = round_to_one_digit(length_px / typical)
     axes.quiver(
         at[:, 0],
         at[:, 1],
@@ -119,11 +132,6 @@ def _draw_arrows(axes: Axes, at: Array, off: Array, length_px: float) -> float:
         color="0.15",
     )
     return factor
-
-
-def _round_to_one_digit(value: float) -> float:
-    power = 10.0 ** math.floor(math.log10(value))
-    return max(round(value / power), 1) * power
 
 
 def draw_top_pose(result: TopPoseResult, pictures: Mapping[str, Map]) -> tuple[Drawing, ...]:
@@ -151,7 +159,7 @@ def _draw_pose(view: TopPoseView, picture: Map, result: TopPoseResult) -> Drawin
         left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
         show_picture(left, picture)
         left.plot(corners[:, 0], corners[:, 1], "+", color=ACCENT, markersize=4.0, mew=0.8)
-        left.set_title(view.name)
+        left.set_title(printable(view.name))
         factor = _draw_arrows(right, corners, off, 0.4 * view.board.square_px)  # type: ignore[union-attr]
         right.plot(corners[:, 0], corners[:, 1], ".", color=ACCENT, markersize=2.0)
         right.set_aspect("equal")

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Sequence
-from functools import cache
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib import get_data_path, rc_context
+from matplotlib import rc_context
 from matplotlib.backends.backend_pdf import FigureCanvasPdf, PdfPages
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
-from matplotlib.ft2font import FT2Font
 from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
@@ -28,6 +26,7 @@ from gelpolight_core.report.document import (
     value_text,
     verdict_word,
 )
+from gelpolight_core.report.typeface import printable
 from gelpolight_core.translation import tr
 
 PAGE_MM = (210.0, 297.0)
@@ -39,7 +38,7 @@ LINE = 1.38
 DARK, GREY, RULE = "#1b1f24", "#4a535e", "#dde2e7"
 VERDICT_COLOURS = {Verdict.PASS: "#1b6e3a", Verdict.WARN: "#8a5200", Verdict.FAIL: "#b3211d"}
 PLAIN, FIXED = "DejaVu Sans", "DejaVu Sans Mono"
-_STYLE = {"text.parse_math": False, "pdf.fonttype": 42}
+_STYLE: dict[Any, Any] = {"text.parse_math": False, "pdf.fonttype": 42}
 
 
 class _Pages:
@@ -63,7 +62,7 @@ class _Pages:
         foot = PAGE_MM[1] - 9.0
         self.text(MARGIN_MM, foot, self._title, size=7.0, colour=GREY)
         self.text(PAGE_MM[0] - MARGIN_MM, foot, str(self._number), size=7.0, colour=GREY, end=True)
-        self._pdf.savefig(self._figure)
+        self._pdf.savefig(self._figure)  # type: ignore[no-untyped-call]
         self._begin()
 
     def need(self, height_mm: float) -> None:
@@ -74,7 +73,7 @@ class _Pages:
     def close(self) -> None:
         """Finish the last page and the file."""
         self.turn()
-        self._pdf.close()
+        self._pdf.close()  # type: ignore[no-untyped-call]
 
     def text(
         self,
@@ -92,7 +91,7 @@ class _Pages:
         self._figure.text(
             x_mm / PAGE_MM[0],
             1.0 - (y_mm + size * POINT_MM) / PAGE_MM[1],
-            text,
+            printable(text),
             fontsize=size,
             color=colour,
             fontweight="bold" if bold else "normal",
@@ -135,37 +134,25 @@ class _Pages:
             self.y_mm += size * POINT_MM * LINE
 
 
-@cache
-def _characters(file: str) -> frozenset[int]:
-    path = Path(get_data_path()) / "fonts" / "ttf" / file
-    return frozenset(FT2Font(str(path)).get_charmap())
-
-
-def printable(text: str) -> str:
-    """Return text with a white square for every character that the page's face does not have."""
-    known = _characters("DejaVuSans.ttf") & _characters("DejaVuSansMono.ttf")
-    shown = " ".join(text.split())
-    return "".join(c if ord(c) in known else "\N{WHITE SQUARE}" for c in shown)
-
-
 def wrap(text: str, width_mm: float, size: float, *, family: str = PLAIN) -> list[str]:
     """Break text into lines of at most that width; a word that is too long is broken too."""
     lines = [""]
     for word in printable(text).split(" "):
         longer = f"{lines[-1]} {word}".strip()
-        if _width_mm(longer, size, family) <= width_mm:
+        if line_width_mm(longer, size, family) <= width_mm:
             lines[-1] = longer
             continue
         if lines[-1]:
             lines.append("")
         for character in word:
-            if lines[-1] and _width_mm(lines[-1] + character, size, family) > width_mm:
+            if lines[-1] and line_width_mm(lines[-1] + character, size, family) > width_mm:
                 lines.append("")
             lines[-1] += character
     return lines
 
 
-def _width_mm(text: str, size: float, family: str) -> float:
+def line_width_mm(text: str, size: float, family: str = PLAIN) -> float:
+    """Return how wide a line is."""
     font = FontProperties(family=family, size=size)
     width, _, _ = text_to_path.get_text_width_height_descent(text or " ", font, ismath=False)
     return float(width) * POINT_MM
@@ -175,7 +162,7 @@ def report_pdf(report: Report) -> bytes:
     """Return the report as a PDF file of A4 pages."""
     stream = io.BytesIO()
     with rc_context(_STYLE):
-        pages = _Pages(stream, printable(report.title))
+        pages = _Pages(stream, report.title)
         pages.lines(wrap(report.title, WIDTH_MM, 17.0), size=17.0, bold=True)
         pages.y_mm += 1.0
         pages.lines(

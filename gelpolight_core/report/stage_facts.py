@@ -121,7 +121,6 @@ def _joint_facts(c: Calibration) -> Facts:
                 "gloss {gloss:.3f}, roughness {roughness:.3f}, light from around {bounce:.3f}"
             ).format(gloss=m.gloss, roughness=m.roughness, bounce=m.bounce),
         ),
-        (tr("Decay length of the drape"), f"{c.full.decay_mm:.3f} mm"),
     )
 
 
