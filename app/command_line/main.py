@@ -23,6 +23,7 @@ OUR_FAULT = 1
 MENDABLE = 2
 INTERRUPTED = 130
 LOG = "gelpolight-faults.log"
+DEMO = "--demo"
 
 
 class _Parser(argparse.ArgumentParser):
@@ -51,9 +52,16 @@ def build_parser() -> argparse.ArgumentParser:
 
     parser = _Parser(
         prog="gelpolight",
-        description=tr("Calibrate a point-lit tactile sensor, see what it feels, and measure it."),
+        description=tr(
+            "Calibrate a point-lit tactile sensor, see what it feels, and measure it. "
+            "Without a command the desktop program starts."
+        ),
     )
     parser.add_argument("--version", action="version", version=f"gelpolight {__version__}")
+    parser.add_argument(
+        DEMO, action="store_true", help=tr("start the desktop program on the virtual sensor")
+    )
+    parser.set_defaults(run=_open_desktop)
     commands = parser.add_subparsers(title=tr("commands"), metavar=tr("COMMAND"))
     for command in (
         simulate,
@@ -75,11 +83,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _open_closed_streams()
     warnings.showwarning = _log_warning
     try:
-        parser = build_parser()
-        options = parser.parse_args(arguments)
-        if not hasattr(options, "run"):
-            parser.print_help()
-            return 0
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        # The window is up before the commands, which it does not need, would be loaded.
+        options = _WINDOW.get(tuple(given)) or build_parser().parse_args(given)
         status: int = options.run(options)
         sys.stdout.flush()
     except InputError as error:
@@ -99,6 +105,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(_report_fault(), file=sys.stderr)
         return OUR_FAULT
     return status
+
+
+def _open_desktop(options: argparse.Namespace) -> int:
+    """Show the main window; here, because the commands run where no window library is."""
+    from app.desktop import run
+
+    return run([DEMO] if options.demo else [])
+
+
+_WINDOW = {
+    (): argparse.Namespace(run=_open_desktop, demo=False),
+    (DEMO,): argparse.Namespace(run=_open_desktop, demo=True),
+}
 
 
 def _open_closed_streams() -> None:

@@ -1,0 +1,1 @@
+"""The Sensors page: the library of sensors and their calibrations."""

@@ -1,0 +1,68 @@
+"""The table of pages: what the navigation offers, each page loaded when it is first opened."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QWidget
+
+    from app.shell.context import AppContext
+
+
+@dataclass(frozen=True, slots=True)
+class PageEntry:
+    """One page of the main window.
+
+    A page is a QWidget whose class takes the keyword ``context`` (an AppContext). It may have
+    ``enter()`` and ``leave()`` (it is shown, it is left), ``may_close() -> bool`` (asked before
+    the window closes) and ``open_path(path)`` (a folder or file was dropped or chosen).
+
+    Attributes
+    ----------
+    name : str
+        Short name, for settings and scripts.
+    title : str
+        What the navigation says.
+    icon : str
+        A name of :mod:`app.shell.icons`.
+    factory : str
+        ``module:class``; the module is imported when the page is first opened.
+    """
+
+    name: str
+    title: str
+    icon: str
+    factory: str
+
+    @property
+    def exists(self) -> bool:
+        """Whether the module is there."""
+        module = self.factory.partition(":")[0]
+        parent = module.rpartition(".")[0]
+        return (
+            importlib.util.find_spec(parent) is not None
+            and importlib.util.find_spec(module) is not None
+        )
+
+    def make(self, context: AppContext) -> QWidget:
+        """Load and make the page."""
+        module, _, name = self.factory.partition(":")
+        page: QWidget = getattr(importlib.import_module(module), name)(context=context)
+        return page
+
+
+def all_pages() -> tuple[PageEntry, ...]:
+    """Return the pages of this program, in the order of the work."""
+    table = (
+        PageEntry("sensors", tr("Sensors"), "sensors", "app.sensors.page:SensorsPage"),
+        PageEntry("calibrate", tr("Calibrate"), "calibrate", "app.calibrate.page:CalibratePage"),
+        PageEntry("inspect", tr("Inspect"), "inspect", "app.inspect.page:InspectPage"),
+        PageEntry("measure", tr("Measure"), "measure", "app.measure.page:MeasurePage"),
+    )
+    return tuple(entry for entry in table if entry.exists)

@@ -1,0 +1,134 @@
+"""What the program remembers between runs, in one INI file of the user's configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import platformdirs
+from PySide6.QtCore import QByteArray, QSettings
+
+APPLICATION = "gelpolight"
+THEMES = ("system", "light", "dark")
+RECENT = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Where the program begins to warn.
+
+    Attributes
+    ----------
+    age_days : float
+        A calibration older than this is marked: gel yellows and hardens in months.
+    height_percent, size_percent : float
+        Largest error of an object of known size for a validation to pass: what the paper reports
+        of its own sensor, 8 % in depth and 5 % in the plane.
+    """
+
+    age_days: float = 90.0
+    height_percent: float = 8.0
+    size_percent: float = 5.0
+
+
+class Settings:
+    """Typed access to the settings file."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path or platformdirs.user_config_path(APPLICATION) / "desktop.ini"
+        self._store = QSettings(str(self.path), QSettings.Format.IniFormat)
+
+    def _text(self, key: str, default: str = "") -> str:
+        return str(self._store.value(key, default))
+
+    @property
+    def theme(self) -> str:
+        """One of THEMES."""
+        theme = self._text("theme", "system")
+        return theme if theme in THEMES else "system"
+
+    @theme.setter
+    def theme(self, theme: str) -> None:
+        self._store.setValue("theme", theme)
+
+    @property
+    def workspace_folder(self) -> Path:
+        """Where sensors are kept."""
+        chosen = self._text("workspace")
+        return Path(chosen) if chosen else platformdirs.user_documents_path() / "GelPoLight"
+
+    @workspace_folder.setter
+    def workspace_folder(self, folder: Path) -> None:
+        self._store.setValue("workspace", str(folder))
+
+    @property
+    def last_folder(self) -> Path:
+        """Where a file dialog begins."""
+        folder = Path(self._text("last_folder") or Path.home())
+        return folder if folder.is_dir() else Path.home()
+
+    @last_folder.setter
+    def last_folder(self, folder: Path) -> None:
+        self._store.setValue("last_folder", str(folder))
+
+    @property
+    def last_page(self) -> str:
+        """Name of the page that was shown last."""
+        return self._text("last_page")
+
+    @last_page.setter
+    def last_page(self, name: str) -> None:
+        self._store.setValue("last_page", name)
+
+    @property
+    def recent_sessions(self) -> tuple[Path, ...]:
+        """Session folders, newest first."""
+        stored = self._text("recent_sessions")
+        return tuple(Path(text) for text in stored.split("\n") if text)
+
+    def add_recent_session(self, folder: Path) -> None:
+        """Put a session folder at the top of the recent ones."""
+        known = [folder, *(f for f in self.recent_sessions if f != folder)][:RECENT]
+        self._store.setValue("recent_sessions", "\n".join(map(str, known)))
+
+    def forget_recent_sessions(self) -> None:
+        """Empty the list of recent sessions."""
+        self._store.remove("recent_sessions")
+
+    @property
+    def limits(self) -> Limits:
+        """Where the program begins to warn; a value that is no number counts as not set."""
+        default = Limits()
+        values = {}
+        for field in fields(Limits):
+            standard = getattr(default, field.name)
+            try:
+                value = float(self._text(f"limits/{field.name}", str(standard)))
+            except ValueError:
+                value = standard
+            values[field.name] = value if 0.0 < value < 1e6 else standard
+        return Limits(**values)
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        for field in fields(Limits):
+            self._store.setValue(f"limits/{field.name}", getattr(limits, field.name))
+
+    def window_state(self) -> tuple[QByteArray, QByteArray]:
+        """Return geometry and state of the main window; empty at first."""
+        none = QByteArray()
+        geometry = self._store.value("window/geometry", none)
+        state = self._store.value("window/state", none)
+        return (
+            geometry if isinstance(geometry, QByteArray) else none,
+            state if isinstance(state, QByteArray) else none,
+        )
+
+    def keep_window_state(self, geometry: QByteArray, state: QByteArray) -> None:
+        """Remember geometry and state of the main window."""
+        self._store.setValue("window/geometry", geometry)
+        self._store.setValue("window/state", state)
+
+    def save(self) -> None:
+        """Write the file now."""
+        self._store.sync()

@@ -1,0 +1,114 @@
+"""Light and dark: palettes, colours with a meaning, and the little that Fusion needs beside."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QGuiApplication, QPalette
+from PySide6.QtWidgets import QApplication
+
+# name: (light, dark). Every text colour has at least 4.5:1 on window, base and alternate base.
+COLOURS = {
+    "window": ("#f3f4f6", "#212429"),
+    "base": ("#ffffff", "#191b1f"),
+    "alternate": ("#eceef1", "#23262b"),
+    "button": ("#e6e8ec", "#30353b"),
+    "text": ("#1b2026", "#e7e9ec"),
+    "muted": ("#565f69", "#a6aeb8"),
+    "disabled": ("#868e97", "#767e87"),
+    "line": ("#c9ced4", "#3d434b"),
+    "highlight": ("#0b5cad", "#1f62a8"),
+    "highlighted": ("#ffffff", "#ffffff"),
+    "accent": ("#0b5cad", "#74b5f7"),
+    "pass": ("#17652f", "#74d18f"),
+    "warn": ("#7f4d00", "#f2b75f"),
+    "fail": ("#ad1f18", "#ff938a"),
+    "stale": ("#5f4596", "#bfa9e8"),
+    "tip": ("#fffbe8", "#33383f"),
+}
+
+STYLE = """
+QToolTip {{ color: {text}; background: {tip}; border: 1px solid {line}; padding: 3px; }}
+QStatusBar {{ border-top: 1px solid {line}; }}
+QStatusBar::item {{ border: none; }}
+QStatusBar QLabel {{ padding: 1px 8px; }}
+QToolBar#navigation {{ background: {alternate}; border: none; border-right: 1px solid {line};
+    padding: 6px; spacing: 4px; }}
+QToolBar#navigation QToolButton {{ border: 2px solid transparent; border-radius: 6px;
+    padding: 8px 4px; min-width: 76px; }}
+QToolBar#navigation QToolButton:hover {{ background: {button}; }}
+QToolBar#navigation QToolButton:checked {{ background: {base}; border-color: {line};
+    font-weight: 600; }}
+QToolBar#navigation QToolButton:focus {{ border-color: {accent}; }}
+"""
+
+
+def is_dark() -> bool:
+    """Whether the program shows its dark theme now."""
+    return QApplication.palette().color(QPalette.ColorRole.Window).lightness() < 128
+
+
+def colour(name: str) -> QColor:
+    """Return a colour of the theme that is shown now.
+
+    Parameters
+    ----------
+    name : str
+        A key of COLOURS; those with a meaning are pass, warn, fail, stale, accent and muted.
+    """
+    return QColor(COLOURS[name][is_dark()])
+
+
+def palette_for(dark: bool) -> QPalette:
+    """Return the palette of a theme."""
+    c = {name: QColor(pair[dark]) for name, pair in COLOURS.items()}
+    role = QPalette.ColorRole
+    palette = QPalette()
+    for to, name in (
+        (role.Window, "window"),
+        (role.WindowText, "text"),
+        (role.Base, "base"),
+        (role.AlternateBase, "alternate"),
+        (role.Text, "text"),
+        (role.PlaceholderText, "muted"),
+        (role.Button, "button"),
+        (role.ButtonText, "text"),
+        (role.BrightText, "fail"),
+        (role.ToolTipBase, "tip"),
+        (role.ToolTipText, "text"),
+        (role.Highlight, "highlight"),
+        (role.HighlightedText, "highlighted"),
+        (role.Accent, "accent"),
+        (role.Link, "accent"),
+        (role.LinkVisited, "stale"),
+        (role.Mid, "line"),
+    ):
+        palette.setColor(to, c[name])
+    for to in (role.WindowText, role.Text, role.ButtonText, role.HighlightedText):
+        palette.setColor(QPalette.ColorGroup.Disabled, to, c["disabled"])
+    palette.setColor(QPalette.ColorGroup.Disabled, role.Highlight, c["button"])
+    return palette
+
+
+def apply(application: QApplication, choice: str) -> None:
+    """Show a theme: ``light``, ``dark``, or ``system``, what the desktop says."""
+    if choice == "system":
+        dark = QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
+    else:
+        dark = choice == "dark"
+    if application.style().name() != "fusion":
+        application.setStyle("Fusion")
+    application.setPalette(palette_for(dark))
+    application.setStyleSheet(STYLE.format(**{name: p[dark] for name, p in COLOURS.items()}))
+
+
+def contrast(one: QColor, other: QColor) -> float:
+    """Return the contrast of two colours by WCAG 2, 1 to 21."""
+
+    def luminance(c: QColor) -> float:
+        def linear(v: float) -> float:
+            return v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4
+
+        return 0.2126 * linear(c.redF()) + 0.7152 * linear(c.greenF()) + 0.0722 * linear(c.blueF())
+
+    light, dark = sorted((luminance(one), luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
