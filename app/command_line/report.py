@@ -12,12 +12,12 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.pipeline import STAGES, calibrate_session
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
-from gelpolight_core.measurement.evaluation import Evaluation, evaluate_presses
+from gelpolight_core.measurement.evaluation import evaluate_presses
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.report.build import calibration_report, run_report
-from gelpolight_core.report.document import Report
+from gelpolight_core.report.build import calibration_report, run_report, validation_of
+from gelpolight_core.report.document import Report, Validation
 from gelpolight_core.report.file import refuse_other_endings, write_report
 from gelpolight_core.session.session import (
     Session,
@@ -78,8 +78,8 @@ def _of_calibration(options: argparse.Namespace) -> Report:
     refuse_unwritable(options.output)
     calibration = read_calibration(options.source)
     with StageProgress() as tell:
-        evaluation = _evaluate(calibration, options.presses, tell)
-    return calibration_report(calibration, evaluation=evaluation)
+        validation = _validate(calibration, options.presses, tell)
+    return calibration_report(calibration, validation=validation)
 
 
 def _of_session(options: argparse.Namespace) -> Report:
@@ -90,12 +90,12 @@ def _of_session(options: argparse.Namespace) -> Report:
     refuse_copies(used)
     with StageProgress() as tell:
         result = calibrate_session(session, model=options.model or MODELS[-1], progress=tell)
-        evaluation = _evaluate(result.calibration, options.presses, tell)
+        validation = _validate(result.calibration, options.presses, tell)
         tell(tr("report"), 1.0)
-        return run_report(result, session, evaluation=evaluation)
+        return run_report(result, session, validation=validation)
 
 
-def _evaluate(calibration: Calibration, presses: Path | None, tell: Any) -> Evaluation | None:
+def _validate(calibration: Calibration, presses: Path | None, tell: Any) -> Validation | None:
     if presses is None:
         return None
     reconstructor = Reconstructor(calibration)
@@ -105,4 +105,4 @@ def _evaluate(calibration: Calibration, presses: Path | None, tell: Any) -> Eval
         require_colour(picture, where=str(path))
         return reconstructor.depth(picture.rgb, name=path.name, normals=False)
 
-    return evaluate_presses(presses, reconstruct, progress=tell)
+    return validation_of(evaluate_presses(presses, reconstruct, progress=tell))

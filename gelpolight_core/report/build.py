@@ -18,6 +18,7 @@ from gelpolight_core.report.document import (
     Listing,
     Report,
     Section,
+    Validation,
     verdict_word,
 )
 from gelpolight_core.report.drawing import Map
@@ -46,15 +47,15 @@ class _Parts:
     listings: tuple[Listing, ...] = ()
 
 
-def calibration_report(calibration: Calibration, *, evaluation: Evaluation | None = None) -> Report:
+def calibration_report(calibration: Calibration, *, validation: Validation | None = None) -> Report:
     """Return the report of a calibration file: all but what only the pictures show.
 
     Parameters
     ----------
     calibration : Calibration
         As read from its file.
-    evaluation : Evaluation, optional
-        Objects of known size, measured with it.
+    validation : Validation, optional
+        What is known from objects of known size; by default, that nothing is.
     """
     parts: dict[str, _Parts] = {
         "lights": _Parts((draw_led_plan(calibration),)),
@@ -64,11 +65,11 @@ def calibration_report(calibration: Calibration, *, evaluation: Evaluation | Non
     }
     if calibration.full is not None:
         parts["joint"] = _Parts((draw_led_moves(calibration),))
-    return _assemble(calibration, parts, evaluation)
+    return _assemble(calibration, parts, validation)
 
 
 def run_report(
-    run: CalibrationRun, session: Session, *, evaluation: Evaluation | None = None
+    run: CalibrationRun, session: Session, *, validation: Validation | None = None
 ) -> Report:
     """Return the report of a run: every stage with its pictures.
 
@@ -78,8 +79,8 @@ def run_report(
         A calibration with the results of every stage.
     session : Session
         The one that it was made from, for the pictures.
-    evaluation : Evaluation, optional
-        Objects of known size, measured with the calibration.
+    validation : Validation, optional
+        What is known from objects of known size; by default, that nothing is.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def run_report(
         parts["joint"] = _Parts(
             (draw_led_moves(c), draw_misfits(run.reflectance.presses, run.joint))
         )
-    return _assemble(c, parts, evaluation)
+    return _assemble(c, parts, validation)
 
 
 def _named(session: Session, stage: str) -> Mapping[str, Map]:
@@ -178,7 +179,7 @@ def _rejected_spots(run: CalibrationRun) -> tuple[Listing, ...]:
     return (Listing(tr("Glints that were rejected"), heads, rows, (0.5, 1.0, 4.0)),)
 
 
-def _assemble(c: Calibration, parts: Mapping[str, _Parts], evaluation: Evaluation | None) -> Report:
+def _assemble(c: Calibration, parts: Mapping[str, _Parts], validation: Validation | None) -> Report:
     sections = tuple(
         replace(
             _section(c, key, table),
@@ -187,13 +188,11 @@ def _assemble(c: Calibration, parts: Mapping[str, _Parts], evaluation: Evaluatio
         )
         for key, table in c.quality.items()
     )
-    sentence, listing = _validation(evaluation)
     return Report(
         title=tr("Calibration of sensor {serial}").format(serial=c.sensor.serial),
         verdict=c.verdict,
         facts=_head_facts(c),
-        validation=sentence,
-        validation_listing=listing,
+        validation=validation or Validation(_not_validated()),
         sections=sections,
         sources=Listing(
             tr("Source files"),
@@ -235,15 +234,21 @@ def _head_facts(c: Calibration) -> tuple[tuple[str, str], ...]:
     return tuple(rows)
 
 
-def _validation(evaluation: Evaluation | None) -> tuple[str, Listing | None]:
-    if evaluation is None:
-        return (
-            tr(
-                "Not validated: no object of known size was measured with this calibration. A "
-                "wrong ball radius or square size scales every result, and no picture can tell"
-            ),
-            None,
-        )
+def _not_validated() -> str:
+    return tr(
+        "Not validated: no object of known size was measured with this calibration. A wrong ball "
+        "radius or square size scales every result, and no picture can tell"
+    )
+
+
+def validation_of(evaluation: Evaluation) -> Validation:
+    """Return what an evaluation on presses of known size says of a calibration.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Made with the calibration.
+    """
     measured = len(evaluation.results) - len(evaluation.failed)
     sentence = tr("{measured} of {n} presses of known objects were measured").format(
         measured=measured, n=len(evaluation.results)
@@ -259,7 +264,7 @@ def _validation(evaluation: Evaluation | None) -> tuple[str, Listing | None]:
         )
     else:
         sentence = tr("Not validated: {first}").format(first=sentence)
-    return sentence, _validation_listing(evaluation)
+    return Validation(sentence, _validation_listing(evaluation))
 
 
 def _validation_listing(evaluation: Evaluation) -> Listing:

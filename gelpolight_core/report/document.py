@@ -87,6 +87,22 @@ class Section:
 
 
 @dataclass(frozen=True, slots=True)
+class Validation:
+    """Whether objects of known size were measured with the calibration.
+
+    Attributes
+    ----------
+    sentence : str
+        Whether, and how well; without a full stop.
+    listing : Listing or None
+        Each object.
+    """
+
+    sentence: str
+    listing: Listing | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """A whole report.
 
@@ -98,10 +114,8 @@ class Report:
         Of the calibration.
     facts : tuple of (label, value)
         Sensor and provenance.
-    validation : str
-        Whether objects of known size were measured with it, and how well.
-    validation_listing : Listing or None
-        Each of them.
+    validation : Validation
+        What is known from objects of known size.
     sections : tuple of Section
         The stages in their order.
     sources : Listing
@@ -111,8 +125,7 @@ class Report:
     title: str
     verdict: Verdict
     facts: tuple[tuple[str, str], ...]
-    validation: str
-    validation_listing: Listing | None
+    validation: Validation
     sections: tuple[Section, ...]
     sources: Listing
 

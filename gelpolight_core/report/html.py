@@ -86,10 +86,10 @@ def _badge(verdict: Verdict) -> str:
 
 
 def _validation(report: Report) -> str:
-    box = f'<p class="box">{escape(report.validation)}.</p>'
-    if report.validation_listing is None:
+    box = f'<p class="box">{escape(report.validation.sentence)}.</p>'
+    if report.validation.listing is None:
         return box
-    return box + _listing(report.validation_listing)
+    return box + _listing(report.validation.listing)
 
 
 def _facts(facts: Iterable[tuple[str, str]]) -> str:

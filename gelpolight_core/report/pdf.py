@@ -172,10 +172,10 @@ def report_pdf(report: Report) -> bytes:
             bold=True,
         )
         pages.y_mm += 1.5
-        pages.lines(wrap(f"{report.validation}.", WIDTH_MM, 9.0), size=9.0)
+        pages.lines(wrap(f"{report.validation.sentence}.", WIDTH_MM, 9.0), size=9.0)
         pages.y_mm += 2.0
-        if report.validation_listing is not None:
-            _listing(pages, report.validation_listing)
+        if report.validation.listing is not None:
+            _listing(pages, report.validation.listing)
         _facts(pages, report.facts)
         _summary(pages, report.sections)
         for section in report.sections:

@@ -1,0 +1,1 @@
+"""The calibration wizard and the editors that it opens."""
