@@ -10,6 +10,7 @@ from hypothesis import settings
 
 if TYPE_CHECKING:
     from gelpolight_core.calibration.calibration import Calibration
+    from gelpolight_core.calibration.pipeline import CalibrationRun
 
 # The same examples on every machine, so that a verdict can be repeated; look further, now and then,
 # with --hypothesis-profile=explore.
@@ -40,9 +41,15 @@ def virtual_session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def virtual_calibration(virtual_session: Path) -> Calibration:
-    """Return the full model's calibration of the virtual session; not to be changed."""
+def virtual_run(virtual_session: Path) -> CalibrationRun:
+    """Return the full model's run on the virtual session; not to be changed."""
     from gelpolight_core.calibration.pipeline import calibrate_session
     from gelpolight_core.session.session import read_session
 
-    return calibrate_session(read_session(virtual_session), model="full").calibration
+    return calibrate_session(read_session(virtual_session), model="full")
+
+
+@pytest.fixture(scope="session")
+def virtual_calibration(virtual_run: CalibrationRun) -> Calibration:
+    """Return the full model's calibration of the virtual session; not to be changed."""
+    return virtual_run.calibration

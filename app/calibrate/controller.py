@@ -13,9 +13,9 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QUndoStack
 
 from app.calibrate.commands import Decide
+from app.calibrate.detection import Detection
 from app.calibrate.jobs import Job, Jobs
 from app.calibrate.look import Looker
-from app.calibrate.detection import Detection
 from app.calibrate.steps import Step
 from app.calibrate.still import Still
 from app.sources.mailbox import Mailbox

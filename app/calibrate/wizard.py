@@ -32,7 +32,7 @@ from app.calibrate.setup_form import SetupForm
 from app.calibrate.states import RUNNING, is_done, step_state
 from app.calibrate.step_list import StepList
 from app.calibrate.step_panel import StepPanel
-from app.calibrate.steps import Step, all_steps
+from app.calibrate.steps import all_steps
 from app.calibrate.takes import takes_of
 from app.calibrate.validating import Validating
 from app.calibrate.validation_panel import ValidationPanel

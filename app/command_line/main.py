@@ -46,6 +46,7 @@ def build_parser() -> argparse.ArgumentParser:
         inspect_calibration,
         measure,
         reconstruct,
+        report,
         simulate,
     )
 
@@ -69,6 +70,7 @@ def build_parser() -> argparse.ArgumentParser:
         reconstruct,
         measure,
         evaluate,
+        report,
         benchmark,
         design,
     ):

@@ -85,6 +85,8 @@ class JointResult:
         Refined.
     misfit : float
         Robust relative misfit over all pixels.
+    ball_misfits : (balls,)
+        The same for each press; NaN where none of its pixels counts.
     held_out : tuple of 2 floats
         Mean robust loss on presses that were held out: with the mirror's LEDs, and with refined
         ones.
@@ -100,6 +102,7 @@ class JointResult:
     decay_mm: float
     balls: tuple[BallPose, ...]
     misfit: float
+    ball_misfits: Array
     held_out: tuple[float, float]
     kept: str
 
@@ -282,6 +285,7 @@ def refine_jointly(
             for (cx, cy, depth), p in zip(x[_GLOBAL:].reshape(-1, 3), pixels, strict=True)
         ),
         solved.misfit,
+        solved.ball_misfits,
         held_out,
         "refined" if refine else "mirror",
     )
@@ -302,11 +306,12 @@ def _thinned(pixels: BallPixels) -> BallPixels:
 
 @dataclass(frozen=True, slots=True)
 class _Solution:
-    """Parameters, their standard deviations, robust misfit of the ratio, and mean robust loss."""
+    """Parameters, their standard deviations, robust misfits of the ratio, and mean robust loss."""
 
     x: Array
     sd: Array
     misfit: float
+    ball_misfits: Array
     loss: float
 
 
@@ -354,16 +359,24 @@ def _solve(
         max_nfev=40,
     )
     x = whole(fit.x)
-    scaled = np.concatenate(problem.residuals(x))
+    residuals = problem.residuals(x)
+    weights = [p.weight.ravel() for p in pixels]
+    scaled = np.concatenate(residuals)
     loss = float(np.mean(np.sqrt(1.0 + scaled**2) - 1.0))
-    left = CORRELATION * np.concatenate(problem.residuals(x))
-    weight = np.concatenate([p.weight.ravel() for p in pixels])
-    seen = (weight > 0.0) & (left != 0.0)
-    misfit = 1.4826 * float(np.median(np.abs(left[seen] / weight[seen])))
+    misfit = _relative_misfit(scaled, np.concatenate(weights))
+    of_balls = [_relative_misfit(r, w) for r, w in zip(residuals, weights, strict=True)]
     curvature = problem.jacobian(x)[:, first_free:]
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.concatenate([np.zeros(first_free), np.sqrt(np.maximum(variance, 0.0))])
-    return _Solution(x, sd, misfit, loss)
+    return _Solution(x, sd, misfit, np.array(of_balls), loss)
+
+
+def _relative_misfit(scaled: Array, weight: Array) -> float:
+    """Return the robust misfit of the ratio from scaled residuals; NaN where none counts."""
+    seen = (weight > 0.0) & (scaled != 0.0)
+    if not seen.any():
+        return float("nan")
+    return 1.4826 * float(np.median(np.abs(CORRELATION * scaled[seen] / weight[seen])))
 
 
 def _held_out(

@@ -12,6 +12,7 @@ import numpy as np
 from gelpolight_core import __version__
 from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.calibration.stages import (
     StageResults,
     press_noise,
@@ -57,6 +58,7 @@ class CalibrationRun:
     radiance: RadianceResult
     reflectance: ReflectanceResult
     factors: FactorResult
+    joint: JointResult | None = None
 
 
 def calibrate_session(
@@ -161,7 +163,8 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
         provenance=_provenance(session),
         full=full,
     )
-    return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
+    joint = results.joint if model == "full" else None
+    return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors, joint)
 
 
 def judge_joint(full: FullModel) -> QualityTable:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import FullModel, sensor_stack
 from gelpolight_core.calibration.inputs import NEEDS, Stage, inputs_of
-from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
+from gelpolight_core.calibration.joint import JointResult, gather_ball_pixels, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -86,6 +86,7 @@ class StageResults:
     balls: tuple[SeenBall, ...] = ()
     reflectance: ReflectanceResult | None = None
     factors: FactorResult | None = None
+    joint: JointResult | None = None
     full: FullModel | None = None
 
     @property
@@ -311,7 +312,7 @@ def _run_joint(session: Session, results: StageResults, _tell: Progress) -> Stag
         joint.held_out,
         joint.kept,
     )
-    return replace(results, full=full)
+    return replace(results, joint=joint, full=full)
 
 
 _RUNS: Mapping[Stage, Callable[[Session, StageResults, Progress], StageResults]] = MappingProxyType(

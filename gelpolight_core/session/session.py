@@ -310,10 +310,17 @@ def read_session(folder: Path) -> Session:
         raise InputError(
             tr("the file is nested too deeply"), where=str(path), advice=tr("Mend the file")
         ) from error
-    return _parse(content, path)
+    return parse_session(content, path)
 
 
-def _parse(content: dict[str, Any], path: Path) -> Session:
+def parse_session(content: dict[str, Any], path: Path) -> Session:
+    """Return the session that the content of a session.toml describes.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown, missing, of the wrong kind or out of range; `path` is named.
+    """
     top = _Table(content, "", path)
     if top.text("format") != FORMAT:
         raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))

@@ -282,6 +282,7 @@ def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
     result = refine_jointly(presses, pixels, MIRROR)
     assert result.decay_mm == pytest.approx(0.6, abs=0.02)
     assert result.membrane.gloss < 0.1
+    assert result.ball_misfits.argmax() == 2
     for index in (0, 1, 3, 4, 5):
         assert np.hypot(*np.subtract(result.balls[index].centre_mm, BALLS[index].centre_mm)) < 0.03
 

@@ -1,0 +1,396 @@
+"""The editor of the reflectance table: nodes under the hand, every step undoable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import (
+    QAction,
+    QActionGroup,
+    QCloseEvent,
+    QKeyEvent,
+    QKeySequence,
+    QUndoCommand,
+    QUndoStack,
+)
+from PySide6.QtWidgets import QLabel, QSplitter, QToolBar, QToolButton, QVBoxLayout, QWidget
+
+from app.calibrate import lut_model as model
+from app.calibrate.lut_effect import Effect
+from app.calibrate.lut_live import LivePanel
+from app.calibrate.lut_model import CHANNELS, CurveEdit
+from app.calibrate.lut_plot import CurvePlot
+from app.widgets.naming import named
+from gelpolight_core.calibration.scatter import ReflectanceScatter
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+NUDGE = 0.002
+"""A key's step, as a share of the curve's highest value and of the cosine's range."""
+NUDGES = {
+    Qt.Key.Key_Left: (-1.0, 0.0),
+    Qt.Key.Key_Right: (1.0, 0.0),
+    Qt.Key.Key_Up: (0.0, 1.0),
+    Qt.Key.Key_Down: (0.0, -1.0),
+}
+
+
+class _Swap(QUndoCommand):
+    """Shows one state or the other."""
+
+    def __init__(
+        self, text: str, before: CurveEdit, after: CurveEdit, show: Callable[[CurveEdit], None]
+    ) -> None:
+        super().__init__(text)
+        self._before, self._after, self._show = before, after, show
+
+    def undo(self) -> None:
+        """Show the older state."""
+        self._show(self._before)
+
+    def redo(self) -> None:
+        """Show the newer state."""
+        self._show(self._after)
+
+
+class LutEditor(QWidget):
+    """Edits the three curves of a reflectance table.
+
+    Parameters
+    ----------
+    start : CurveEdit
+        The state to begin with, and to return to.
+    scatter : ReflectanceScatter
+        The ball pixels behind it.
+    previous : CurveEdit, optional
+        An older version to compare with; by default `start`.
+    effect : callable, optional
+        From (state, press's name) to :class:`~app.calibrate.lut_effect.Effect`.
+    parent : QWidget, optional
+        Of the editor.
+    """
+
+    edited = Signal(object)
+
+    def __init__(
+        self,
+        start: CurveEdit,
+        scatter: ReflectanceScatter,
+        *,
+        previous: CurveEdit | None = None,
+        effect: Callable[[CurveEdit, str], Effect] | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._start = self._state = self._shown = start
+        self._previous = previous or start
+        self._scatter = scatter
+        self.channel = 0
+        self.chosen: int | None = None
+        self.undo_stack = QUndoStack(self)
+        self.plot = named(CurvePlot(scatter), "lut.plot", tr("Reflectance curve"))
+        self.plot.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.live = None if effect is None else LivePanel(start, scatter.names, effect)
+        self._notice = named(QLabel(), "lut.notice", tr("What was done"))
+        self._hint = named(QLabel(), "lut.hint", tr("How to edit"))
+        for label in (self._notice, self._hint):
+            label.setTextFormat(Qt.TextFormat.PlainText)
+            label.setWordWrap(True)
+        self._actions = self._make_actions()
+        self._lay_out()
+        self._connect()
+        self._apply_theme()
+        self.choose_channel(0)
+
+    @property
+    def state(self) -> CurveEdit:
+        """The state that stands, without a drag that has not ended."""
+        return self._state
+
+    def choose_channel(self, channel: int) -> None:
+        """Show another channel's curve."""
+        self.channel, self.chosen = channel, None
+        self._actions[f"channel.{CHANNELS[channel]}"].setChecked(True)
+        self.plot.whole(self._state, channel)
+        self._refresh()
+
+    def choose_node(self, index: int | None) -> None:
+        """Choose a node of the channel for the keys and buttons."""
+        self.chosen = index
+        self._notice.clear()
+        self._refresh()
+
+    def stop(self) -> bool:
+        """End the panel's thread; return whether it has ended."""
+        return self.live is None or self.live.stop()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """End the panel's thread."""
+        self.stop()
+        super().closeEvent(event)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the theme."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_actions"):
+            self._apply_theme()
+            self._refresh()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Nudge the chosen node, or go to its neighbour."""
+        key = Qt.Key(event.key())
+        if key in NUDGES and self.chosen is not None:
+            times = 10.0 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0
+            self._nudge(*(times * step for step in NUDGES[key]))
+        elif key in (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown):
+            self._choose_beside(1 if key == Qt.Key.Key_PageUp else -1)
+        elif key == Qt.Key.Key_Escape and self._actions["lasso"].isChecked():
+            self._actions["lasso"].setChecked(False)
+        else:
+            super().keyPressEvent(event)
+
+    def _make_actions(self) -> dict[str, QAction]:
+        actions: dict[str, QAction] = {}
+
+        def add(key: str, text: str, tip: str, shortcut: str = "", check: bool = False) -> QAction:
+            action = QAction(text, self)
+            action.setObjectName(f"lut.{key}")
+            action.setCheckable(check)
+            action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            if shortcut:
+                action.setShortcut(QKeySequence(shortcut))
+                tip += f" ({action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)})"
+            action.setToolTip(tip)
+            actions[key] = action
+            self.addAction(action)
+            return action
+
+        group = QActionGroup(self)
+        for k, name in enumerate(CHANNELS):
+            action = add(
+                f"channel.{name}",
+                tr(name).capitalize(),
+                tr("Show the {name} channel's curve").format(name=tr(name)),
+                f"Ctrl+{k + 1}",
+                check=True,
+            )
+            action.triggered.connect(lambda _on, k=k: self.choose_channel(k))
+            group.addAction(action)
+        add("add", tr("Add node"), tr("Add a node in the widest gap beside the chosen one"), "Ins")
+        add("remove", tr("Remove node"), tr("Remove the chosen node"), "Del")
+        add("thin", tr("Fewer nodes"), tr("Keep as few nodes as draw the same curve"), "F")
+        add("snap", tr("Snap to fit"), tr("Put the chosen node, or all, on the fitted curve"), "S")
+        add("smooth", tr("Smooth"), tr("Even out the curve's bumps by half"), "M")
+        add(
+            "lasso",
+            tr("Lasso"),
+            tr("Draw around points to leave them out; the curve is fitted anew"),
+            "L",
+            check=True,
+        )
+        add("reset", tr("Reset channel"), tr("Return this channel to where it began"))
+        add("compare", tr("Compare"), tr("Show the previous version beside"), "C", check=True)
+        add("view", tr("Whole curve"), tr("Show the whole curve"), "Home")
+        return actions
+
+    def _lay_out(self) -> None:
+        bar = named(QToolBar(), "lut.tools", tr("Tools of the reflectance curve"))
+        undo = self.undo_stack.createUndoAction(self, tr("Undo"))
+        redo = self.undo_stack.createRedoAction(self, tr("Redo"))
+        for key, action, shortcut in (
+            ("undo", undo, QKeySequence.StandardKey.Undo),
+            ("redo", redo, QKeySequence.StandardKey.Redo),
+        ):
+            action.setObjectName(f"lut.{key}")
+            action.setShortcut(QKeySequence(shortcut))
+            action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            self._actions[key] = action
+            self.addAction(action)
+        groups = (
+            [f"channel.{name}" for name in CHANNELS],
+            ["add", "remove", "thin", "snap", "smooth"],
+            ["lasso", "reset"],
+            ["compare", "view"],
+            ["undo", "redo"],
+        )
+        for keys in groups:
+            for key in keys:
+                bar.addAction(self._actions[key])
+                button = bar.widgetForAction(self._actions[key])
+                if isinstance(button, QToolButton):
+                    named(button, f"lut.{key}.button", self._actions[key].text())
+                    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+            bar.addSeparator()
+        split = QSplitter(Qt.Orientation.Horizontal)
+        split.addWidget(self.plot)
+        split.setStretchFactor(0, 3)
+        if self.live is not None:
+            split.addWidget(self.live)
+            split.setStretchFactor(1, 1)
+            split.setSizes([860, 400])
+        layout = QVBoxLayout(self)
+        layout.addWidget(bar)
+        layout.addWidget(split, 1)
+        layout.addWidget(self._hint)
+        layout.addWidget(self._notice)
+
+    def _connect(self) -> None:
+        self.plot.node_chosen.connect(self.choose_node)
+        self.plot.node_moved.connect(self._on_node_moved)
+        self.plot.outlined.connect(self._on_outlined)
+        self.plot.asked_for_node.connect(self._add_at)
+        handlers: dict[str, Callable[[], None]] = {
+            "add": self._on_add,
+            "remove": self._on_remove,
+            "thin": lambda: self._do(tr("fewer nodes"), model.thin_nodes, keep=False),
+            "snap": lambda: self._do(tr("snap to fit"), model.snap_to_fit, self.chosen),
+            "smooth": lambda: self._do(tr("smooth"), model.smooth),
+            "reset": lambda: self._do(
+                tr("reset channel"), model.reset_channel, self._start, keep=False
+            ),
+            "view": lambda: self.plot.whole(self._state, self.channel),
+        }
+        for key, handler in handlers.items():
+            self._actions[key].triggered.connect(lambda _on=False, handler=handler: handler())
+        self._actions["lasso"].toggled.connect(self._on_lasso)
+        self._actions["compare"].toggled.connect(lambda _on: self._refresh())
+
+    def _apply_theme(self) -> None:
+        self.plot.apply_theme()
+        if self.live is not None:
+            self.live.apply_theme()
+
+    def _do(
+        self,
+        text: str,
+        operation: Callable[..., CurveEdit],
+        *details: object,
+        keep: bool = True,
+    ) -> None:
+        """Apply an operation of the model to the channel; `keep` the chosen node."""
+        try:
+            after = operation(self._state, self.channel, *details)
+        except InputError as error:
+            self._notice.setText(str(error))
+            return
+        if not keep:
+            self.chosen = None
+        self._commit(text, after)
+
+    def _commit(self, text: str, after: CurveEdit) -> None:
+        self._notice.clear()
+        if after == self._state:
+            self._show(after)
+            return
+        name = tr(CHANNELS[self.channel])
+        self.undo_stack.push(_Swap(f"{text} ({name})", self._state, after, self._show))
+
+    def _show(self, state: CurveEdit) -> None:
+        """Make a state the one that stands."""
+        changed = state != self._state
+        self._state = self._shown = state
+        if self.chosen is not None and self.chosen >= len(state.curves[self.channel].cosines):
+            self.chosen = None
+        self._refresh()
+        if changed:
+            self.edited.emit(state)
+
+    def _refresh(self) -> None:
+        compare = self._actions["compare"].isChecked()
+        previous = self._previous.curves[self.channel] if compare else None
+        self.plot.show_state(self._shown, self.channel, chosen=self.chosen, previous=previous)
+        self._hint.setText(self._hint_text())
+        curve = self._state.curves[self.channel]
+        inner = self.chosen is not None and 0 < self.chosen < len(curve.cosines) - 1
+        self._actions["remove"].setEnabled(inner)
+        changed = (
+            curve != self._start.curves[self.channel]
+            or self._state.left_out[self.channel] != self._start.left_out[self.channel]
+        )
+        self._actions["reset"].setEnabled(changed)
+        if self.live is not None:
+            self.live.show_state(self._shown)
+
+    def _hint_text(self) -> str:
+        if self._actions["lasso"].isChecked():
+            return tr("Drag a line around the points to leave out. Esc puts the lasso away.")
+        if self.chosen is None:
+            return tr(
+                "Drag a ring to move it; click one to choose it; double-click the curve for a new "
+                "one; the wheel zooms. A ring stays between its neighbours: Fewer nodes gives room."
+            )
+        curve = self._shown.curves[self.channel]
+        return tr(
+            "Node {number} of {all}: cosine {cosine:.4f}, value {value:.4f}. Arrow keys nudge it "
+            "(Shift: ten times), Page Up and Page Down choose its neighbours, Del removes it."
+        ).format(
+            number=self.chosen + 1,
+            all=len(curve.cosines),
+            cosine=curve.cosines[self.chosen],
+            value=curve.values[self.chosen],
+        )
+
+    def _on_node_moved(self, index: int, cosine: float, value: float, end: bool) -> None:
+        moved = model.move_node(self._state, self.channel, index, cosine, value)
+        if end:
+            self._commit(tr("move node"), moved)
+            return
+        self._shown = moved
+        self._refresh()
+
+    def _nudge(self, across: float, up: float) -> None:
+        assert self.chosen is not None
+        curve = self._state.curves[self.channel]
+        self._do(
+            tr("nudge node"),
+            model.move_node,
+            self.chosen,
+            curve.cosines[self.chosen] + NUDGE * across,
+            curve.values[self.chosen] + NUDGE * up * curve.values[-1],
+        )
+
+    def _choose_beside(self, step: int) -> None:
+        count = len(self._state.curves[self.channel].cosines)
+        start = (-1 if step > 0 else count) if self.chosen is None else self.chosen
+        self.choose_node(min(max(start + step, 0), count - 1))
+
+    def _on_add(self) -> None:
+        """Add a node in the middle of the wider gap beside the chosen node, or of the widest."""
+        cosines: Sequence[float] = self._state.curves[self.channel].cosines
+        gaps = range(len(cosines) - 1)
+        if self.chosen is not None:
+            gaps = range(max(self.chosen - 1, 0), min(self.chosen + 1, len(cosines) - 1))
+        gap = max(gaps, key=lambda i: cosines[i + 1] - cosines[i])
+        self._add_at(0.5 * (cosines[gap] + cosines[gap + 1]))
+
+    def _add_at(self, cosine: float) -> None:
+        try:
+            after, index = model.add_node(self._state, self.channel, cosine)
+        except InputError as error:
+            self._notice.setText(str(error))
+            return
+        self.chosen = index
+        self._commit(tr("add node"), after)
+
+    def _on_remove(self) -> None:
+        if self.chosen is not None:
+            self._do(tr("remove node"), model.remove_node, self.chosen, keep=False)
+
+    def _on_lasso(self, on: bool) -> None:
+        self.plot.box.lasso = on
+        self.plot.nodes.setVisible(not on)
+        self._refresh()
+
+    def _on_outlined(self, outline: Sequence[tuple[float, float]]) -> None:
+        before = self._state
+        self._do(tr("leave points out"), model.leave_out, outline, self._scatter, keep=False)
+        if self._state is not before:
+            out = model.left_out_points(
+                self._state.left_out[self.channel], self._scatter, self.channel
+            )
+            self._notice.setText(
+                tr("{n} of {all} points are left out; the curve was fitted anew").format(
+                    n=int(out.sum()), all=out.size
+                )
+            )

@@ -1,0 +1,119 @@
+"""What an edited reflectance table does to a ball press: the depth along a line, and what is off.
+
+The paper's model is used, which the table belongs to. What a press needs is made ready once: an
+edit changes the table alone, so that an answer comes while the hand still moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.calibrate.lut_model import CurveEdit
+from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.reconstruction.normals import ShadingMaps, solve_slopes
+from gelpolight_core.reconstruction.reconstructor import LOOKUP_SIZE, Reconstructor
+from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.session.session import Session, read_picture
+
+Array = NDArray[np.float64]
+REACH = 2.0
+"""How far the line goes to either side, in contact radii."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A press's depth along x through the ball's centre, against the ball.
+
+    Attributes
+    ----------
+    press : str
+        The press's name.
+    place_mm : (N,)
+        Along x, from the ball's centre.
+    profile_mm : (N,)
+        Depth as reconstructed.
+    sphere_mm : (N,)
+        Depth of the ball's surface; NaN outside of the contact.
+    rms_mm : float
+        Root mean square of depth minus ball over the whole contact.
+    lowest_mm : float
+        Depth minus ball, averaged over the inner tenth of the contact's area.
+    """
+
+    press: str
+    place_mm: Array
+    profile_mm: Array
+    sphere_mm: Array
+    rms_mm: float
+    lowest_mm: float
+
+    @property
+    def residual_mm(self) -> Array:
+        """Depth minus ball along the line; NaN outside of the contact, (N,)."""
+        return self.profile_mm - self.sphere_mm
+
+
+def ball_effect(
+    run: CalibrationRun, session: Session, *, workers: int = 1
+) -> Callable[[CurveEdit, str], Effect]:
+    """Return a function of (state, press's name) that reconstructs the press with that table.
+
+    Parameters
+    ----------
+    run : CalibrationRun
+        With the presses and all that the table does not hold.
+    session : Session
+        Where the ball pictures are.
+    workers : int, optional
+        Threads of the reconstruction.
+    """
+    reconstructor = Reconstructor(run.calibration, model="paper", workers=workers)
+    presses = {press.name: press for press in run.reflectance.presses}
+
+    @lru_cache(maxsize=2)
+    def frame(name: str) -> NDArray[np.float32]:
+        return read_picture(session.folder / name).rgb
+
+    def effect(edit: CurveEdit, name: str) -> Effect:
+        field = solve_slopes(frame(name), _maps(reconstructor.maps, edit), workers=workers)
+        depth = reconstructor.solver.integrate(field.slope_x, field.slope_y).depth_mm
+        return _compare(np.asarray(depth, np.float64), presses[name], run)
+
+    return effect
+
+
+def _maps(maps: ShadingMaps, edit: CurveEdit) -> ShadingMaps:
+    table = edit.table()
+    lookup, scale = table.lookup(LOOKUP_SIZE)
+    return replace(
+        maps, lookup=lookup, lookup_scale=scale, coverage=table.coverage.astype(np.float32)
+    )
+
+
+def _compare(depth: Array, press: BallPress, run: CalibrationRun) -> Effect:
+    """Compare with the ball where the paper's model shows it: straight below the seen contact."""
+    table = run.calibration.table
+    grid, pose, contact = table.grid, press.pose, press.contact_radius_mm
+    column, row = np.round(grid.to_index(np.asarray(pose.centre_mm))).astype(int)
+    centre = press.seen_centre_mm(table.drift[row, column].astype(np.float64))
+    x, y = grid.x_mm - centre[0], grid.y_mm - centre[1]
+    away2 = x[None, :] ** 2 + y[:, None] ** 2
+    inside = away2 < contact**2
+    top = pose.depth_mm - pose.radius_mm
+    ball = top + np.sqrt(np.where(inside, pose.radius_mm**2 - away2, np.nan))
+    off = depth - ball
+    line = int(np.abs(y).argmin())
+    near = np.flatnonzero(np.abs(x) <= REACH * contact)
+    return Effect(
+        press.name,
+        x[near],
+        depth[line, near],
+        ball[line, near],
+        float(np.sqrt(np.mean(off[inside] ** 2))),
+        float(np.mean(off[away2 < 0.1 * contact**2])),
+    )

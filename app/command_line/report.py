@@ -1,0 +1,108 @@
+"""``gelpolight report``: a calibration as a document for people, with pictures."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from app.command_line.common import StageProgress, refuse_overwriting
+from gelpolight_core.calibration.calibration import MODELS, Calibration
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.pipeline import STAGES, calibrate_session
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import refuse_unwritable
+from gelpolight_core.measurement.evaluation import evaluate_presses
+from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.report.build import calibration_report, run_report, validation_of
+from gelpolight_core.report.document import Report, Validation
+from gelpolight_core.report.file import refuse_other_endings, write_report
+from gelpolight_core.session.session import (
+    Session,
+    read_picture,
+    read_session,
+    refuse_copies,
+    require_colour,
+)
+from gelpolight_core.translation import tr
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser("report", help=tr("write a calibration's report, HTML or PDF"))
+    parser.add_argument(
+        "source",
+        type=Path,
+        metavar="SESSION_OR_CALIBRATION",
+        help=tr("a session is calibrated anew and shown with its pictures"),
+    )
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.html|FILE.pdf")
+    parser.add_argument(
+        "--presses",
+        type=Path,
+        metavar="PRESSES",
+        help=tr("presses of known size, with truth.csv, to validate the calibration with"),
+    )
+    parser.add_argument(
+        "--model", choices=MODELS, help=tr("to calibrate a session for (full unless stated)")
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the report and say where it is."""
+    refuse_other_endings(options.output)
+    if options.presses:
+        read_truth(options.presses)  # before minutes of work for nothing
+    make = _of_session if options.source.is_dir() else _of_calibration
+    report = make(options)
+    write_report(report, options.output)
+    print(
+        tr("Report written to {path}: {verdict}").format(
+            path=options.output, verdict=report.verdict.value
+        )
+    )
+    return 0
+
+
+def _of_calibration(options: argparse.Namespace) -> Report:
+    if options.model:
+        raise InputError(
+            tr("a calibration has its model already"),
+            where="--model",
+            advice=tr("Leave it out, or name a session folder"),
+        )
+    refuse_overwriting([options.output], [options.source])
+    refuse_unwritable(options.output)
+    calibration = read_calibration(options.source)
+    with StageProgress() as tell:
+        validation = _validate(calibration, options.presses, tell)
+    return calibration_report(calibration, validation=validation)
+
+
+def _of_session(options: argparse.Namespace) -> Report:
+    session: Session = read_session(options.source)
+    used = [path for stage in STAGES for path in session.files(stage)]
+    refuse_overwriting([options.output], [session.folder / "session.toml", *used])
+    refuse_unwritable(options.output)
+    refuse_copies(used)
+    with StageProgress() as tell:
+        result = calibrate_session(session, model=options.model or MODELS[-1], progress=tell)
+        validation = _validate(result.calibration, options.presses, tell)
+        tell(tr("report"), 1.0)
+        return run_report(result, session, validation=validation)
+
+
+def _validate(calibration: Calibration, presses: Path | None, tell: Any) -> Validation | None:
+    if presses is None:
+        return None
+    reconstructor = Reconstructor(calibration)
+
+    def reconstruct(path: Path) -> HeightMap:
+        picture = read_picture(path)
+        require_colour(picture, where=str(path))
+        return reconstructor.depth(picture.rgb, name=path.name, normals=False)
+
+    return validation_of(evaluate_presses(presses, reconstruct, progress=tell))

@@ -1,0 +1,1 @@
+"""The calibration report: one document, written as HTML or PDF."""

@@ -1,0 +1,169 @@
+"""The report as plain values: what stands in it, not how it is laid out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.translation import tr
+
+ROUNDING = 1e-12
+MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}
+"""A sign beside each verdict's word, so that colour is not the only carrier."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """One picture of the report.
+
+    Attributes
+    ----------
+    caption : str
+        What it shows and how to read it.
+    png : bytes
+        The picture.
+    width_mm, height_mm : float
+        On paper.
+    """
+
+    caption: str
+    png: bytes
+    width_mm: float
+    height_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """A table: a title, column heads and rows of text.
+
+    Attributes
+    ----------
+    title : str
+        Above the table; may be empty.
+    heads : tuple of str
+        One for each column.
+    rows : tuple of tuple of str
+        Cells.
+    widths : tuple of float
+        Relative widths of the columns on paper.
+    fixed_width : bool
+        Whether the last column is set in a fixed-width face, as hashes are.
+    """
+
+    title: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    widths: tuple[float, ...]
+    fixed_width: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One stage of the calibration.
+
+    Attributes
+    ----------
+    key, title, intro : str
+        Name for links, heading, and what the stage does.
+    quality : QualityTable
+        Its judged figures.
+    facts : tuple of (label, value)
+        Its results as numbers.
+    drawings : tuple of Drawing
+        Its results as pictures.
+    listings : tuple of Listing
+        Further tables.
+    """
+
+    key: str
+    title: str
+    intro: str
+    quality: QualityTable
+    facts: tuple[tuple[str, str], ...] = ()
+    drawings: tuple[Drawing, ...] = ()
+    listings: tuple[Listing, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """Whether objects of known size were measured with the calibration.
+
+    Attributes
+    ----------
+    sentence : str
+        Whether, and how well; without a full stop.
+    listing : Listing or None
+        Each object.
+    """
+
+    sentence: str
+    listing: Listing | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A whole report.
+
+    Attributes
+    ----------
+    title : str
+        Heading.
+    verdict : Verdict
+        Of the calibration.
+    facts : tuple of (label, value)
+        Sensor and provenance.
+    validation : Validation
+        What is known from objects of known size.
+    sections : tuple of Section
+        The stages in their order.
+    sources : Listing
+        Every file that it was made from, with its hash.
+    """
+
+    title: str
+    verdict: Verdict
+    facts: tuple[tuple[str, str], ...]
+    validation: Validation
+    sections: tuple[Section, ...]
+    sources: Listing
+
+
+def verdict_word(verdict: Verdict) -> str:
+    """Return the verdict as a person reads it."""
+    return {
+        Verdict.PASS: tr("Pass"),
+        Verdict.WARN: tr("Warning"),
+        Verdict.FAIL: tr("Fail"),
+    }[verdict]
+
+
+def value_text(figure: Figure) -> str:
+    """Return a figure's value with its unit."""
+    # What rounding leaves of a zero is a zero.
+    value = 0.0 if abs(figure.value) < ROUNDING else figure.value
+    number = f"{value:.4g}" if math.isfinite(value) else tr("not a number")
+    return f"{number} {figure.unit}".rstrip()
+
+
+def limit_text(figure: Figure) -> str:
+    """Return where a figure's verdict turns; empty where it is only reported."""
+    limits = [x for x in (figure.warn_limit, figure.fail_limit) if x is not None]
+    if not limits:
+        return ""
+    at_most = _is_upper_limit(figure, limits)
+    sign = "\N{LESS-THAN OR EQUAL TO}" if at_most else "\N{GREATER-THAN OR EQUAL TO}"
+    text = f"{sign} {limits[0]:.4g}"
+    if figure.warn_limit is not None and figure.fail_limit is not None:
+        text += tr(" (fails {sign} {limit:.4g})").format(
+            sign=">" if at_most else "<", limit=figure.fail_limit
+        )
+    return text
+
+
+def _is_upper_limit(figure: Figure, limits: Sequence[float]) -> bool:
+    """Tell from the limits' order, or from the verdict where there is one, which side is good."""
+    if len(limits) == 2 and limits[0] != limits[1]:
+        return limits[0] < limits[1]
+    return (figure.value <= limits[0]) == (figure.verdict is Verdict.PASS)

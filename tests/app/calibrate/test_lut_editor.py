@@ -1,0 +1,199 @@
+"""The editor by mouse and keys: what the hand does is what the table becomes."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+from test_lut_model import scatter, start
+
+from app.calibrate import lut_model as model
+from app.calibrate.lut_editor import NUDGE, LutEditor
+from app.calibrate.lut_effect import Effect
+from app.calibrate.lut_live import effect_sentence
+from app.calibrate.lut_model import CurveEdit
+from app.shell import theme
+
+
+def effect(edit: CurveEdit, press: str) -> Effect:
+    """Return a made-up press whose depth is the red curve's value in the middle."""
+    place = np.linspace(-3.0, 3.0, 61)
+    ball = np.where(np.abs(place) < 1.5, 1.0 - 0.1 * place**2, np.nan)
+    depth = np.full(61, float(edit.curves[0].at(0.5)))
+    return Effect(press, place, depth, ball, float(depth[0]), 0.0)
+
+
+@pytest.fixture
+def editor(qtbot: QtBot) -> Iterator[LutEditor]:
+    """Return an editor on the screen, with few nodes."""
+    widget = LutEditor(model.thin_nodes(start(), 0), scatter(), effect=effect)
+    qtbot.addWidget(widget)
+    widget.resize(1100, 700)
+    with qtbot.waitExposed(widget):
+        widget.show()
+    qtbot.wait(50)
+    yield widget
+    assert widget.stop()
+
+
+def pixel(editor: LutEditor, cosine: float, value: float) -> QPoint:
+    """Return where on the plot's viewport a point of the curve is."""
+    place = editor.plot.box.mapViewToScene(QPointF(cosine, value))
+    return editor.plot.mapFromScene(place)
+
+
+def drag(qtbot: QtBot, editor: LutEditor, *points: tuple[float, float]) -> None:
+    """Drag the left button along points of the plot."""
+    view = editor.plot.viewport()
+    places = [pixel(editor, *point) for point in points]
+    qtbot.mouseMove(view, places[0])
+    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=places[0])
+    for a, b in zip(places, places[1:], strict=False):
+        for share in np.linspace(0.1, 1.0, 10):
+            qtbot.mouseMove(view, a + (b - a) * float(share))
+    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=places[-1])
+
+
+def node(editor: LutEditor, index: int) -> tuple[float, float]:
+    """Return a node of the channel that is shown."""
+    curve = editor.state.curves[editor.channel]
+    return curve.cosines[index], curve.values[index]
+
+
+def test_a_node_follows_the_mouse_and_one_undo_brings_it_back(
+    qtbot: QtBot, editor: LutEditor
+) -> None:
+    before = editor.state
+    cosine, value = node(editor, 3)
+    states: list[CurveEdit] = []
+    editor.edited.connect(states.append)
+    drag(qtbot, editor, (cosine, value), (cosine, value - 0.03))
+    assert node(editor, 3)[1] == pytest.approx(value - 0.03, abs=0.01)
+    assert editor.chosen == 3
+    assert states == [editor.state]  # once, when the drag has ended
+    editor.undo_stack.undo()
+    assert editor.state == before
+    editor.undo_stack.redo()
+    assert editor.state == states[0]
+
+
+def test_a_drag_beside_every_node_moves_none(qtbot: QtBot, editor: LutEditor) -> None:
+    before = editor.state
+    drag(qtbot, editor, (0.2, 0.8), (0.3, 0.7))
+    assert editor.state == before
+
+
+def test_a_click_chooses_a_node_and_del_removes_it(qtbot: QtBot, editor: LutEditor) -> None:
+    count = len(editor.state.curves[0].cosines)
+    place = pixel(editor, *node(editor, 2))
+    qtbot.mouseMove(editor.plot.viewport(), place)
+    qtbot.mouseClick(editor.plot.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert editor.chosen == 2
+    gone = node(editor, 2)
+    qtbot.keyClick(editor.plot, Qt.Key.Key_Delete)
+    assert len(editor.state.curves[0].cosines) == count - 1
+    assert gone[0] not in editor.state.curves[0].cosines
+
+
+@pytest.mark.parametrize(
+    ("key", "modifier", "across", "up"),
+    [
+        (Qt.Key.Key_Left, Qt.KeyboardModifier.NoModifier, -1, 0),
+        (Qt.Key.Key_Right, Qt.KeyboardModifier.NoModifier, 1, 0),
+        (Qt.Key.Key_Up, Qt.KeyboardModifier.NoModifier, 0, 1),
+        (Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier, 0, -10),
+    ],
+)
+def test_arrow_keys_nudge_the_chosen_node(
+    qtbot: QtBot,
+    editor: LutEditor,
+    key: Qt.Key,
+    modifier: Qt.KeyboardModifier,
+    across: int,
+    up: int,
+) -> None:
+    editor.choose_node(3)
+    cosine, value = node(editor, 3)
+    qtbot.keyClick(editor.plot, key, modifier)
+    top = editor.state.curves[0].values[-1]
+    expected = (cosine + NUDGE * across, value + NUDGE * up * top)
+    assert node(editor, 3) == pytest.approx(expected)
+
+
+def test_a_double_click_on_the_curve_adds_a_node_there(qtbot: QtBot, editor: LutEditor) -> None:
+    curve = editor.state.curves[0]
+    cosine = 0.5 * (curve.cosines[3] + curve.cosines[4])
+    place = pixel(editor, cosine, float(curve.at(cosine)))
+    qtbot.mouseMove(editor.plot.viewport(), place)
+    qtbot.mouseClick(editor.plot.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    qtbot.mouseDClick(editor.plot.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    qtbot.waitUntil(lambda: len(editor.state.curves[0].cosines) == len(curve.cosines) + 1)
+    assert node(editor, 4)[0] == pytest.approx(cosine, abs=0.01)
+
+
+def test_the_lasso_leaves_points_out_and_says_how_many(qtbot: QtBot, editor: LutEditor) -> None:
+    editor.findChild(type(editor._actions["lasso"]), "lut.lasso").trigger()
+    outline = [(0.48, 0.62), (0.62, 0.75), (0.62, 0.95), (0.48, 0.8)]
+    drag(qtbot, editor, *outline)
+    assert float(editor.state.curves[0].at(0.55)) == pytest.approx(0.05 + 0.9 * 0.55**1.3, abs=0.02)
+    assert "points are left out" in editor._notice.text()
+    editor.undo_stack.undo()
+    assert editor.state.left_out == ((), (), ())
+
+
+@pytest.mark.parametrize("name", ["add", "thin", "snap", "smooth", "reset", "compare", "view"])
+def test_every_tool_has_a_button_and_none_fails(editor: LutEditor, name: str) -> None:
+    editor._on_node_moved(3, *node(editor, 3), True)
+    action = editor._actions[name]
+    button = editor.findChild(object, f"lut.{name}.button")
+    assert button is not None and button.accessibleName()
+    action.trigger()
+    assert editor._notice.text() == ""
+
+
+def test_what_cannot_be_done_is_said_in_one_sentence(editor: LutEditor) -> None:
+    editor._add_at(editor.state.curves[0].cosines[2])
+    assert "no room" in editor._notice.text()
+    assert not editor.undo_stack.canUndo()
+
+
+def test_each_channel_is_edited_alone(qtbot: QtBot, editor: LutEditor) -> None:
+    editor.choose_channel(2)
+    before = editor.state.curves[0]
+    editor.choose_node(5)
+    qtbot.keyClick(editor.plot, Qt.Key.Key_Down)
+    assert editor.state.curves[2] != start().curves[2]
+    assert editor.state.curves[0] == before
+
+
+def test_the_panel_shows_the_newest_state(qtbot: QtBot, editor: LutEditor) -> None:
+    assert editor.live is not None
+    editor.choose_node(4)
+    for _ in range(5):
+        qtbot.keyClick(editor.plot, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
+    expected = effect(editor.state, scatter().names[0])
+    words = effect_sentence(effect(editor._start, scatter().names[0]), expected)
+    qtbot.waitUntil(lambda: editor.live._words.text() == words)
+    _, shown = editor.live._lines["after"].getData()
+    np.testing.assert_allclose(shown, expected.profile_mm)
+
+
+def test_closing_ends_the_thread(qtbot: QtBot) -> None:
+    widget = LutEditor(start(), scatter(), effect=effect)
+    qtbot.addWidget(widget)
+    widget.close()
+    assert "lut-effect" not in {thread.name for thread in threading.enumerate()}
+
+
+@pytest.mark.parametrize("choice", ["light", "dark"])
+def test_it_follows_the_theme(qtbot: QtBot, editor: LutEditor, choice: str) -> None:
+    theme.apply(QApplication.instance(), choice)
+    qtbot.wait(20)
+    shown = editor.plot.backgroundBrush().color()
+    assert shown == theme.colour("base")
+    theme.apply(QApplication.instance(), "light")

@@ -1,0 +1,59 @@
+"""The newest question is answered; no answer of an older one comes after it."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from app.calibrate.lut_worker import NewestWins
+
+
+def answer_of(worker: NewestWins, timeout_s: float = 5.0):  # type: ignore[no-untyped-def]
+    """Return the next answer."""
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        answered = worker.take()
+        if answered is not None:
+            return answered
+        time.sleep(0.005)
+    raise AssertionError("no answer came")
+
+
+def test_what_waits_gives_way_to_what_is_newer() -> None:
+    gate, began, asked = threading.Event(), threading.Event(), []
+
+    def slow(question: int) -> int:
+        asked.append(question)
+        began.set()
+        assert gate.wait(5.0)
+        return 10 * question
+
+    worker = NewestWins(slow, name="test-newest")
+    worker.ask(1)
+    assert began.wait(5.0)
+    for question in range(2, 20):
+        worker.ask(question)
+    gate.set()
+    while answer_of(worker).question != 19:
+        pass
+    assert asked == [1, 19]
+    assert worker.idle
+    assert worker.stop()
+
+
+def test_an_error_is_handed_over_and_the_thread_goes_on() -> None:
+    def fails(question: int) -> float:
+        return 1.0 / question
+
+    worker = NewestWins(fails, name="test-errors")
+    worker.ask(0)
+    assert isinstance(answer_of(worker).error, ZeroDivisionError)
+    worker.ask(2)
+    assert answer_of(worker).answer == 0.5
+    assert worker.stop()
+
+
+def test_a_stopped_worker_leaves_no_thread() -> None:
+    worker = NewestWins(lambda question: question, name="test-stops")
+    assert worker.stop()
+    assert "test-stops" not in {thread.name for thread in threading.enumerate()}
