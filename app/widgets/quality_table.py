@@ -26,6 +26,8 @@ from gelpolight_core.translation import tr
 VERDICT_COLUMN, LABEL_COLUMN, VALUE_COLUMN, LIMIT_COLUMN = range(4)
 COLUMNS = 4
 ROW_HEIGHT = 24
+# Rounding alone; no figure's limit is near.
+TINY = 1e-9
 MARGIN = 6
 
 
@@ -42,7 +44,9 @@ def value_text(figure: Figure) -> str:
     """Return a figure's value with its unit; counts without decimals."""
     if not math.isfinite(figure.value):
         return tr("unknown")
-    if not figure.unit and figure.value == round(figure.value):
+    if abs(figure.value) < TINY:
+        number = "0"
+    elif not figure.unit and figure.value == round(figure.value):
         number = f"{figure.value:.0f}"
     else:
         number = f"{figure.value:.3g}" if abs(figure.value) < 1000.0 else f"{figure.value:.0f}"
