@@ -119,6 +119,7 @@ missing_for_a_window() {
 }
 
 install_what_windows_need() {
+    # shellcheck disable=SC2046 # names of packages hold no spaces
     set -- $(missing_for_a_window)
     if [ "$kind" = test ] && ! command -v Xvfb >/dev/null 2>&1; then
         set -- "$@" xvfb

@@ -1,4 +1,4 @@
-"""What the tests of the desktop program share: its own folders, its theme, and a watch for leaks."""
+"""What the tests of the desktop program share: own folders, its theme, a watch for leaks."""
 
 from __future__ import annotations
 
@@ -80,6 +80,11 @@ class _Started:
 
         monkeypatch.setattr(kind, "start", noted)
 
+    @property
+    def any(self) -> bool:
+        """Whether anything was started."""
+        return bool(self._found)
+
     def left(self) -> list[str]:
         """Return where those were started that still run; stop them."""
         lines = []
@@ -87,7 +92,10 @@ class _Started:
             this = reference()
             if this is not None and isValid(this) and self._running(this):
                 lines.append(line)
-                this.stop() if isinstance(this, QTimer) else this.quit()
+                if isinstance(this, QTimer):
+                    this.stop()
+                else:
+                    this.quit()
         return list(dict.fromkeys(lines))
 
 
@@ -95,19 +103,16 @@ class _Started:
 def _nothing_is_left_behind(qapp: QApplication, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Fail when a test leaves a thread, a timer or a window behind, and name it."""
     threads_before = set(threading.enumerate())
-    # Compared by their address: a widget that was there may be gone by now.
-    windows_before = {id(widget) for widget in QApplication.topLevelWidgets()}
-    kept = QApplication.topLevelWidgets()
+    windows_before = QApplication.topLevelWidgets()
     timers, qthreads = _Started(QTimer.isActive), _Started(QThread.isRunning)
     timers.watch(QTimer, monkeypatch)
     qthreads.watch(QThread, monkeypatch)
     yield
     _delete_what_was_deleted()
     # What is only held by a cycle of references is not in use, and goes with it.
-    if _left_windows(windows_before) or timers._found:
+    if _left_windows(windows_before) or timers.any or qthreads.any:
         gc.collect()
         _delete_what_was_deleted()
-    del kept
     problems = [f"timer started at {line}" for line in timers.left()]
     problems += [f"QThread started at {line}" for line in qthreads.left()]
     problems += [f"thread {name}" for name in _left_threads(threads_before)]
@@ -125,11 +130,11 @@ def _delete_what_was_deleted() -> None:
     QCoreApplication.processEvents()
 
 
-def _left_windows(before: set[int]) -> list[QWidget]:
+def _left_windows(before: list[QWidget]) -> list[QWidget]:
     return [
         widget
         for widget in QApplication.topLevelWidgets()
-        if id(widget) not in before and widget.parent() is None
+        if widget.parent() is None and not any(widget is old for old in before)
     ]
 
 

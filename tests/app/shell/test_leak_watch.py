@@ -9,6 +9,7 @@ import pytest
 pytest_plugins = ["pytester"]
 
 CONFTEST = Path(__file__).resolve().parents[1] / "conftest.py"
+ROOT = CONFTEST.parents[2]
 LEAKS = {
     "timer": (
         "from PySide6.QtCore import QTimer\nKEPT = []\n",
@@ -29,8 +30,11 @@ LEAKS = {
 
 
 @pytest.mark.parametrize("kind", LEAKS)
-def test_what_is_left_behind_is_named(kind: str, pytester: pytest.Pytester) -> None:
+def test_what_is_left_behind_is_named(
+    kind: str, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
     above, inside, said = LEAKS[kind]
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
     pytester.makeconftest(CONFTEST.read_text("utf-8"))
     pytester.makepyfile(f"{above}\ndef test_leaks():\n{inside}\ndef test_next():\n    pass\n")
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-p", "no:xvfb")
