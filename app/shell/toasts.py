@@ -144,6 +144,7 @@ class Toasts(QObject):
         self._host = host
         self._show_log = show_log
         host.installEventFilter(self)
+        host.destroyed.connect(self._detach)
 
     def show(
         self,
@@ -187,6 +188,10 @@ class Toasts(QObject):
     def shown(self) -> list[Toast]:
         """Return the messages that are shown, oldest first."""
         return list(self._shown)
+
+    def _detach(self) -> None:
+        self._host = None
+        self._shown.clear()
 
     def _forget(self, toast: Toast) -> None:
         if toast in self._shown:

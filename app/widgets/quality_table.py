@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QEvent, QRect, QSize, Qt
-from PySide6.QtGui import QGuiApplication, QKeySequence
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -70,6 +70,19 @@ def _higher_is_better(figure: Figure, limit: float) -> bool:
     return beyond if figure.verdict is Verdict.PASS else figure.value < limit
 
 
+class _Grid(QTableWidget):
+    """A table whose copy key copies rows; the view's own copies a single cell."""
+
+    copy_asked = Signal()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Copy, or do what a table does."""
+        if event.matches(QKeySequence.StandardKey.Copy):
+            self.copy_asked.emit()
+        else:
+            super().keyPressEvent(event)
+
+
 class QualityTableWidget(QWidget):
     """Shows a QualityTable as high as it is; rows are updated in place.
 
@@ -86,7 +99,7 @@ class QualityTableWidget(QWidget):
         named(self, name, accessible)
         self._shown: tuple[tuple[str, bool], ...] = ()
         self._table = QualityTable()
-        self._grid = named(QTableWidget(0, COLUMNS, self), f"{name}.table", accessible)
+        self._grid = named(_Grid(0, COLUMNS, self), f"{name}.table", accessible)
         # Verdict, figure, value and limit say themselves what they are.
         self._grid.horizontalHeader().hide()
         self._grid.verticalHeader().hide()
@@ -104,9 +117,8 @@ class QualityTableWidget(QWidget):
         header.setMinimumSectionSize(80)
         header.sectionResized.connect(self._fit)
         self._grid.verticalHeader().setMinimumSectionSize(1)
-        copy = make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
-        copy.setShortcut(QKeySequence.StandardKey.Copy)
-        copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
+        self._grid.copy_asked.connect(self.copy)
         self._grid.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         layout = QVBoxLayout(self)
