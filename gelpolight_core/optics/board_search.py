@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# A larger copy only costs time.
+LARGEST_SEARCH_PX = 1300
+
 
 def find_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Array | None:
     """Ask OpenCV's contour detector for the corners: a few milliseconds.
@@ -37,7 +40,9 @@ def find_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Arra
     return _in_full_size(np.asarray(corners).reshape(size[1], size[0], 2), scale)
 
 
-def search_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Array | None:
+def search_rough_corners(
+    grey: NDArray[np.float32], size: tuple[int, int], *, longest_px: int = LARGEST_SEARCH_PX
+) -> Array | None:
     """Ask OpenCV's slow detector, which copes with more noise and blur and with uneven light.
 
     Parameters
@@ -46,13 +51,15 @@ def search_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Ar
         The picture.
     size : (columns, rows)
         Of the inner corners.
+    longest_px : int, optional
+        Search in a copy of at most this size: smaller is quicker and misses smaller boards.
 
     Returns
     -------
     (rows, columns, 2) or None
         As from :func:`find_rough_corners`.
     """
-    small, scale = _for_detector(grey)
+    small, scale = _for_detector(grey, longest_px=longest_px)
     for flags in (cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE, 0):
         ok, corners = cv2.findChessboardCornersSB(small, size, flags=flags)
         if ok:
@@ -85,9 +92,9 @@ def search_any_size(grey: NDArray[np.float32]) -> Array | None:
 
 
 def _for_detector(
-    grey: NDArray[np.float32], *, longest_px: int = 1300
+    grey: NDArray[np.float32], *, longest_px: int = LARGEST_SEARCH_PX
 ) -> tuple[NDArray[np.uint8], Array]:
-    """Return an 8-bit copy of at most `longest_px` (more only costs time), and its scale."""
+    """Return an 8-bit copy of at most `longest_px`, and its scale."""
     low, high = np.percentile(grey[::4, ::4], [0.5, 99.5])
     stretched = np.clip((grey - low) * (255.0 / max(high - low, 1e-6)), 0.0, 255.0)
     shrink = max(1.0, max(grey.shape) / longest_px)

@@ -149,7 +149,7 @@ class BoardView:
     tilt_deg: float
 
 
-def find_board(picture: Picture, board: BoardSpec) -> BoardView:
+def find_board(picture: Picture, board: BoardSpec, *, rough: Array | None = None) -> BoardView:
     """Find the inner corners of a checkerboard, and make sure that it is the stated one.
 
     Parameters
@@ -158,6 +158,9 @@ def find_board(picture: Picture, board: BoardSpec) -> BoardView:
         Any size; colours are averaged.
     board : BoardSpec
         The board that should be there.
+    rough : (rows, columns, 2), optional
+        Where the corners are to a pixel or two, from :mod:`.board_search`; without it they are
+        searched for, with as much patience as it takes.
 
     Returns
     -------
@@ -172,7 +175,8 @@ def find_board(picture: Picture, board: BoardSpec) -> BoardView:
     """
     grey = _average_of_channels(picture)
     check_exposure(grey, picture.name)
-    rough = find_rough_corners(grey, board.inner_corners)
+    if rough is None:
+        rough = find_rough_corners(grey, board.inner_corners)
     if rough is None:
         _refuse_other_size(grey, board, picture.name)
         rough = search_rough_corners(grey, board.inner_corners)

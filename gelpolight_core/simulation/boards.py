@@ -10,8 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.design.parts import CameraDesign, LayerDesign
-from gelpolight_core.simulation.compiled import compiled
-from gelpolight_core.simulation.rays import pixel_directions, project_to_pixels, sensor_axes
+from gelpolight_core.simulation.compiled import Interrupt, compiled, never
+from gelpolight_core.simulation.rays import (
+    bands,
+    pixel_directions,
+    project_to_pixels,
+    sensor_axes,
+)
 
 Array = NDArray[np.float64]
 
@@ -111,16 +116,32 @@ def _draw(
     return out
 
 
-def board_picture(camera: CameraDesign, pose: BoardPose) -> Array:
-    """Return (rows, columns): the board's brightness at each pixel, without blur and noise."""
-    # Directions at the pixels' corners: within a pixel the lens is straight to 1e-8.
-    v, u = np.mgrid[: camera.height_px + 1, : camera.width_px + 1] - 0.5
-    directions = pixel_directions(camera, u, v)
+def board_picture(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt = never) -> Array:
+    """Return (rows, columns): the board's brightness at each pixel, without blur and noise.
+
+    Parameters
+    ----------
+    camera : CameraDesign
+        The lens.
+    pose : BoardPose
+        How the board is held.
+    interrupt : callable, optional
+        Called now and then; what it raises stops the work.
+    """
     disc = (*pose.disc_centre_mm, min(pose.disc_radius_mm, 1e308))
     round_board = math.isfinite(pose.disc_radius_mm)
     levels = (WHITE, BLACK, DARK_ROOM if round_board else ROOM)
     board = (*pose.inner_corners, pose.square_mm)
-    return np.asarray(_draw(directions, pose.axes, pose.centre_mm, board, disc, levels, _SAMPLES))
+    out = np.empty((camera.height_px, camera.width_px))
+    for start, stop in bands(0, camera.height_px):
+        interrupt()
+        # Directions at the pixels' corners: within a pixel the lens is straight to 1e-8.
+        v, u = np.mgrid[start : stop + 1, : camera.width_px + 1] - 0.5
+        directions = pixel_directions(camera, u, v)
+        out[start:stop] = _draw(
+            directions, pose.axes, pose.centre_mm, board, disc, levels, _SAMPLES
+        )
+    return out
 
 
 def _turned(rx: float, ry: float, rz: float) -> Array:

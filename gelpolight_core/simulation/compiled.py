@@ -1,4 +1,4 @@
-"""One decorator for the compiled loops of the simulation."""
+"""One decorator for the compiled loops of the simulation, and how long work is stopped."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+Interrupt = Callable[[], None]
+"""Called now and then during long work; what it raises stops the work."""
+
 
 def compiled(function: Function) -> Function:
     """Compile a loop once, keep it on disk, and let other threads run beside it.
@@ -16,3 +19,7 @@ def compiled(function: Function) -> Function:
     Never ``parallel=True``: numba's workqueue layer aborts when two threads enter it.
     """
     return cast(Function, numba.njit(function, cache=True, nogil=True, error_model="numpy"))
+
+
+def never() -> None:
+    """Let the work run to its end."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import k0, k1
 
-from gelpolight_core.simulation.compiled import compiled
+from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,7 @@ NOWHERE_MM = -1e9
 
 _COARSEST_CELLS = 24
 _MOST_SWEEPS = 4000
+_SWEEPS_AT_ONCE = 25  # a few hundredths of a second on the finest grids
 
 
 def contact_radius(
@@ -90,11 +91,12 @@ def _sweep(
 @compiled
 def _relax(
     depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float, most: int
-) -> int:  # pragma: no cover - compiled
-    for number in range(most):
+) -> bool:  # pragma: no cover - compiled
+    """Sweep until the change is below the tolerance; return whether it is."""
+    for _ in range(most):
         if _sweep(depth, obstacle, weight, relaxation) < tolerance:
-            return number + 1
-    return most
+            return True
+    return False
 
 
 def solve_drape(
@@ -104,6 +106,7 @@ def solve_drape(
     *,
     decay_mm: float,
     tolerance_mm: float = 2e-7,
+    interrupt: Interrupt = never,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Solve the obstacle problem on a grid whose border lies flat.
 
@@ -119,6 +122,8 @@ def solve_drape(
         Decay length lambda.
     tolerance_mm : float, optional
         Largest change of the last sweep.
+    interrupt : callable, optional
+        Called now and then; what it raises stops the work.
 
     Returns
     -------
@@ -130,8 +135,9 @@ def solve_drape(
         coarse_x = np.arange(x_mm[0], x_mm[-1] + 2.0 * pitch, 2.0 * pitch)
         coarse_y = np.arange(y_mm[0], y_mm[-1] + 2.0 * pitch, 2.0 * pitch)
         coarse, _ = solve_drape(
-            obstacle, coarse_x, coarse_y, decay_mm=decay_mm, tolerance_mm=4.0 * tolerance_mm
-        )
+            obstacle, coarse_x, coarse_y,
+            decay_mm=decay_mm, tolerance_mm=4.0 * tolerance_mm, interrupt=interrupt,
+        )  # fmt: skip
         depth = _between(coarse, y_mm.size, x_mm.size)
     else:
         depth = np.zeros((y_mm.size, x_mm.size))
@@ -141,7 +147,10 @@ def solve_drape(
     radius = 4.0 * weight / (1.0 + 4.0 * weight)
     # Young's optimal factor for the problem without the obstacle, which is the slower one.
     relaxation = 2.0 / (1.0 + math.sqrt(1.0 - radius * radius))
-    _relax(depth, shape, weight, relaxation, tolerance_mm, _MOST_SWEEPS)
+    for _ in range(0, _MOST_SWEEPS, _SWEEPS_AT_ONCE):
+        interrupt()
+        if _relax(depth, shape, weight, relaxation, tolerance_mm, _SWEEPS_AT_ONCE):
+            break
     return depth, depth <= shape + 1e-9
 
 

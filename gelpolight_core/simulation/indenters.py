@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
     contact_radius,
@@ -160,6 +161,7 @@ def press(
     decay_mm: float = 0.7,
     pitch_mm: float = PITCH_MM,
     margin_mm: float = 0.0,
+    interrupt: Interrupt = never,
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
 
@@ -178,6 +180,8 @@ def press(
         Cell of the surface.
     margin_mm : float, optional
         Room around the indenter; at least as much as the membrane needs to come to rest.
+    interrupt : callable, optional
+        Called now and then; what it raises stops the work.
     """
     margin = max(MARGIN_DECAYS * decay_mm, margin_mm)
     turned = not isinstance(indenter, (Ball, Cylinder))
@@ -190,7 +194,7 @@ def press(
         yaw = math.radians(yaw_deg)
         along = dx * math.cos(yaw) + dy * math.sin(yaw)
         across = dy * math.cos(yaw) - dx * math.sin(yaw)
-        depth, contact = _turned_drape(indenter, along, across, decay_mm, pitch_mm)
+        depth, contact = _turned_drape(indenter, along, across, decay_mm, pitch_mm, interrupt)
     return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
 
 
@@ -217,7 +221,12 @@ def _round_drape(
 
 
 def _turned_drape(
-    indenter: Cuboid | Relief, along: Array, across: Array, decay_mm: float, pitch_mm: float
+    indenter: Cuboid | Relief,
+    along: Array,
+    across: Array,
+    decay_mm: float,
+    pitch_mm: float,
+    interrupt: Interrupt,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Solve in the indenter's frame, then read the solution at turned positions."""
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
@@ -225,7 +234,9 @@ def _turned_drape(
     count = math.ceil(half / pitch_mm)
     step = indenter.reach_mm / max(1, round(indenter.reach_mm / pitch_mm))
     cells = step * np.arange(-count, count + 1, dtype=np.float64)
-    depth, contact = solve_drape(indenter.obstacle, cells, cells, decay_mm=decay_mm)
+    depth, contact = solve_drape(
+        indenter.obstacle, cells, cells, decay_mm=decay_mm, interrupt=interrupt
+    )
     place = [across / step + count, along / step + count]
     turned = map_coordinates(depth, place, order=3, mode="constant", cval=0.0, prefilter=True)
     touched = map_coordinates(contact.astype(np.float64), place, order=1, cval=0.0) > 0.5

@@ -22,7 +22,8 @@ from gelpolight_core.design.parts import BallPress, Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
-from gelpolight_core.simulation.boards import board_views
+from gelpolight_core.simulation.boards import BoardPose, board_views
+from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.drape import contact_radius
 from gelpolight_core.simulation.indenters import (
     PITCH_MM,
@@ -157,15 +158,19 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
         yield _Shot("presses", f"{name}.png", _press_maker(design, item), keeps_truth=True)
     for number, ball in enumerate(design.balls):
         yield _Shot("balls", f"ball_{number:02d}.png", _ball_maker(design, ball))
-    rng = np.random.default_rng([sensor.seed, 2])
-    poses = board_views(design.camera, rng, inner_corners=_INNER_CORNERS, square_mm=_VIEW_SQUARE_MM)
-    for number, pose in enumerate(poses):
+    for number, pose in enumerate(checkerboard_poses(design, sensor.seed)):
         state = Checkerboard(pose)
         yield _Shot("checkerboard", f"view_{number:02d}.png", lambda state=state: state)  # type: ignore[misc]
     yield _Shot("top_pose", "top_pose.png", BoardOnTop)
     yield _Shot("mirror", "mirror.png", Mirror)
     yield _Shot("whiteboard", "whiteboard.png", Whiteboard)
     yield _Shot("background", "background.png", BareMembrane)
+
+
+def checkerboard_poses(design: SensorDesign, seed: int = 0) -> tuple[BoardPose, ...]:
+    """Return how the board is held in the lens views of a session."""
+    rng = np.random.default_rng([seed, 2])
+    return board_views(design.camera, rng, inner_corners=_INNER_CORNERS, square_mm=_VIEW_SQUARE_MM)
 
 
 def indenter_of(item: Press) -> Indenter:
@@ -191,40 +196,50 @@ def press_names(presses: tuple[Press, ...]) -> tuple[str, ...]:
 
 
 def _press_maker(design: SensorDesign, item: Press) -> Callable[[], State]:
-    def make() -> State:
-        return PressedMembrane(
-            press(
-                indenter_of(item),
-                x_mm=item.x_mm,
-                y_mm=item.y_mm,
-                yaw_deg=item.yaw_deg,
-                decay_mm=design.membrane.decay_length_mm,
-                pitch_mm=_pitch(design),
-            )
-        )
-
-    return make
+    return lambda: pressed_membrane(
+        design, indenter_of(item), x_mm=item.x_mm, y_mm=item.y_mm, yaw_deg=item.yaw_deg
+    )
 
 
 def _ball_maker(design: SensorDesign, ball: BallPress) -> Callable[[], State]:
-    def make() -> State:
-        return PressedMembrane(
-            press(
-                Ball(ball.radius_mm, ball.depth_mm),
-                x_mm=ball.x_mm,
-                y_mm=ball.y_mm,
-                decay_mm=design.membrane.decay_length_mm,
-                pitch_mm=_pitch(design),
-            )
-        )
-
-    return make
+    shape = Ball(ball.radius_mm, ball.depth_mm)
+    return lambda: pressed_membrane(design, shape, x_mm=ball.x_mm, y_mm=ball.y_mm)
 
 
-def _pitch(design: SensorDesign) -> float:
-    """Cell of the pressed surfaces: no finer than the pixels of the picture call for."""
+def pressed_membrane(
+    design: SensorDesign,
+    indenter: Indenter,
+    *,
+    x_mm: float,
+    y_mm: float,
+    yaw_deg: float = 0.0,
+    interrupt: Interrupt = never,
+) -> PressedMembrane:
+    """Return the sensor with an indenter in its membrane, as fine as its picture calls for.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The sensor.
+    indenter : Ball, Cylinder, Cuboid or Relief
+        What is pressed.
+    x_mm, y_mm, yaw_deg : float
+        Where, and how turned.
+    interrupt : callable, optional
+        Called now and then; what it raises stops the work.
+    """
     pixel = design.layers.top_distance_mm / design.camera.fx
-    return max(PITCH_MM, 0.7 * pixel)
+    return PressedMembrane(
+        press(
+            indenter,
+            x_mm=x_mm,
+            y_mm=y_mm,
+            yaw_deg=yaw_deg,
+            decay_mm=design.membrane.decay_length_mm,
+            pitch_mm=max(PITCH_MM, 0.7 * pixel),
+            interrupt=interrupt,
+        )
+    )
 
 
 def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,12 +12,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
 from gelpolight_core.design.parts import MembraneDesign
-from gelpolight_core.simulation.compiled import compiled
+from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 from gelpolight_core.simulation.occlusion import lamp_share, sample, visible_depth
 from gelpolight_core.simulation.rays import RayTable
 from gelpolight_core.simulation.surface import PressedSurface
 
 Array = NDArray[np.float64]
+
+_PIXELS_AT_ONCE = 1 << 15  # a few hundredths of a second of work
 
 _ROUGH_SHARE = 0.002
 """Departure from the neighbours' mean, as a share of the peak, that asks for more rays."""
@@ -196,6 +199,7 @@ def shade_pressed(
     material: Material,
     *,
     samples: int = 3,
+    interrupt: Interrupt = never,
 ) -> None:
     """Overwrite the pixels that see a pressed patch with what they see.
 
@@ -215,6 +219,8 @@ def shade_pressed(
         Of the membrane.
     samples : int, optional
         Rays per pixel and side at edges; 1 is fastest.
+    interrupt : callable, optional
+        Called now and then; what it raises stops the work.
     """
     deepest = float(surface.depth_mm.max(initial=0.0))
     if deepest <= 0.0:
@@ -234,10 +240,18 @@ def shade_pressed(
         material.values,
     )
     peak = float(out.max(initial=0.0))
-    _pressed(out, chosen + corner, *parts, 1)
+    for some in _portions(chosen + corner, interrupt):
+        _pressed(out, some, *parts, 1)
     if samples > 1:
         rough = np.argwhere(_is_rough(out[window], _ROUGH_SHARE * peak))
-        _pressed(out, rough + corner, *parts, samples)
+        for some in _portions(rough + corner, interrupt):
+            _pressed(out, some, *parts, samples)
+
+
+def _portions(pixels: NDArray[np.intp], interrupt: Interrupt) -> Iterator[NDArray[np.intp]]:
+    for start in range(0, len(pixels), _PIXELS_AT_ONCE):
+        interrupt()
+        yield pixels[start : start + _PIXELS_AT_ONCE]
 
 
 def _is_rough(picture: Array, limit: float) -> NDArray[np.bool_]:

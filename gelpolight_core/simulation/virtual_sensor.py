@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
 from gelpolight_core.simulation.boards import BoardPose, board_on_top, board_picture
+from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
 from gelpolight_core.simulation.lamps import Lamp, PointLamp, lamp_table, lamps_of
 from gelpolight_core.simulation.membrane import reflectance_factor
@@ -78,6 +79,8 @@ class VirtualSensor:
         Of the membrane's pattern and of the noise; one seed gives one sequence of bytes.
     lamps : tuple of PointLamp or ParallelLamp, optional
         Other lights in place of the design's three LEDs.
+    interrupt : callable, optional
+        Called now and then while the sensor is made; what it raises stops the work.
 
     Raises
     ------
@@ -86,7 +89,12 @@ class VirtualSensor:
     """
 
     def __init__(
-        self, design: SensorDesign, seed: int = 0, *, lamps: tuple[Lamp, ...] | None = None
+        self,
+        design: SensorDesign,
+        seed: int = 0,
+        *,
+        lamps: tuple[Lamp, ...] | None = None,
+        interrupt: Interrupt = never,
     ) -> None:
         self.design = validate_design(design)
         self.seed = seed
@@ -94,15 +102,17 @@ class VirtualSensor:
         self.material = Material.of_membrane(design.membrane)
         self._table = lamp_table(self.lamps)
         self._count = 0
-        self.rays = trace_pixels(design.camera, design.layers)
+        self.rays = trace_pixels(design.camera, design.layers, interrupt=interrupt)
         self.factors = reflectance_factor(
             design.membrane, np.random.default_rng([seed, zlib.crc32(b"membrane")])
         )
+        interrupt()
         self.exposure = self._exposure()
+        interrupt()
         self._cover = self._rim_cover()
         self._membrane = self._flat(self.material) * self._factor_seen()[..., None]
 
-    def brightness(self, state: State, *, samples: int = 3) -> Array:
+    def brightness(self, state: State, *, samples: int = 3, interrupt: Interrupt = never) -> Array:
         """Return the exact picture (rows, columns, 3), linear, before noise and saturation.
 
         Parameters
@@ -111,12 +121,14 @@ class VirtualSensor:
             What is before the camera.
         samples : int, optional
             Rays per pixel and side at the edges of what is pressed; 1 is fastest.
+        interrupt : callable, optional
+            Called now and then; what it raises stops the work.
         """
         camera, photometry = self.design.camera, self.design.photometry
         if isinstance(state, (Checkerboard, BoardOnTop)):
             pose = state.pose if isinstance(state, Checkerboard) else self.top_pose
-            grey = blurred(board_picture(camera, pose), camera.blur_sigma_px)
-            return np.repeat(grey[..., None], 3, axis=2)
+            grey = board_picture(camera, pose, interrupt=interrupt)
+            return np.repeat(blurred(grey, camera.blur_sigma_px)[..., None], 3, axis=2)
         if isinstance(state, Mirror):
             light = self._mirror() * photometry.mirror_peak
         elif isinstance(state, Whiteboard):
@@ -126,8 +138,9 @@ class VirtualSensor:
             if isinstance(state, PressedMembrane):
                 shade_pressed(
                     light, self.rays, state.surface, self.factors, self._table, self.material,
-                    samples=samples,
+                    samples=samples, interrupt=interrupt,
                 )  # fmt: skip
+            interrupt()
             light *= self.exposure
         return blurred(mixed(light, photometry.crosstalk), camera.blur_sigma_px)
 

@@ -1,0 +1,1 @@
+"""The virtual bench: what lies on the virtual sensor, chosen by hand."""

@@ -1,0 +1,1 @@
+"""The calibration pages and what they show of each picture."""

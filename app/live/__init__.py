@@ -1,0 +1,1 @@
+"""The live picture: shown, checked, drawn upon."""

@@ -1,0 +1,102 @@
+"""The line below the picture: the pixel under the pointer, focus, exposure, rate."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen
+from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
+
+from app.live.picture_checks import Exposure
+from app.widgets.naming import named
+from gelpolight_core.quality import Verdict
+from gelpolight_core.translation import tr
+
+SIGNS = {Verdict.PASS: "\u2713", Verdict.WARN: "!", Verdict.FAIL: "\u2715"}
+
+
+class FocusBar(QWidget):
+    """How sharp the picture is against the sharpest of late; full is as sharp as it was."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(
+            self,
+            "live.focus",
+            tr("Focus"),
+            tr("Turn the lens until the bar is full and falls on either side"),
+        )
+        self.share = 0.0
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+
+    def sizeHint(self) -> QSize:  # noqa: D102
+        return QSize(170, 18)
+
+    def show_share(self, share: float) -> None:
+        """Show the focus as a share of the best, 0..1."""
+        self.share = share
+        self.setAccessibleDescription(self._text())
+        self.update()
+
+    def _text(self) -> str:
+        return tr("Focus {p:.0f} % of best").format(p=100.0 * self.share)
+
+    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        palette = self.palette()
+        frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+        painter.setPen(QPen(palette.color(QPalette.ColorRole.Mid), 1.0))
+        painter.setBrush(palette.color(QPalette.ColorRole.Base))
+        painter.drawRoundedRect(frame, 3.0, 3.0)
+        # Two in three of the bar for the last third of the way, where the hand goes slowly.
+        filled = QRectF(frame)
+        filled.setWidth(frame.width() * self.share**3)
+        tint = palette.color(QPalette.ColorRole.Highlight)
+        tint.setAlpha(110)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(tint)
+        painter.drawRoundedRect(filled, 3.0, 3.0)
+        painter.setPen(palette.color(QPalette.ColorRole.Text))
+        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._text())
+
+
+class ChecksBar(QWidget):
+    """Two lines of words and figures about the picture above."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "live.checks", tr("Picture checks"))
+        self.focus = FocusBar()
+        self._exposure = named(QLabel(), "live.exposure", tr("Exposure"))
+        self._pixel = named(QLabel(), "live.pixel", tr("Pixel under the pointer"))
+        self._rate = named(QLabel(), "live.rate", tr("Frame rate"))
+        self._rate.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        # Long advice is cut off rather than widening the window.
+        self._exposure.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self._pixel.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        layout = QGridLayout(self)
+        layout.setContentsMargins(6, 3, 6, 3)
+        layout.setVerticalSpacing(2)
+        layout.addWidget(self._exposure, 0, 0)
+        layout.addWidget(self.focus, 0, 1)
+        layout.addWidget(self._pixel, 1, 0)
+        layout.addWidget(self._rate, 1, 1)
+        layout.setColumnStretch(0, 1)
+
+    def show_exposure(self, exposure: Exposure | None) -> None:
+        """Show the advice about the exposure; None for nothing."""
+        text = f"{SIGNS[exposure.verdict]} {exposure.advice}" if exposure else ""
+        if text != self._exposure.text():
+            self._exposure.setText(text)
+            self._exposure.setToolTip(text)
+
+    def show_pixel(self, text: str) -> None:
+        """Show the value under the pointer."""
+        if text != self._pixel.text():
+            self._pixel.setText(text)
+
+    def show_rate(self, text: str) -> None:
+        """Show the frame rate and what was lost."""
+        if text != self._rate.text():
+            self._rate.setText(text)
+            self._rate.setToolTip(text)

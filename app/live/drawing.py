@@ -1,0 +1,279 @@
+"""Draws an overlay over the picture of a pyqtgraph view.
+
+Everything is drawn at one width on the screen whatever the zoom, twice: a dark line below a bright
+one, which can be seen on any picture. What a colour means is also told by shape, dashes or words.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
+
+from app.live.handles import (
+    Grip,
+    Handle,
+    drag,
+    find_grip,
+    handles_of,
+    with_handle,
+)
+from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay, Role
+
+# Told apart by people who see no red or no green, too: they differ in brightness.
+ROLE_COLOURS: dict[Role, str] = {
+    "good": "#3ddc84",
+    "bad": "#ff6b5e",
+    "expected": "#ffd54a",
+    "led0": "#ff8a80",
+    "led1": "#7dff8a",
+    "led2": "#8fb4ff",
+    "info": "#e8eef5",
+}
+# A word's worth of meaning before each note, for those to whom the colours look alike.
+NOTE_SIGNS: dict[Role, str] = {"good": "\u2713", "bad": "\u2715", "expected": "?"}
+HALO = QColor(0, 0, 0, 170)
+PLATE = QColor(0, 0, 0, 150)
+MARKER_PX = 7.0
+GRIP_PX = 4.0
+# How near to a handle the pointer must be, in screen pixels: a fingertip's worth of tremor.
+REACH_PX = 12.0
+MASK_ALPHA = 95
+
+
+class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
+    """Shows an overlay in picture coordinates and lets its handles be dragged.
+
+    Signals
+    -------
+    handle_moved(Handle)
+        A drag ended.
+    handle_taken(str)
+        A handle was taken hold of.
+    """
+
+    handle_moved = Signal(object)
+    handle_taken = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._overlay = Overlay()
+        self._size = (1, 1)
+        self._masks: list[QImage] = []
+        self._held: tuple[Handle, Grip] | None = None
+        self._dragged: Handle | None = None
+        self.selected = ""
+
+    def set_overlay(self, overlay: Overlay, size: tuple[int, int]) -> None:
+        """Show `overlay` over a picture of `size` (width, height)."""
+        if size != self._size:
+            self.prepareGeometryChange()
+            self._size = size
+        if overlay.masks != self._overlay.masks:
+            self._masks = [_mask_picture(mask) for mask in overlay.masks]
+        # A result that comes in while a person drags must not tear the handle away.
+        self._overlay = overlay if self._dragged is None else with_handle(overlay, self._dragged)
+        self.update()
+
+    @property
+    def handles(self) -> tuple[Handle, ...]:
+        """What can be moved."""
+        return handles_of(self._overlay)
+
+    def place(self, handle: Handle) -> None:
+        """Show a handle at another place."""
+        self._overlay = with_handle(self._overlay, handle)
+        self.update()
+
+    def select(self, name: str) -> None:
+        """Mark the handle that the keyboard moves."""
+        self.selected = name
+        self.update()
+
+    def boundingRect(self) -> QRectF:  # noqa: D102
+        width, height = self._size
+        # Marks have a width on the screen, of which the picture's coordinates know nothing.
+        return QRectF(-0.5 * width, -0.5 * height, 2.0 * width, 2.0 * height)
+
+    def hoverEvent(self, event: Any) -> None:  # noqa: D102
+        over = None if event.isExit() else self._grip_at(event.pos())
+        if over is None:
+            self.unsetCursor()
+            return
+        event.acceptDrags(Qt.MouseButton.LeftButton)
+        event.acceptClicks(Qt.MouseButton.LeftButton)
+        resizes = over[1] is Grip.RADIUS
+        self.setCursor(Qt.CursorShape.SizeHorCursor if resizes else Qt.CursorShape.SizeAllCursor)
+
+    def mouseClickEvent(self, event: Any) -> None:  # noqa: D102
+        over = self._grip_at(event.pos())
+        if over is None or event.button() != Qt.MouseButton.LeftButton or event.double():
+            event.ignore()
+            return
+        event.accept()
+        self._take(over)
+        self._held = None
+
+    def mouseDragEvent(self, event: Any) -> None:  # noqa: D102
+        if event.isStart():
+            over = self._grip_at(event.buttonDownPos())
+            if over is None or event.button() != Qt.MouseButton.LeftButton:
+                event.ignore()
+                return
+            self._take(over)
+        if self._held is None:
+            event.ignore()
+            return
+        event.accept()
+        down, now = event.buttonDownPos(), event.pos()
+        self._dragged = drag(*self._held, (down.x(), down.y()), (now.x(), now.y()), self._size)
+        self.place(self._dragged)
+        if event.isFinish():
+            moved, self._held, self._dragged = self._dragged, None, None
+            self.handle_moved.emit(moved)
+
+    def _take(self, over: tuple[Handle, Grip]) -> None:
+        self._held = over
+        self.select(over[0].name)
+        self.handle_taken.emit(over[0].name)
+
+    def _grip_at(self, place: QPointF) -> tuple[Handle, Grip] | None:
+        width_px = self.pixelLength(pg.Point(1.0, 0.0)) or 1.0
+        return find_grip(self.handles, place.x(), place.y(), reach_px=REACH_PX * width_px)
+
+    def paint(self, painter: QPainter, *_: Any) -> None:  # noqa: D102
+        self._paint_masks(painter)
+        to_screen = painter.worldTransform()
+        painter.save()
+        painter.resetTransform()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for line in self._overlay.lines:
+            _paint_line(painter, line, to_screen)
+        for circle in self._overlay.circles:
+            _paint_circle(painter, circle, to_screen, circle.handle == self.selected)
+        for marker in self._overlay.markers:
+            _paint_marker(painter, marker, to_screen, marker.handle == self.selected)
+        _paint_notes(painter, self._overlay.notes)
+        painter.restore()
+
+    def _paint_masks(self, painter: QPainter) -> None:
+        for picture in self._masks:
+            target = QRectF(-0.5, -0.5, picture.width(), picture.height())
+            painter.drawImage(target, picture)
+
+
+def _mask_picture(mask: Mask) -> QImage:
+    """Return a tint for the true pixels: one byte a pixel, coloured by a table."""
+    rows, columns = mask.area.shape
+    # Qt wants every line to begin at a multiple of four bytes.
+    padded = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
+    padded[:, :columns] = mask.area
+    picture = QImage(padded.data, columns, rows, padded.shape[1], QImage.Format.Format_Indexed8)
+    tint = QColor(ROLE_COLOURS[mask.role])
+    tint.setAlpha(MASK_ALPHA)
+    picture.setColorTable([0, tint.rgba()])
+    return picture.copy()
+
+
+def _stroke(painter: QPainter, role: Role, draw: Any, *, width: float = 1.6) -> None:
+    """Draw twice: a dark halo, then the role's colour; what is expected is dashed."""
+    dashed = Qt.PenStyle.DashLine if role == "expected" else Qt.PenStyle.SolidLine
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for pen in (
+        QPen(HALO, width + 2.0),
+        QPen(QColor(ROLE_COLOURS[role]), width, dashed),
+    ):
+        painter.setPen(pen)
+        draw()
+
+
+def _paint_line(painter: QPainter, line: Line, to_screen: QTransform) -> None:
+    polygon = to_screen.map(QPolygonF([QPointF(u, v) for u, v in line.points]))
+    draw = painter.drawPolygon if line.closed else painter.drawPolyline
+    # What is only told for information stays thin: there may be a dozen earlier views of it.
+    if line.role == "info":
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        faint = QColor(ROLE_COLOURS["info"])
+        faint.setAlpha(120)
+        painter.setPen(QPen(faint, 1.0))
+        draw(polygon)
+        return
+    _stroke(painter, line.role, lambda: draw(polygon))
+
+
+def _paint_circle(painter: QPainter, circle: Circle, to_screen: QTransform, selected: bool) -> None:
+    centre = to_screen.map(QPointF(circle.u, circle.v))
+    edge = to_screen.map(QPointF(circle.u + circle.radius_px, circle.v))
+    radius = abs(edge.x() - centre.x())
+    _stroke(painter, circle.role, lambda: painter.drawEllipse(centre, radius, radius))
+    if circle.handle:
+        _paint_grip(painter, centre, circle.role, selected)
+        _paint_grip(painter, edge, circle.role, selected)
+
+
+def _paint_grip(painter: QPainter, at: QPointF, role: Role, selected: bool) -> None:
+    size = GRIP_PX + (2.0 if selected else 0.0)
+    box = QRectF(at.x() - size, at.y() - size, 2 * size, 2 * size)
+    painter.setPen(QPen(QColor(0, 0, 0), 1.0))
+    painter.setBrush(QColor("white") if selected else QColor(ROLE_COLOURS[role]))
+    painter.drawRect(box)
+
+
+def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, selected: bool) -> None:
+    at = to_screen.map(QPointF(marker.u, marker.v))
+    x, y, s = at.x(), at.y(), MARKER_PX
+
+    def draw() -> None:
+        match marker.kind:
+            case "cross":
+                painter.drawLine(QPointF(x - s, y - s), QPointF(x + s, y + s))
+                painter.drawLine(QPointF(x - s, y + s), QPointF(x + s, y - s))
+            case "plus":
+                painter.drawLine(QPointF(x - s, y), QPointF(x + s, y))
+                painter.drawLine(QPointF(x, y - s), QPointF(x, y + s))
+            case "ring":
+                painter.drawEllipse(at, s, s)
+            case "dot":
+                painter.drawEllipse(at, 2.0, 2.0)
+
+    _stroke(painter, marker.role, draw)
+    if marker.handle:
+        ring = s + 5.0
+        _stroke(
+            painter,
+            "info" if selected else marker.role,
+            lambda: painter.drawRect(QRectF(x - ring, y - ring, 2 * ring, 2 * ring)),
+            width=2.4 if selected else 1.0,
+        )
+    if marker.text:
+        # What is expected lies near what was found: their words must not lie on each other.
+        beside = QPointF(x, y + s + 6.0 if marker.role == "expected" else y - s)
+        _paint_text(painter, beside, marker.text, marker.role, gap=s + 5.0)
+
+
+def _paint_text(painter: QPainter, at: QPointF, text: str, role: Role, *, gap: float = 0.0) -> None:
+    """Write on a dark plate, `gap` to the right of a point, or to its left where the view ends."""
+    metrics = QFontMetricsF(painter.font())
+    width, height = metrics.horizontalAdvance(text) + 8.0, metrics.height() + 2.0
+    view = QRectF(painter.window())
+    left, top = at.x() + gap, at.y() - height / 2
+    if left + width > view.right():
+        left = at.x() - gap - width
+    top = min(max(top, 0.0), view.bottom() - height)
+    plate = QRectF(left, top, width, height)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(PLATE)
+    painter.drawRoundedRect(plate, 3.0, 3.0)
+    painter.setPen(QColor(ROLE_COLOURS[role]))
+    painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, text)
+
+
+def _paint_notes(painter: QPainter, notes: tuple[Note, ...]) -> None:
+    y = 16.0
+    for note in notes:
+        sign = NOTE_SIGNS.get(note.role, "")
+        _paint_text(painter, QPointF(8.0, y), f"{sign} {note.text}".strip(), note.role)
+        y += QFontMetricsF(painter.font()).height() + 6.0

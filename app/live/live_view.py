@@ -1,0 +1,400 @@
+"""The live picture with its tools: what every page shows of a camera."""
+
+from __future__ import annotations
+
+import math
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+import numpy as np
+from PySide6.QtCore import QStandardPaths, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.live.checks_bar import ChecksBar
+from app.live.handles import Handle, move, next_name, resize
+from app.live.histogram import Histogram
+from app.live.overlay import Overlay
+from app.live.picture_checks import (
+    BestFocus,
+    Rgb,
+    channel_histograms,
+    end_of_scale,
+    measure_exposure,
+    measure_focus,
+)
+from app.live.picture_view import PictureView
+from app.live.tools import PictureTools
+from app.live.zebra import eight_bits, with_zebra
+from app.widgets.naming import named
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.translation import tr
+
+TICK_MS = 16
+# Words and figures five times a second: faster than they can be read.
+CHECK_S = 0.2
+# One pixel in nine: still a hundred thousand of a small camera.
+CHECK_STRIDE = 3
+NUDGE_PX = 0.2
+LARGE_NUDGE_PX = 2.0
+# A nudge has ended when no key came for so long.
+NUDGE_END_MS = 250
+ZOOM_STEP = 1.25
+CORNER_PX = 10
+
+
+class FrameLike(Protocol):
+    """What this view needs of a frame."""
+
+    @property
+    def rgb(self) -> Rgb:
+        """(rows, columns, 3), never rewritten."""
+
+
+class MailboxLike(Protocol):
+    """A slot that holds the newest frame."""
+
+    def take(self) -> FrameLike | None:
+        """Return the frame and empty the slot."""
+
+
+class StreamLike(Protocol):
+    """Where frames come from."""
+
+    @property
+    def newest(self) -> MailboxLike:
+        """The newest frame, taken by this view alone."""
+
+    def figures(self) -> Any:
+        """Return the rate and what was lost."""
+
+
+class LiveView(QWidget):
+    """Shows a stream or a still, checks it, and lets a person put an overlay's handles right.
+
+    Signals
+    -------
+    moved(str, float, float, float)
+        Handle, u, v and radius (0 for a marker), after a drag or a nudge.
+    clicked(float, float)
+        A left click at (u, v).
+    saved(str)
+        A snapshot was written to this file.
+    refused(str)
+        A sentence: why a snapshot was not written.
+    """
+
+    moved = Signal(str, float, float, float)
+    clicked = Signal(float, float)
+    saved = Signal(str)
+    refused = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "live", tr("Live view"))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.snapshot_folder = _pictures_folder()
+        self._stream: StreamLike | None = None
+        self._rgb: Rgb | None = None
+        self._overlay = Overlay()
+        self._best_focus = BestFocus()
+        self._checked_s = -math.inf
+        self._pointer = (math.nan, math.nan)
+        self._shown_frames = 0
+        self._tools = PictureTools(self)
+        self._picture = PictureView()
+        self._checks = ChecksBar()
+        self._histogram = Histogram(self._picture)
+        self._histogram.hide()
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self._tools)
+        column.addWidget(self._picture, 1)
+        column.addWidget(self._checks)
+
+    def _connect(self) -> None:
+        self._tools.pressed.connect(self._on_tool)
+        self._tools.switched.connect(self._on_switch)
+        self._picture.pointed.connect(self._on_pointed)
+        self._picture.clicked.connect(self.clicked)
+        self._picture.zoomed.connect(self._tools.show_zoom)
+        self._picture.resized.connect(self._place_histogram)
+        self._picture.overlay.handle_moved.connect(self._on_handle_moved)
+        self._tick = QTimer(self)
+        self._tick.setTimerType(Qt.TimerType.PreciseTimer)
+        self._tick.setInterval(TICK_MS)
+        self._tick.timeout.connect(self._take_newest)
+        self._nudge_end = QTimer(self)
+        self._nudge_end.setSingleShot(True)
+        self._nudge_end.setInterval(NUDGE_END_MS)
+        self._nudge_end.timeout.connect(self._end_nudge)
+
+    # What pages ask of it
+
+    def set_stream(self, stream: StreamLike | None) -> None:
+        """Show the newest frames of `stream` from now on; None: none, the picture goes."""
+        self._stream = stream
+        self._best_focus = BestFocus()
+        self._checks.focus.show()
+        self._tick.stop()
+        if stream is None:
+            self._rgb = None
+            self._picture.show_rgb(None)
+            self._checks.show_exposure(None)
+            self._checks.show_pixel("")
+            self._checks.show_rate("")
+            self._checks.focus.show_share(0.0)
+            self._histogram.show_counts(None)
+        elif self.isVisible():
+            self._tick.start()
+
+    def show_frame(self, frame: FrameLike) -> None:
+        """Show a frame."""
+        self._show(frame.rgb)
+
+    def show_picture(self, rgb: Rgb) -> None:
+        """Show a still, (rows, columns, 3) uint8 or uint16, and check it at once."""
+        self._checked_s = -math.inf
+        self._checks.focus.hide()
+        self._show(rgb)
+
+    def set_overlay(self, overlay: Overlay | None) -> None:
+        """Draw over the picture; None: nothing."""
+        self._overlay = overlay or Overlay()
+        self._draw_overlay()
+
+    def freeze(self, on: bool) -> None:
+        """Keep the picture that is shown, while the stream goes on."""
+        self._tools.switch("freeze", on)
+
+    def zebra(self, on: bool) -> None:
+        """Stripe what is at the end of scale."""
+        self._tools.switch("zebra", on)
+
+    def show_histogram(self, on: bool) -> None:
+        """Show the histogram in the corner."""
+        self._tools.switch("histogram", on)
+
+    def fit(self) -> None:
+        """Show the whole picture."""
+        self._picture.fit()
+
+    def full_size(self) -> None:
+        """Show one picture pixel on one screen pixel."""
+        self._picture.full_size()
+
+    def say(self, text: str) -> None:
+        """Change what stands where there is no picture."""
+        self._picture.say(text)
+
+    def snapshot(self, path: Path) -> None:
+        """Write the picture that is shown, without marks, as PNG with all its bits.
+
+        Raises
+        ------
+        InputError
+            Where there is no picture or the file cannot be written.
+        """
+        if self._rgb is None:
+            raise InputError(
+                tr("there is no picture to save"),
+                where=tr("live view"),
+                advice=tr("Choose a source first"),
+            )
+        _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
+        write_atomically(path, lambda file: file.write(png.tobytes()))
+
+    def save_snapshot(self) -> None:
+        """Write the picture into :attr:`snapshot_folder`, named by date and time."""
+        name = datetime.now().astimezone().strftime("snapshot-%Y%m%d-%H%M%S-%f")[:-3] + ".png"
+        path = self.snapshot_folder / name
+        try:
+            make_folder(self.snapshot_folder)
+            self.snapshot(path)
+        except InputError as refusal:
+            self.refused.emit(str(refusal))
+            return
+        self.saved.emit(str(path))
+
+    # Frames
+
+    def _take_newest(self) -> None:
+        if self._stream is None or self._tools.is_on("freeze"):
+            return
+        frame = self._stream.newest.take()
+        if frame is not None:
+            self._show(frame.rgb)
+
+    def _show(self, rgb: Rgb) -> None:
+        resized = self._rgb is None or self._rgb.shape != rgb.shape
+        self._rgb = rgb
+        self._shown_frames += 1
+        self._render()
+        if resized:
+            self._draw_overlay()
+        now_s = time.monotonic()
+        if now_s - self._checked_s >= CHECK_S:
+            self._checked_s = now_s
+            self._check(rgb, now_s)
+            self._tell_pixel()
+
+    def _render(self) -> None:
+        if self._rgb is None:
+            return
+        striped = self._tools.is_on("zebra")
+        shown = with_zebra(self._rgb, self._shown_frames) if striped else eight_bits(self._rgb)
+        self._picture.show_rgb(shown)
+
+    def _check(self, rgb: Rgb, now_s: float) -> None:
+        thin = np.ascontiguousarray(rgb[::CHECK_STRIDE, ::CHECK_STRIDE])
+        self._checks.show_exposure(measure_exposure(rgb))
+        self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
+        if self._histogram.isVisible():
+            self._histogram.show_counts(channel_histograms(thin))
+        if self._stream is not None:
+            figures = self._stream.figures()
+            self._checks.show_rate(
+                figures.lost
+                or tr("{r:.0f} frames/s, {d} dropped").format(r=figures.rate_hz, d=figures.dropped)
+            )
+
+    def _draw_overlay(self) -> None:
+        shown = self._overlay if self._tools.is_on("overlay") else Overlay()
+        self._picture.overlay.set_overlay(shown, self._drawing_size())
+
+    def _drawing_size(self) -> tuple[int, int]:
+        width, height = self._picture.picture_size
+        return max(width, 1), max(height, 1)
+
+    # Tools
+
+    def _on_tool(self, name: str) -> None:
+        {"fit": self.fit, "full_size": self.full_size, "snapshot": self.save_snapshot}[name]()
+
+    def _on_switch(self, name: str, on: bool) -> None:
+        match name:
+            case "zebra":
+                self._render()
+            case "overlay":
+                self._draw_overlay()
+            case "histogram":
+                self._histogram.setVisible(on)
+                self._checked_s = -math.inf
+                if on and self._rgb is not None:
+                    self._check(self._rgb, time.monotonic())
+
+    def _on_pointed(self, u: float, v: float) -> None:
+        self._pointer = (u, v)
+        self._tell_pixel()
+
+    def _tell_pixel(self) -> None:
+        self._checks.show_pixel("" if self._rgb is None else pixel_text(self._rgb, *self._pointer))
+
+    # Handles
+
+    def _on_handle_moved(self, handle: Handle) -> None:
+        self._nudge_end.stop()
+        self.moved.emit(handle.name, handle.u, handle.v, handle.radius_px)
+
+    def _selected(self) -> Handle | None:
+        item = self._picture.overlay
+        return next((h for h in item.handles if h.name == item.selected), None)
+
+    def _end_nudge(self) -> None:
+        handle = self._selected()
+        if handle is not None:
+            self.moved.emit(handle.name, handle.u, handle.v, handle.radius_px)
+
+    def _nudge(self, event: QKeyEvent) -> bool:
+        """Move or resize the selected handle if the key says so; return whether it did."""
+        handle = self._selected()
+        if handle is None:
+            return False
+        held = event.modifiers()
+        step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ShiftModifier else NUDGE_PX
+        # A plus is typed with Shift on many keyboards, so that Ctrl makes the large step here.
+        radius_step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ControlModifier else NUDGE_PX
+        match event.key():
+            case Qt.Key.Key_Left | Qt.Key.Key_Right | Qt.Key.Key_Up | Qt.Key.Key_Down:
+                du, dv = _ARROWS[event.key()]
+                handle = move(handle, step * du, step * dv, self._drawing_size())
+            case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
+                handle = resize(handle, radius_step)
+            case Qt.Key.Key_Minus:
+                handle = resize(handle, -radius_step)
+            case _:
+                return False
+        self._picture.overlay.place(handle)
+        self._nudge_end.start()
+        return True
+
+    # Qt
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102
+        item = self._picture.overlay
+        if self._nudge(event):
+            return
+        match event.key():
+            case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp if item.handles:
+                step = 1 if event.key() == Qt.Key.Key_PageDown else -1
+                item.select(next_name(item.handles, item.selected, step))
+            case Qt.Key.Key_Escape if item.selected:
+                item.select("")
+            case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
+                self._picture.zoom_by(ZOOM_STEP)
+            case Qt.Key.Key_Minus:
+                self._picture.zoom_by(1.0 / ZOOM_STEP)
+            case _:
+                super().keyPressEvent(event)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: D102
+        super().showEvent(event)
+        if self._stream is not None:
+            self._tick.start()
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: D102
+        super().hideEvent(event)
+        self._tick.stop()
+
+    def _place_histogram(self) -> None:
+        corner = self._picture.rect().bottomRight()
+        self._histogram.move(
+            corner.x() - self._histogram.width() - CORNER_PX,
+            corner.y() - self._histogram.height() - CORNER_PX,
+        )
+
+
+_ARROWS = {
+    Qt.Key.Key_Left: (-1.0, 0.0),
+    Qt.Key.Key_Right: (1.0, 0.0),
+    Qt.Key.Key_Up: (0.0, -1.0),
+    Qt.Key.Key_Down: (0.0, 1.0),
+}
+
+
+def pixel_text(rgb: Rgb, u: float, v: float) -> str:
+    """Return the numbers of the pixel at (u, v), empty outside the picture."""
+    rows, columns = rgb.shape[:2]
+    if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
+        return ""
+    column, row = math.floor(u + 0.5), math.floor(v + 0.5)
+    top = end_of_scale(rgb)
+    values = (
+        f"{name} {int(value)} ({100.0 * int(value) / top:.0f} %)"
+        for name, value in zip(("R", "G", "B"), rgb[row, column], strict=True)
+    )
+    return f"u {column}, v {row}:  " + "   ".join(values)
+
+
+def _pictures_folder() -> Path:
+    pictures = QStandardPaths.StandardLocation.PicturesLocation
+    return Path(QStandardPaths.writableLocation(pictures)) / "GelPoLight Studio"

@@ -1,0 +1,169 @@
+"""Is the picture sharp, and is it exposed well? Cheap figures for every few frames; no Qt here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.quality import Verdict
+from gelpolight_core.translation import tr
+
+Rgb = NDArray[np.uint8] | NDArray[np.uint16]
+
+# A twentieth of a percent may be glints and hot pixels, which say nothing of the exposure.
+SATURATED_WARN = 0.0005
+# Core stages refuse from a few percent on; one percent is where a person should act.
+SATURATED_FAIL = 0.01
+# Eight bits below a quarter of the scale leave fewer than 64 steps.
+DARK_SHARE_OF_SCALE = 0.25
+# A mirror spot may be a dozen pixels of a million, and is all that there is to expose; hot pixels
+# at a short exposure are fewer.
+BRIGHTEST_PIXELS = 12
+# Seconds in which a best focus that was left behind loses half of its lead.
+BEST_HALF_LIFE_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """How a picture fills its scale.
+
+    Attributes
+    ----------
+    saturated_share : float
+        Pixels with a channel at the end of scale, 0..1.
+    brightest : float
+        What all but a few pixels stay below, share of the scale.
+    verdict : Verdict
+        The judgement.
+    advice : str
+        What to say to a person.
+    """
+
+    saturated_share: float
+    brightest: float
+    verdict: Verdict
+    advice: str
+
+
+def end_of_scale(rgb: Rgb) -> int:
+    """Return the largest number that a picture's pixels can hold."""
+    return int(np.iinfo(rgb.dtype).max)
+
+
+def brightest_channel(rgb: Rgb) -> Rgb:
+    """Return the largest of the three channels at every pixel, (rows, columns)."""
+    red, green, blue = cv2.split(rgb)
+    return np.asarray(cv2.max(cv2.max(red, green), blue))
+
+
+def saturated(rgb: Rgb) -> NDArray[np.uint8]:
+    """Return 255 where a channel is at the end of scale, else 0; (rows, columns).
+
+    A 16-bit picture counts from the last 8-bit step on, as cameras of 10 or 12 bit fill 16 bits
+    by shifting.
+    """
+    top = end_of_scale(rgb)
+    limit = 254 if top == 255 else 0xFEFF
+    return np.asarray(cv2.compare(brightest_channel(rgb), float(limit), cv2.CMP_GT), np.uint8)
+
+
+def measure_exposure(rgb: Rgb) -> Exposure:
+    """Judge how a picture fills its scale.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        The whole picture.
+    """
+    full = saturated(rgb)
+    share = cv2.countNonZero(full) / full.size
+    brightest = _level_of_brightest(rgb)
+    if share > SATURATED_WARN:
+        verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
+        text = tr("Too bright: {p} % of the pixels are at the end of scale. Shorten the exposure.")
+        return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * share)))
+    if brightest < DARK_SHARE_OF_SCALE:
+        verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
+        text = tr("Too dark: the brightest places reach {p} % of the scale. Lengthen the exposure.")
+        return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * brightest)))
+    text = tr("Exposure is good: the brightest places reach {p} % of the scale.")
+    return Exposure(share, brightest, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))
+
+
+def _level_of_brightest(rgb: Rgb) -> float:
+    """Return which share of the scale the brightest pixels reach, but for a few."""
+    counts = np.cumsum(np.bincount(_high_byte(brightest_channel(rgb)).ravel(), minlength=256)[::-1])
+    return float(255 - int(np.searchsorted(counts, BRIGHTEST_PIXELS))) / 255.0
+
+
+def _high_byte(values: Rgb) -> NDArray[np.uint8]:
+    return np.asarray(values >> (8 * values.dtype.itemsize - 8), np.uint8)
+
+
+def _percent(value: float) -> str:
+    return f"{value:.0f}" if value >= 2.0 else f"{value:.1g}"
+
+
+def measure_focus(rgb: Rgb) -> float:
+    """Return how sharp a picture is: squared steps over two pixels against its brightness squared.
+
+    Brenner's gradient, along rows and columns. Dividing by the brightness makes it indifferent to
+    the exposure, so that only the focus moves it. It has no meaning between different scenes.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        The whole picture; a subsample has no fine detail.
+    """
+    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+    energy = cv2.norm(grey, cv2.NORM_L2SQR)
+    if energy == 0.0 or min(grey.shape) < 3:
+        return 0.0
+    steps = cv2.norm(grey[2:], grey[:-2], cv2.NORM_L2SQR)
+    steps += cv2.norm(grey[:, 2:], grey[:, :-2], cv2.NORM_L2SQR)
+    return float(steps / energy)
+
+
+class BestFocus:
+    """Remembers the sharpest picture, so that a person turning the lens sees the way back.
+
+    The memory fades by half of its lead every :data:`BEST_HALF_LIFE_S`, so that another scene,
+    which has another sharpness, gets a best of its own.
+    """
+
+    def __init__(self) -> None:
+        self.best = 0.0
+        self._seen_s: float | None = None
+
+    def update(self, focus: float, time_s: float) -> float:
+        """Take in a figure measured at `time_s`; return it as a share of the best, 0..1."""
+        if self._seen_s is not None:
+            fade = 0.5 ** (max(time_s - self._seen_s, 0.0) / BEST_HALF_LIFE_S)
+            self.best = focus + (self.best - focus) * fade
+        self.best = max(self.best, focus)
+        self._seen_s = time_s
+        return focus / self.best if self.best > 0.0 else 0.0
+
+
+def channel_histograms(rgb: Rgb, bins: int = 64) -> NDArray[np.int64]:
+    """Count pixels by brightness, each channel for itself.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        The picture, or evenly chosen pixels of it.
+    bins : int, optional
+        A power of two, at most 256.
+
+    Returns
+    -------
+    (3, bins) int64
+        Counts; the last bin holds the end of scale.
+    """
+    shift = 8 * rgb.dtype.itemsize - (bins - 1).bit_length()
+    return np.stack(
+        [np.bincount(rgb[..., k].ravel() >> shift, minlength=bins) for k in range(3)]
+    ).astype(np.int64)

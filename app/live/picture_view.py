@@ -1,0 +1,172 @@
+"""One picture in a pyqtgraph view: zoom, pan, fit, and where the pointer is.
+
+Coordinates are the core's: (u, v) with pixel centres at whole numbers, v down.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QResizeEvent
+from PySide6.QtWidgets import QLabel, QWidget
+
+from app.live.drawing import OverlayItem
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+# Dark in both themes: dark pictures can only be judged against a dark surround.
+SURROUND = "#15171a"
+# From this magnification on pixels are shown as squares, which is what one zooms in for.
+SQUARES_FROM = 1.5
+LEAST_SHOWN_PX = 6.0
+
+
+class PictureView(pg.GraphicsView):  # type: ignore[misc]
+    """Shows a picture and an overlay.
+
+    Signals
+    -------
+    pointed(float, float)
+        Picture pixel (u, v) under the pointer; NaN where there is none.
+    clicked(float, float)
+        A left click on the picture.
+    zoomed(float)
+        Screen pixels per picture pixel.
+    resized()
+        The view has another size.
+    """
+
+    pointed = Signal(float, float)
+    clicked = Signal(float, float)
+    zoomed = Signal(float)
+    resized = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent, background=SURROUND)
+        named(self, "live.picture", tr("Live picture"))
+        # Keys belong to the whole live view, which has the tools' and the handles'.
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._size = (0, 0)
+        self._fitted = True
+        self._box = pg.ViewBox(lockAspect=1.0, invertY=True, enableMenu=False)
+        self._box.disableAutoRange()
+        self.setCentralItem(self._box)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        self._box.addItem(self._image, ignoreBounds=True)
+        self.overlay = OverlayItem()
+        self.overlay.setZValue(10)
+        self._box.addItem(self.overlay, ignoreBounds=True)
+        self._box.sigRangeChangedManually.connect(self._on_moved_by_hand)
+        self._box.sigRangeChanged.connect(self._on_range)
+        self.scene().sigMouseMoved.connect(self._on_pointer)
+        self.scene().sigMouseClicked.connect(self._on_click)
+        self._placeholder = QLabel(tr("No camera. Choose a source."), self)
+        self._placeholder.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._placeholder.setWordWrap(True)
+        self._placeholder.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 15px;")
+        self._placeholder.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """(width, height) in pixels; (0, 0) without a picture."""
+        return self._size
+
+    @property
+    def scale_px(self) -> float:
+        """Screen pixels per picture pixel."""
+        width, _ = self._box.viewPixelSize()
+        return float(self.devicePixelRatioF() / width) if width > 0.0 else 1.0
+
+    def show_rgb(self, rgb: NDArray[np.uint8] | None) -> None:
+        """Show a picture (rows, columns, 3); None for none."""
+        self._placeholder.setVisible(rgb is None)
+        if rgb is None:
+            self._image.clear()
+            self._size = (0, 0)
+            return
+        self._image.setImage(rgb, autoLevels=False)
+        size = (rgb.shape[1], rgb.shape[0])
+        if size != self._size:
+            self._size = size
+            # Half a pixel: the first pixel's centre, not its corner, is (0, 0).
+            self._image.setRect(QRectF(-0.5, -0.5, *size))
+            self._box.setLimits(
+                minXRange=LEAST_SHOWN_PX,
+                maxXRange=8.0 * size[0],
+                xMin=-4.0 * size[0],
+                xMax=5.0 * size[0],
+                yMin=-4.0 * size[1],
+                yMax=5.0 * size[1],
+            )
+            self.fit()
+
+    def say(self, text: str) -> None:
+        """Change what stands where there is no picture."""
+        self._placeholder.setText(text)
+
+    def fit(self) -> None:
+        """Show the whole picture, and go on doing so when the view's size changes."""
+        self._fitted = True
+        if self._size != (0, 0):
+            self._box.setRange(QRectF(-0.5, -0.5, *self._size), padding=0.0)
+
+    def full_size(self) -> None:
+        """Show one picture pixel on one screen pixel, about the middle of what is shown."""
+        self._scale_to(1.0)
+
+    def zoom_by(self, factor: float) -> None:
+        """Magnify about the middle of what is shown."""
+        self._scale_to(self.scale_px * factor)
+
+    def _scale_to(self, scale: float) -> None:
+        if self._size == (0, 0):
+            return
+        self._fitted = False
+        middle = self._box.viewRect().center()
+        width = self._box.width() * self.devicePixelRatioF() / scale
+        height = self._box.height() * self.devicePixelRatioF() / scale
+        self._box.setRange(
+            QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height), padding=0.0
+        )
+
+    def view_position(self, u: float, v: float) -> tuple[float, float]:
+        """Return where in this widget a picture point is, in points."""
+        at = self.mapFromScene(self._box.mapViewToScene(pg.Point(u, v)))
+        return float(at.x()), float(at.y())
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
+        super().resizeEvent(event)
+        if hasattr(self, "_placeholder"):  # the base class resizes itself while it is being made
+            self._placeholder.setGeometry(self.rect().adjusted(20, 20, -20, -20))
+            if self._fitted:
+                self.fit()
+            self.resized.emit()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().leaveEvent(event)
+        self.pointed.emit(math.nan, math.nan)
+
+    def _on_moved_by_hand(self, *_: Any) -> None:
+        self._fitted = False
+
+    def _on_range(self, *_: Any) -> None:
+        self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, self.scale_px < SQUARES_FROM)
+        self.zoomed.emit(self.scale_px)
+
+    def _on_pointer(self, at: Any) -> None:
+        place = self._box.mapSceneToView(at)
+        self.pointed.emit(place.x(), place.y())
+
+    def _on_click(self, event: Any) -> None:
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        if event.double():
+            self.fit()
+            return
+        place = self._box.mapSceneToView(event.scenePos())
+        self.clicked.emit(place.x(), place.y())

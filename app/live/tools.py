@@ -1,0 +1,103 @@
+"""The row of picture tools, each with a key of its own."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QIcon, QKeySequence, QPalette, QShortcut
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+
+from app.live.icons import SIDE, tool_icon
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+# name: (key, stays pressed)
+TOOLS = {
+    "fit": ("F", False),
+    "full_size": ("1", False),
+    "freeze": ("Space", True),
+    "snapshot": ("P", False),
+    "zebra": ("Z", True),
+    "histogram": ("H", True),
+    "overlay": ("O", True),
+}
+
+
+def tool_texts() -> dict[str, str]:
+    """Return what each tool is called."""
+    return {
+        "fit": tr("Fit to view"),
+        "full_size": tr("Full size, 100 %"),
+        "freeze": tr("Freeze"),
+        "snapshot": tr("Save a snapshot"),
+        "zebra": tr("Stripes where saturated"),
+        "histogram": tr("Histogram"),
+        "overlay": tr("Marks on the picture"),
+    }
+
+
+class PictureTools(QWidget):
+    """Flat buttons; their keys work wherever the focus is inside `owner`.
+
+    Signals
+    -------
+    pressed(str)
+        A tool that does not stay pressed.
+    switched(str, bool)
+        One that does.
+    """
+
+    pressed = Signal(str)
+    switched = Signal(str, bool)
+
+    def __init__(self, owner: QWidget) -> None:
+        super().__init__()
+        named(self, "live.tools", tr("Picture tools"))
+        self._buttons: dict[str, QToolButton] = {}
+        self._zoom = named(QLabel(), "live.zoom", tr("Magnification"))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(4, 2, 8, 2)
+        row.setSpacing(2)
+        for name, text in tool_texts().items():
+            row.addWidget(self._make_button(name, text, owner))
+        row.addStretch(1)
+        row.addWidget(self._zoom)
+        self._buttons["overlay"].setChecked(True)
+
+    def _make_button(self, name: str, text: str, owner: QWidget) -> QToolButton:
+        key, stays = TOOLS[name]
+        button = named(QToolButton(), f"live.{name}", text, f"{text} ({key})")
+        button.setAutoRaise(True)
+        button.setIconSize(QSize(SIDE, SIDE))
+        button.setIcon(self._icon(name))
+        button.setCheckable(stays)
+        if stays:
+            button.toggled.connect(lambda on: self.switched.emit(name, on))
+        else:
+            button.clicked.connect(lambda: self.pressed.emit(name))
+        shortcut = QShortcut(QKeySequence(key), owner)
+        shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        shortcut.activated.connect(button.click)
+        self._buttons[name] = button
+        return button
+
+    def is_on(self, name: str) -> bool:
+        """Whether a tool is pressed."""
+        return self._buttons[name].isChecked()
+
+    def switch(self, name: str, on: bool) -> None:
+        """Press or release a tool."""
+        self._buttons[name].setChecked(on)
+
+    def show_zoom(self, scale: float) -> None:
+        """Show the magnification, 1 for full size."""
+        self._zoom.setText(f"{100.0 * scale:.0f} %")
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_buttons"):
+            for name, button in self._buttons.items():
+                button.setIcon(self._icon(name))
+
+    def _icon(self, name: str) -> QIcon:
+        colour = self.palette().color(QPalette.ColorRole.ButtonText)
+        return tool_icon(name, colour, ratio=max(self.devicePixelRatioF(), 1.0))

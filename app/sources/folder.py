@@ -1,0 +1,128 @@
+"""A folder of pictures as a source: replays what was captured."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+from app.sources.source import Frame, Rgb, Setting, SourceLost
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.session import SUFFIXES, read_picture
+from gelpolight_core.translation import tr
+
+# Decoding takes longer than a frame at 30 Hz; what fits in here is decoded once.
+_KEPT_BYTES = 256 * 2**20
+
+
+class FolderSource:
+    """PNG and TIFF pictures of a folder, in the order of their names.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they are.
+    loop : bool, optional
+        Whether to begin again after the last one; otherwise the source is lost then.
+    rate_hz : float, optional
+        Pictures per second.
+    """
+
+    kind = "folder"
+
+    def __init__(self, folder: Path, *, loop: bool = True, rate_hz: float = 10.0) -> None:
+        self.folder = Path(folder)
+        self.name = self.folder.name
+        self.size = (0, 0)
+        self._loop, self._rate_hz = loop, rate_hz
+        self._files: tuple[Path, ...] = ()
+        self._kept: dict[int, Rgb] = {}
+        self._closed = threading.Event()
+        self._number, self._due_s = 0, math.nan
+
+    def open(self) -> None:
+        """List the pictures and read the first one, whose size all must have."""
+        if self._files:
+            return
+        self._closed.clear()
+        self._number, self._due_s = 0, math.nan
+        found = self.folder.glob("[!.]*") if self.folder.is_dir() else ()
+        files = tuple(sorted(path for path in found if path.suffix.lower() in SUFFIXES))
+        if not files:
+            raise InputError(
+                tr("there are no PNG or TIFF pictures"),
+                where=str(self.folder),
+                advice=tr("Choose a folder that holds pictures"),
+            )
+        self.size = read_picture(files[0]).size
+        self._files = files
+
+    def frame(self, timeout_s: float) -> Frame | None:
+        """Wait for the next picture; None if its time has not come."""
+        if not self._files:
+            raise SourceLost(
+                tr("it is closed"), where=str(self.folder), advice=tr("Open the folder again")
+            )
+        now = time.monotonic()
+        due_s = now if math.isnan(self._due_s) else self._due_s
+        if due_s > now and self._closed.wait(min(due_s - now, timeout_s)):
+            return None
+        if due_s > now + timeout_s:
+            return None
+        if self._number >= len(self._files) and not self._loop:
+            raise SourceLost(
+                tr("the last picture was shown"),
+                where=str(self.folder),
+                advice=tr("Open the folder again to begin anew"),
+            )
+        rgb = self._picture(self._number % len(self._files))
+        # A folder waits for its reader: nothing is ever lost.
+        now = time.monotonic()
+        self._due_s = max(due_s + 1.0 / self._rate_hz, now)
+        self._number += 1
+        return Frame(rgb, self._number - 1, now)
+
+    def settings(self) -> tuple[Setting, ...]:
+        """Return the one setting, the rate."""
+        return (Setting("rate_hz", tr("Frame rate"), "Hz", 0.5, 60.0, 0.5, self._rate_hz),)
+
+    def set(self, key: str, value: float) -> float:
+        """Change the rate."""
+        (rate,) = self.settings()
+        if key != rate.key:
+            raise InputError(
+                tr("it has no setting {key}").format(key=key),
+                where=self.name,
+                advice=tr("Use {key}").format(key=rate.key),
+            )
+        self._rate_hz = rate.nearest(value)
+        return self._rate_hz
+
+    def close(self) -> None:
+        """Forget the pictures."""
+        self._closed.set()
+        self._files = ()
+        self._kept.clear()
+
+    def _picture(self, index: int) -> Rgb:
+        if index in self._kept:
+            return self._kept[index]
+        picture = read_picture(self._files[index])
+        if picture.size != self.size:
+            raise InputError(
+                tr("the picture is {a} pixels and the first one of the folder {b}").format(
+                    a="x".join(map(str, picture.size)), b="x".join(map(str, self.size))
+                ),
+                where=str(self._files[index]),
+                advice=tr("Keep pictures of one size in a folder"),
+            )
+        full = 2**picture.bit_depth - 1
+        kind = np.uint8 if picture.bit_depth == 8 else np.uint16
+        rgb: Rgb = np.rint(picture.rgb * np.float32(full)).astype(kind)
+        rgb.flags.writeable = False
+        if rgb.nbytes + sum(kept.nbytes for kept in self._kept.values()) <= _KEPT_BYTES:
+            self._kept[index] = rgb
+        return rgb

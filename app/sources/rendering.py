@@ -1,0 +1,285 @@
+"""The virtual sensor's pictures without noise, made in the background; the newest scene wins."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from dataclasses import dataclass, replace
+from functools import partial
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sources.bench import BOARDS, PRESSED, Bench, Scene
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.simulation.boards import BoardPose, board_on_top
+from gelpolight_core.simulation.compiled import Interrupt, never
+from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, Indenter, coin, nut
+from gelpolight_core.simulation.session import pressed_membrane
+from gelpolight_core.simulation.virtual_sensor import (
+    BareMembrane,
+    Checkerboard,
+    Mirror,
+    PressedMembrane,
+    State,
+    VirtualSensor,
+    Whiteboard,
+)
+
+_LOG = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+_PREVIEW_WIDTH_PX = 480
+_DARK = 1e-6  # far below one count of any camera
+_STOP_S = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rendering:
+    """A picture without noise.
+
+    Attributes
+    ----------
+    scene : Scene
+        What it shows.
+    signal : (rows, columns) or (rows, columns, 3)
+        Linear light at the nominal exposure, 1 is full scale; grey for boards.
+    exact : bool
+        False for the coarse picture that is shown while the exact one is being made.
+    """
+
+    scene: Scene
+    signal: Array
+    exact: bool
+
+
+class _Superseded(Exception):
+    """A newer scene is wanted, or none any more."""
+
+
+class Renderer:
+    """Renders the scenes that it is asked for in a thread of its own.
+
+    Parameters
+    ----------
+    bench : Bench
+        Its design and its checkerboard's poses.
+    """
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._changed = threading.Condition()
+        self._wanted: Scene | None = None
+        self._newest: Rendering | None = None
+        self._failure: Exception | None = None
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name="virtual sensor", daemon=True)
+        self._thread.start()
+
+    def request(self, scene: Scene) -> None:
+        """Ask for a scene in the place of all asked for before."""
+        with self._changed:
+            if scene != self._wanted:
+                self._wanted = scene
+                self._changed.notify_all()
+
+    def newest(self, timeout_s: float) -> Rendering | None:
+        """Return the newest picture, waiting for the first one; None if it is not there in time.
+
+        What went wrong in the thread is raised here.
+        """
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._newest is not None or self._failure is not None, timeout_s
+            )
+            if self._failure is not None:
+                raise self._failure
+            return self._newest
+
+    def close(self) -> None:
+        """Stop rendering; harmless when it is stopped."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._thread.join(_STOP_S)
+        if self._thread.is_alive():
+            _LOG.warning("The virtual sensor is still busy; it ends with the picture at hand")
+
+    def _run(self) -> None:
+        try:
+            makers = _Makers(self._bench)
+            done: Scene | None = None
+            while (scene := self._next(done)) is not None:
+                try:
+                    self._publish(makers.preview(scene, self._check_open))
+                    makers.get_ready(self._check_open)
+                    self._publish(makers.exact(scene, partial(self._check_newest, scene)))
+                except _Superseded:
+                    continue
+                done = scene
+        except Exception as error:  # raised again in the thread that waits for pictures
+            with self._changed:
+                self._failure = error
+                self._changed.notify_all()
+
+    def _next(self, done: Scene | None) -> Scene | None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._closing or self._wanted not in (None, done))
+            return None if self._closing else self._wanted
+
+    def _check_open(self) -> None:
+        if self._closing:
+            raise _Superseded
+
+    def _check_newest(self, scene: Scene) -> None:
+        with self._changed:
+            if self._closing or self._wanted != scene:
+                raise _Superseded
+
+    def _publish(self, rendering: Rendering | None) -> None:
+        if rendering is not None:
+            with self._changed:
+                self._newest = rendering
+                self._changed.notify_all()
+
+
+class _Makers:
+    """The virtual sensor in the picture's own size, and in a small one for previews."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        scale = _PREVIEW_WIDTH_PX / bench.design.camera.width_px
+        self._small_design = bench.design.scaled(scale) if scale < 1.0 else None
+        self._small: VirtualSensor | None = None
+        self._large: VirtualSensor | None = None
+        self._bare: Array | None = None
+        self._shape: tuple[Scene, State] | None = None
+
+    def get_ready(self, interrupt: Interrupt) -> None:
+        """Make the sensor of the picture's own size, once."""
+        if self._large is None:
+            design, seed = self._bench.design, self._bench.seed
+            self._large = VirtualSensor(design, seed, interrupt=interrupt)
+
+    def exact(self, scene: Scene, interrupt: Interrupt) -> Rendering:
+        """Return the exact picture."""
+        assert self._large is not None
+        interrupt()
+        state = state_of(self._bench, self._bench.design, scene, interrupt)
+        return Rendering(scene, _light(self._large, state, scene, interrupt), True)
+
+    def preview(self, scene: Scene, interrupt: Interrupt) -> Rendering | None:
+        """Return a coarse picture, soon; None where the exact one is as soon."""
+        if self._small_design is None:
+            return None
+        if self._small is None:
+            self._small = VirtualSensor(self._small_design, self._bench.seed, interrupt=interrupt)
+        state = self._coarse_state(self._small_design, scene, interrupt)
+        small = _light(self._small, state, scene, interrupt, samples=1)
+        return Rendering(scene, self._full_size(small, scene), False)
+
+    def _coarse_state(self, design: SensorDesign, scene: Scene, interrupt: Interrupt) -> State:
+        """Return the state for a preview: while an object is dragged its shape is solved once."""
+        if scene.item not in PRESSED:
+            return state_of(self._bench, design, scene, interrupt)
+        middle = replace(scene, x_mm=0.0, y_mm=0.0)
+        if self._shape is None or self._shape[0] != middle:
+            self._shape = middle, state_of(self._bench, design, middle, interrupt)
+        state = self._shape[1]
+        if not isinstance(state, PressedMembrane):
+            return state
+        old = state.surface
+        return PressedMembrane(
+            replace(old, x0_mm=old.x0_mm + scene.x_mm, y0_mm=old.y0_mm + scene.y_mm)
+        )
+
+    def _full_size(self, small: Array, scene: Scene) -> Array:
+        if scene.item in BOARDS or self._small is None or self._large is None:
+            return self._enlarged(small)
+        # What is pressed changes the bare membrane's picture by a smooth factor, beside which the
+        # membrane's own fine pattern stays sharp; so does its rim, where nothing is divided.
+        if self._bare is None:
+            self._bare = self._large.brightness(BareMembrane())
+        bare = self._small.brightness(BareMembrane())
+        outside = (bare.max(axis=2) < _DARK).astype(np.uint8)
+        inside = cv2.dilate(outside, np.ones((5, 5), np.uint8)) == 0
+        factor = np.ones_like(bare)
+        np.divide(small, np.maximum(bare, _DARK), out=factor, where=inside[..., None])
+        return self._bare * self._enlarged(factor)
+
+    def _enlarged(self, picture: Array) -> Array:
+        camera = self._bench.design.camera
+        return np.asarray(
+            cv2.resize(picture, (camera.width_px, camera.height_px), interpolation=cv2.INTER_LINEAR)
+        )
+
+
+def _light(
+    sensor: VirtualSensor, state: State, scene: Scene, interrupt: Interrupt, *, samples: int = 3
+) -> Array:
+    light = sensor.brightness(state, samples=samples, interrupt=interrupt)
+    return light[..., 0] if scene.item in BOARDS else light
+
+
+def state_of(
+    bench: Bench, design: SensorDesign, scene: Scene, interrupt: Interrupt = never
+) -> State:
+    """Return what the virtual sensor of a design is to show for a scene of the bench.
+
+    Parameters
+    ----------
+    bench : Bench
+        Its checkerboard's poses.
+    design : SensorDesign
+        The bench's own, or a scaled one.
+    scene : Scene
+        What lies there.
+    interrupt : callable, optional
+        Called now and then; what it raises stops the work.
+    """
+    if scene.item == "checkerboard":
+        return Checkerboard(_held(bench.poses[scene.pose], scene))
+    if scene.item == "board_on_top":
+        pose = board_on_top(
+            design.layers,
+            working_diameter_mm=design.membrane.working_diameter_mm,
+            yaw_deg=scene.yaw_deg,
+            shift_mm=(scene.x_mm, scene.y_mm),
+        )
+        return Checkerboard(pose)
+    if scene.item == "mirror":
+        return Mirror()
+    if scene.item == "whiteboard":
+        return Whiteboard()
+    if scene.item == "bare" or scene.depth_mm <= 0.0:
+        return BareMembrane()
+    return pressed_membrane(
+        design,
+        _indenter(scene),
+        x_mm=scene.x_mm,
+        y_mm=scene.y_mm,
+        yaw_deg=scene.yaw_deg,
+        interrupt=interrupt,
+    )
+
+
+def _held(pose: BoardPose, scene: Scene) -> BoardPose:
+    """Return a scripted pose moved in the camera frame and turned in the board's plane."""
+    yaw = math.radians(scene.yaw_deg)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    moved = pose.centre_mm + np.array([scene.x_mm, scene.y_mm, 0.0])
+    return replace(pose, axes=turn @ pose.axes, centre_mm=moved)
+
+
+def _indenter(scene: Scene) -> Indenter:
+    if scene.item == "ball":
+        return Ball(0.5 * scene.size_mm, scene.depth_mm)
+    if scene.item == "cylinder":
+        return Cylinder(scene.size_mm, scene.depth_mm)
+    if scene.item == "cuboid":
+        return Cuboid(scene.size_mm, scene.depth_mm)
+    return (coin if scene.item == "coin" else nut)(scene.size_mm, scene.depth_mm)

@@ -1,0 +1,248 @@
+"""The capture thread: takes every frame of a source and hands it on."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+
+from app.sources.mailbox import Mailbox
+from app.sources.source import Frame, Source, SourceLost
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+_LOG = logging.getLogger(__name__)
+
+STOP_S = 1.0
+"""How long a thread is waited for before it is left behind."""
+
+_POLL_S = 0.1
+_RATE_WINDOW_S = 2.0
+
+Tap = Callable[[Frame], object]
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFigures:
+    """How a stream fares.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Frames received per second, over the last two seconds.
+    made : int
+        Frames that the source made since it was opened.
+    dropped : int
+        Those among them that never arrived.
+    unseen : int
+        Those that arrived and were replaced in `Stream.newest` before anybody took them.
+    lost : str or None
+        Why there are no more frames, as a sentence; None while all is well.
+    """
+
+    rate_hz: float = 0.0
+    made: int = 0
+    dropped: int = 0
+    unseen: int = 0
+    lost: str | None = None
+
+
+@dataclass(slots=True)
+class _Capture:
+    count: int
+    since_s: float
+    future: Future[list[Frame]]
+    frames: list[Frame] = field(default_factory=list)
+
+
+class Stream:
+    """Frames of a source, taken by a thread of its own, which also opens and closes the source.
+
+    Parameters
+    ----------
+    source : Source
+        Need not be open. It belongs to the stream from now on.
+    silence_s : float, optional
+        A source that has delivered and then is silent for so long counts as lost.
+
+    Attributes
+    ----------
+    source : Source
+        Where the frames come from; its settings may be used by any thread.
+    newest : Mailbox of Frame
+        The newest frame, for one reader; further readers add the `put` of their own mailbox as a
+        tap.
+    """
+
+    def __init__(self, source: Source, *, silence_s: float = 5.0) -> None:
+        self.source = source
+        self.newest: Mailbox[Frame] = Mailbox()
+        self._silence_s = silence_s
+        self._lock = threading.Lock()
+        self._taps: list[Tap] = []
+        self._captures: list[_Capture] = []
+        self._thread: threading.Thread | None = None
+        self._end = threading.Event()
+        self._begin_anew()
+
+    def start(self) -> None:
+        """Begin to capture; returns at once. What goes wrong is said by :meth:`figures`."""
+        if self._thread is not None and self._thread.is_alive():
+            raise RuntimeError("the stream runs already")
+        self._end = threading.Event()
+        self._begin_anew()
+        self._thread = threading.Thread(
+            target=self._run, args=(self._end,), name=f"capture {self.source.name}", daemon=True
+        )
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End capturing and close the source; harmless when it is stopped."""
+        self._end.set()
+        if self._thread is not None:
+            _join(self._thread)
+            self._thread = None
+
+    def reopen(self) -> None:
+        """Try a lost source again."""
+        self.stop()
+        self.start()
+
+    def add_tap(self, tap: Tap) -> None:
+        """Have every frame handed to `tap`, in the capture thread; it must return quickly."""
+        with self._lock:
+            self._taps.append(tap)
+
+    def remove_tap(self, tap: Tap) -> None:
+        """Hand no more frames to `tap`; harmless when it is not there."""
+        with self._lock:
+            self._taps = [other for other in self._taps if other != tap]
+
+    def capture(self, count: int) -> Future[list[Frame]]:
+        """Collect the next `count` settled frames that are made after this call.
+
+        Returns
+        -------
+        Future of list of Frame
+            May be cancelled; fails with SourceLost if the stream ends before it is complete.
+        """
+        if count < 1:
+            raise ValueError(f"cannot capture {count} frames")
+        wanted = _Capture(count, time.monotonic(), Future())
+        with self._lock:
+            if self._thread is not None and self._lost is None and not self._end.is_set():
+                self._captures.append(wanted)
+                return wanted.future
+            reason = self._lost
+        wanted.future.set_exception(reason or self._stopped())
+        return wanted.future
+
+    def figures(self) -> StreamFigures:
+        """Return how the stream fares."""
+        now = time.monotonic()
+        with self._lock:
+            times = [t for t in self._times if now - t < _RATE_WINDOW_S]
+            rate = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
+            lost = None if self._lost is None else str(self._lost)
+            made = self._last_number + 1
+            return StreamFigures(rate, made, made - self._received, self._unseen, lost)
+
+    def _begin_anew(self) -> None:
+        with self._lock:
+            self._times: deque[float] = deque(maxlen=1000)
+            self._last_number = -1
+            self._received = 0
+            self._unseen = 0
+            self._lost: InputError | None = None
+
+    def _run(self, end: threading.Event) -> None:
+        reason: InputError = self._stopped()
+        try:
+            self.source.open()
+            self._deliver(end)
+        except InputError as error:
+            reason = error
+            with self._lock:
+                self._lost = error
+        except Exception as error:
+            _LOG.exception("The source %s failed", self.source.name)
+            reason = SourceLost(
+                tr("a fault of this program stopped the pictures ({kind}); the log has it").format(
+                    kind=type(error).__name__
+                ),
+                where=self.source.name,
+                advice=tr("Open the source again"),
+            )
+            with self._lock:
+                self._lost = reason
+        finally:
+            self.source.close()
+            self._fail_captures(end, reason)
+
+    def _deliver(self, end: threading.Event) -> None:
+        heard_s: float | None = None
+        while not end.is_set():
+            frame = self.source.frame(_POLL_S)
+            now = time.monotonic()
+            if frame is not None:
+                heard_s = now
+                self._hand_on(frame)
+            elif heard_s is not None and now - heard_s > self._silence_s:
+                raise SourceLost(
+                    tr("no picture has come for {s:.0f} seconds").format(s=self._silence_s),
+                    where=self.source.name,
+                    advice=tr("Check the camera and its cable, then open it again"),
+                )
+
+    def _hand_on(self, frame: Frame) -> None:
+        unseen = self.newest.put(frame)
+        with self._lock:
+            self._times.append(time.monotonic())
+            self._last_number = max(self._last_number, frame.number)
+            self._received += 1
+            self._unseen += unseen
+            taps, captures = tuple(self._taps), tuple(self._captures)
+        for tap in taps:
+            try:
+                tap(frame)
+            except Exception:
+                # What somebody does with frames must not stop them for everybody else.
+                _LOG.exception("A reader of %s failed and gets no more frames", self.source.name)
+                self.remove_tap(tap)
+        for capture in captures:
+            self._collect(capture, frame)
+
+    def _collect(self, capture: _Capture, frame: Frame) -> None:
+        if frame.settled and frame.time_s > capture.since_s:
+            capture.frames.append(frame)
+        if len(capture.frames) == capture.count or capture.future.cancelled():
+            with self._lock:
+                self._captures.remove(capture)
+            if capture.future.set_running_or_notify_cancel():
+                capture.future.set_result(capture.frames)
+
+    def _fail_captures(self, end: threading.Event, reason: InputError) -> None:
+        with self._lock:
+            end.set()
+            captures, self._captures = self._captures, []
+        for capture in captures:
+            if capture.future.set_running_or_notify_cancel():
+                capture.future.set_exception(reason)
+
+    def _stopped(self) -> SourceLost:
+        return SourceLost(
+            tr("the pictures were stopped"),
+            where=self.source.name,
+            advice=tr("Start them and capture again"),
+        )
+
+
+def _join(thread: threading.Thread) -> None:
+    thread.join(STOP_S)
+    if thread.is_alive():
+        # It is a daemon, so that a hanging driver cannot keep the program from ending.
+        _LOG.warning("The thread %s did not stop within %s s", thread.name, STOP_S)

@@ -1,0 +1,192 @@
+"""The virtual sensor as a live source: what lies on the bench, as its camera would deliver it."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sources.bench import (
+    BOARDS,
+    CONDITION_RANGES,
+    NOMINAL_EXPOSURE_MS,
+    Bench,
+    Conditions,
+)
+from app.sources.noise import NoiseLevel, noisy, rgb_of
+from app.sources.rendering import Renderer, Rendering
+from app.sources.source import Frame, Rgb, Setting, SourceLost
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+ROOM_LIGHT = (0.066, 0.060, 0.050)
+"""What a lit room adds to the three channels at the nominal exposure, 1 is full scale."""
+TOO_BRIGHT = 3.0
+
+_SETTINGS: dict[str, tuple[Callable[[], str], str, float]] = {
+    "exposure_ms": (lambda: tr("Exposure"), "ms", 0.1),
+    "gain_db": (lambda: tr("Gain"), "dB", 0.1),
+    "rate_hz": (lambda: tr("Frame rate"), "Hz", 1.0),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Developed:
+    """A rendering as exposed: how to make a frame of it."""
+
+    rendering: Rendering
+    conditions: Conditions
+    make: Callable[[int], Rgb]
+
+
+class VirtualSource:
+    """Frames of what lies on a bench, at the rate of a camera.
+
+    While a new scene is being rendered the pictures go on, with ``settled`` False.
+
+    Parameters
+    ----------
+    bench : Bench
+        May be changed at any time, by any thread.
+    """
+
+    kind = "virtual"
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        camera = bench.design.camera
+        self.name = tr("Virtual sensor {serial}").format(serial=bench.design.serial)
+        self.size = camera.width_px, camera.height_px
+        self._renderer: Renderer | None = None
+        self._developed: _Developed | None = None
+        self._closed = threading.Event()
+        self._next_number, self._due_s = 0, math.nan
+
+    def open(self) -> None:
+        """Begin to render; the first frame comes when the first picture is there."""
+        self._refuse_if_stopped(self.bench.conditions)
+        if self._renderer is None:
+            self._closed.clear()
+            self._renderer = Renderer(self.bench)
+            self._next_number, self._due_s = 0, math.nan
+
+    def frame(self, timeout_s: float) -> Frame | None:
+        """Wait for the camera's next frame; None if there is none in time."""
+        limit_s = time.monotonic() + timeout_s
+        renderer = self._renderer
+        if renderer is None:
+            raise SourceLost(
+                tr("it is closed"), where=self.name, advice=tr("Open the virtual sensor again")
+            )
+        renderer.request(self.bench.seen)
+        rendering = renderer.newest(timeout_s)
+        if rendering is None or not self._wait_until_due(limit_s):
+            return None
+        conditions, wanted = self.bench.conditions, self.bench.seen
+        self._refuse_if_stopped(conditions)
+        rendering = renderer.newest(0.0) or rendering
+        number = self._advance(_period_s(conditions))
+        developed = self._develop(rendering, conditions)
+        now = time.monotonic()
+        settled = rendering.exact and rendering.scene == wanted
+        return Frame(developed.make(number), number, now, settled)
+
+    def settings(self) -> tuple[Setting, ...]:
+        """Return exposure, gain and frame rate."""
+        conditions = self.bench.conditions
+        return tuple(
+            Setting(key, label(), unit, *CONDITION_RANGES[key], step, getattr(conditions, key))
+            for key, (label, unit, step) in _SETTINGS.items()
+        )
+
+    def set(self, key: str, value: float) -> float:
+        """Change a setting of the bench; return what was really set."""
+        for setting in self.settings():
+            if setting.key == key:
+                return float(getattr(self.bench.adjust(**{key: setting.nearest(value)}), key))
+        raise InputError(
+            tr("it has no setting {key}").format(key=key),
+            where=self.name,
+            advice=tr("Use one of {keys}").format(keys=", ".join(_SETTINGS)),
+        )
+
+    def close(self) -> None:
+        """Stop rendering."""
+        self._closed.set()
+        if self._renderer is not None:
+            self._renderer.close()
+        self._renderer, self._developed = None, None
+
+    def _refuse_if_stopped(self, conditions: Conditions) -> None:
+        if "camera_stops" in conditions.faults:
+            raise SourceLost(
+                tr("the camera has stopped"),
+                where=self.name,
+                advice=tr("Check its cable, then open it again"),
+            )
+
+    def _wait_until_due(self, limit_s: float) -> bool:
+        now = time.monotonic()
+        if math.isnan(self._due_s):
+            self._due_s = now
+        wait_s = min(self._due_s, limit_s) - now
+        if wait_s > 0.0:
+            self._closed.wait(wait_s)
+        return self._due_s <= limit_s and not self._closed.is_set()
+
+    def _advance(self, period_s: float) -> int:
+        """Return the number of the frame that is due; those nobody came for in time are lost."""
+        missed = max(0, math.floor((time.monotonic() - self._due_s) / period_s))
+        number = self._next_number + missed
+        self._next_number = number + 1
+        self._due_s += (missed + 1) * period_s
+        return number
+
+    def _develop(self, rendering: Rendering, conditions: Conditions) -> _Developed:
+        old = self._developed
+        if old and old.rendering is rendering and old.conditions == conditions:
+            return old
+        self._developed = _Developed(
+            rendering, conditions, self._maker(_exposed(rendering, conditions), conditions)
+        )
+        return self._developed
+
+    def _maker(self, signal: NDArray[np.float64], conditions: Conditions) -> Callable[[int], Rgb]:
+        camera, seed = self.bench.design.camera, self.bench.seed
+        depth = camera.bit_depth
+        full = 2.0**depth - 1.0
+        if conditions.noise == 0.0:
+            whole = np.rint(full * np.clip(signal, 0.0, 1.0))
+            quiet = rgb_of(whole.astype(np.uint8 if depth == 8 else np.uint16))
+            # Every frame has memory of its own, as a camera's has.
+            return lambda number: quiet.copy()
+        noise = NoiseLevel.of_camera(
+            camera, gain=_amplification(conditions), scale=conditions.noise
+        )
+        level = np.maximum(full * signal, 0.0).astype(np.float32)
+        return lambda number: noisy(level, noise, seed=(seed << 40) + number, bit_depth=depth)
+
+
+def _amplification(conditions: Conditions) -> float:
+    return float(10.0 ** (conditions.gain_db / 20.0))
+
+
+def _period_s(conditions: Conditions) -> float:
+    """Return the time between frames: no shorter than the exposure."""
+    return max(1.0 / conditions.rate_hz, 1e-3 * conditions.exposure_ms)
+
+
+def _exposed(rendering: Rendering, conditions: Conditions) -> NDArray[np.float64]:
+    """Return the signal at the camera's exposure and gain, 1 is full scale."""
+    factor = conditions.exposure_ms / NOMINAL_EXPOSURE_MS * _amplification(conditions)
+    if "too_bright" in conditions.faults:
+        factor *= TOO_BRIGHT
+    signal = rendering.signal
+    if "room_light" in conditions.faults and rendering.scene.item not in BOARDS:
+        signal = signal + np.array(ROOM_LIGHT)
+    return np.asarray(signal * factor)

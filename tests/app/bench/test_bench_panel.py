@@ -1,0 +1,163 @@
+"""The bench panel lets a technician lay things on the virtual sensor."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QPushButton,
+    QSlider,
+    QSpinBox,
+    QWidget,
+)
+from shiboken6 import isValid
+
+from app.bench.bench_panel import BenchPanel, item_names
+from app.sources.bench import FAULTS, ITEMS, Bench
+from gelpolight_core.design.sensor_design import SensorDesign
+
+W = TypeVar("W", bound=QWidget)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench(SensorDesign().scaled(0.25))
+
+
+@pytest.fixture
+def panel(qtbot: Any, bench: Bench) -> Iterator[BenchPanel]:
+    panel = BenchPanel(bench=bench)
+    qtbot.addWidget(panel)
+    panel.show()
+    yield panel
+    panel.close()
+
+
+def find(panel: BenchPanel, kind: type[W], name: str) -> W:
+    """Return a control by its name, as a script would."""
+    widget = panel.findChild(kind, f"bench.{name}")
+    assert widget is not None, name
+    return widget
+
+
+def choose(panel: BenchPanel, item: str) -> None:
+    box = find(panel, QComboBox, "item")
+    box.setCurrentIndex(box.findData(item))
+
+
+@pytest.mark.parametrize("item", ITEMS)
+def test_choosing_a_thing_lays_it_on_the_sensor(panel: BenchPanel, bench: Bench, item: str) -> None:
+    choose(panel, item)
+    assert bench.scene.item == item
+    assert find(panel, QComboBox, "item").currentText() == item_names()[item]
+
+
+def test_only_what_applies_is_shown(panel: BenchPanel) -> None:
+    fields = {
+        name: panel.findChild(QWidget, f"bench.{name}")
+        for name in ("pose", "size_mm", "depth_mm", "x_mm", "yaw_deg")
+    }
+    expected = {
+        "mirror": set(),
+        "checkerboard": {"pose", "x_mm", "yaw_deg"},
+        "ball": {"size_mm", "depth_mm", "x_mm"},
+        "cuboid": {"size_mm", "depth_mm", "x_mm", "yaw_deg"},
+    }
+    for item, names in expected.items():
+        choose(panel, item)
+        assert {name for name, field in fields.items() if field.isVisible()} == names
+
+
+def test_numbers_and_the_depth_slider_move_the_object(panel: BenchPanel, bench: Bench) -> None:
+    choose(panel, "cuboid")
+    for name, value in {"x_mm": 1.5, "y_mm": -2.0, "yaw_deg": 30.0, "size_mm": 4.0}.items():
+        find(panel, QDoubleSpinBox, name).setValue(value)
+        assert getattr(bench.scene, name) == value
+    find(panel, QSlider, "depth_slider").setValue(150)
+    assert bench.scene.depth_mm == 1.5
+    assert find(panel, QDoubleSpinBox, "depth_mm").value() == 1.5
+
+
+def test_a_ball_cannot_be_pressed_deeper_than_its_middle(panel: BenchPanel, bench: Bench) -> None:
+    choose(panel, "ball")
+    find(panel, QDoubleSpinBox, "size_mm").setValue(1.0)
+    depth = find(panel, QDoubleSpinBox, "depth_mm")
+    assert (depth.maximum(), depth.value()) == (0.5, 0.5)
+    assert find(panel, QSlider, "depth_slider").maximum() == 50
+
+
+def test_poses_are_stepped_through_and_come_round(
+    qtbot: Any, panel: BenchPanel, bench: Bench
+) -> None:
+    choose(panel, "checkerboard")
+    pose = find(panel, QSpinBox, "pose")
+    assert (pose.value(), pose.text()) == (1, "1 of 16")
+    qtbot.mouseClick(find(panel, QPushButton, "next_pose"), Qt.MouseButton.LeftButton)
+    assert (bench.scene.pose, pose.value()) == (1, 2)
+    for _ in range(2):
+        qtbot.mouseClick(find(panel, QPushButton, "previous_pose"), Qt.MouseButton.LeftButton)
+    assert (bench.scene.pose, pose.value()) == (15, 16)
+
+
+def test_dragging_on_the_picture_moves_the_object_and_its_numbers(
+    panel: BenchPanel, bench: Bench
+) -> None:
+    choose(panel, "ball")
+    panel.drag_to(200.0, 100.0)
+    scene = bench.scene
+    assert scene.x_mm > 0.0 > scene.y_mm
+    assert find(panel, QDoubleSpinBox, "x_mm").value() == pytest.approx(scene.x_mm, abs=0.005)
+    # What is shown is rounded; where the object lies is not.
+    assert scene.x_mm != round(scene.x_mm, 2)
+
+
+def test_exposure_noise_and_faults_reach_the_bench(panel: BenchPanel, bench: Bench) -> None:
+    find(panel, QDoubleSpinBox, "exposure_ms").setValue(4.0)
+    find(panel, QDoubleSpinBox, "gain_db").setValue(6.0)
+    find(panel, QDoubleSpinBox, "noise").setValue(0.0)
+    conditions = bench.conditions
+    assert (conditions.exposure_ms, conditions.gain_db, conditions.noise) == (4.0, 6.0, 0.0)
+    for fault in FAULTS:
+        find(panel, QCheckBox, f"fault.{fault}").click()
+    assert bench.conditions.faults == set(FAULTS)
+    find(panel, QCheckBox, "fault.room_light").click()
+    assert "room_light" not in bench.conditions.faults
+
+
+def test_it_follows_what_others_change_from_another_thread(
+    qtbot: Any, panel: BenchPanel, bench: Bench
+) -> None:
+    other = threading.Thread(target=lambda: bench.adjust(exposure_ms=3.0))
+    other.start()
+    other.join()
+    box = find(panel, QDoubleSpinBox, "exposure_ms")
+    qtbot.waitUntil(lambda: box.value() == 3.0)
+
+
+def test_every_control_has_a_name_and_says_what_it_is(panel: BenchPanel) -> None:
+    for kind in (QComboBox, QAbstractSpinBox, QSlider, QAbstractButton):
+        for widget in panel.findChildren(kind):
+            assert widget.objectName().startswith("bench."), widget
+            assert widget.accessibleName(), widget.objectName()
+
+
+def test_it_fits_a_narrow_dock(panel: BenchPanel) -> None:
+    for item in ITEMS:
+        choose(panel, item)
+        assert panel.minimumSizeHint().width() <= 300
+
+
+def test_a_panel_that_is_gone_hears_no_more(qtbot: Any, bench: Bench) -> None:
+    panel = BenchPanel(bench=bench)
+    panel.deleteLater()
+    qtbot.waitUntil(lambda: not isValid(panel))
+    bench.lay("ball")  # would raise, were the deleted panel told

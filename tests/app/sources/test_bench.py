@@ -1,0 +1,132 @@
+"""The bench holds what a technician lays on the sensor, within what can be laid there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.sources.bench import FAULTS, ITEMS, PRESSED, STAGES, Bench, Scene
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.simulation.rays import project_through_layers, project_to_pixels
+
+BENCH = Bench(SensorDesign().scaled(0.25))
+POSES = BENCH.poses  # once, before an example is timed
+NUMBERS = st.floats(-1e6, 1e6)
+
+
+@given(st.sampled_from(ITEMS), NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, st.integers(-50, 50))
+def test_everything_stays_within_its_range(
+    item: str, x: float, y: float, yaw: float, size: float, depth: float, pose: int
+) -> None:
+    BENCH.lay(item)
+    scene = BENCH.arrange(x_mm=x, y_mm=y, yaw_deg=yaw, size_mm=size, depth_mm=depth, pose=pose)
+    assert math.hypot(scene.x_mm, scene.y_mm) <= BENCH.reach_mm(scene) * (1 + 1e-12)
+    low, high = BENCH.depth_range_mm(scene)
+    assert low <= scene.depth_mm <= high
+    assert abs(scene.yaw_deg) <= 180.0
+    if item in PRESSED:
+        low, high = BENCH.size_range_mm()
+        assert low <= scene.size_mm <= high
+    if item == "ball":
+        assert scene.depth_mm <= 0.5 * scene.size_mm
+    if item == "checkerboard":
+        assert 0 <= scene.pose < BENCH.steps("checkerboard")
+
+
+@given(st.floats(40.0, 280.0), st.floats(40.0, 200.0))
+def test_an_object_is_dragged_to_where_the_camera_sees_the_pointer(u: float, v: float) -> None:
+    BENCH.lay("ball")
+    scene = BENCH.drag_to(u, v)
+    place = np.array([scene.x_mm, scene.y_mm, 0.0])
+    design = BENCH.design
+    back = project_through_layers(design.camera, design.layers, place)
+    inside = math.hypot(*place) < BENCH.reach_mm(scene) * (1 - 1e-9)
+    if inside:
+        # A thousandth of a pixel: the two ways through the layers share no code.
+        assert back == pytest.approx([u, v], abs=1e-3)
+    else:
+        assert math.hypot(*place) == pytest.approx(BENCH.reach_mm(scene))
+
+
+@given(st.floats(20.0, 300.0), st.floats(20.0, 220.0), st.integers(0, 15))
+def test_a_checkerboard_is_dragged_by_its_middle(u: float, v: float, pose: int) -> None:
+    BENCH.show("checkerboard", pose)
+    scene = BENCH.drag_to(u, v)
+    held = POSES[pose].centre_mm + np.array([scene.x_mm, scene.y_mm, 0.0])
+    assert project_to_pixels(BENCH.design.camera, held) == pytest.approx([u, v], abs=1e-3)
+
+
+def test_the_mirror_the_whiteboard_and_the_bare_membrane_lie_where_they_lie() -> None:
+    for item in ("mirror", "whiteboard", "bare"):
+        before = BENCH.lay(item)
+        assert BENCH.drag_to(100.0, 100.0) == before
+
+
+def test_dragging_beyond_what_the_lens_sees_of_the_layers_changes_nothing() -> None:
+    before = BENCH.lay("ball")
+    assert BENCH.drag_to(math.nan, 0.0) == before
+
+
+def test_every_picture_of_a_session_can_be_laid_in_turn() -> None:
+    counts = {stage: BENCH.steps(stage) for stage in STAGES}
+    assert counts == {
+        "checkerboard": 16,
+        "top_pose": 1,
+        "mirror": 1,
+        "whiteboard": 1,
+        "background": 1,
+        "balls": 10,
+        "presses": 8,
+    }
+    for stage, count in counts.items():
+        scenes = {BENCH.show(stage, number) for number in range(count)}
+        assert len(scenes) == count
+    with pytest.raises(ValueError, match="no 'balls' number 10"):
+        BENCH.show("balls", 10)
+
+
+def test_a_ball_of_the_session_is_laid_as_the_design_says() -> None:
+    ball = BENCH.design.balls[1]
+    assert BENCH.show("balls", 1) == Scene(
+        "ball", 0, ball.x_mm, ball.y_mm, 0.0, 2.0 * ball.radius_mm, ball.depth_mm
+    )
+
+
+def test_a_membrane_that_was_left_on_hides_the_mirror_alone() -> None:
+    bench = Bench(BENCH.design)
+    bench.switch("membrane_on", True)
+    bench.lay("mirror")
+    assert bench.seen.item == "bare"
+    bench.lay("whiteboard")
+    assert bench.seen.item == "whiteboard"
+    bench.lay("mirror")
+    bench.switch("membrane_on", False)
+    assert bench.seen.item == "mirror"
+
+
+def test_watchers_hear_of_every_change_until_they_leave() -> None:
+    bench = Bench(BENCH.design)
+    heard: list[Scene] = []
+    leave = bench.watch(lambda: heard.append(bench.scene))
+    bench.lay("ball")
+    bench.arrange(x_mm=1.0)
+    bench.adjust(noise=0.0)
+    bench.switch(FAULTS[0], True)
+    assert [scene.x_mm for scene in heard] == [0.0, 1.0, 1.0, 1.0]
+    leave()
+    bench.lay("mirror")
+    assert len(heard) == 4
+
+
+def test_nonsense_is_refused() -> None:
+    bench = Bench(BENCH.design)
+    with pytest.raises(ValueError, match="'spoon'"):
+        bench.lay("spoon")
+    with pytest.raises(ValueError, match="'rain'"):
+        bench.switch("rain", True)
+    with pytest.raises(ValueError, match="depth_mm is nan"):
+        bench.arrange(depth_mm=math.nan)

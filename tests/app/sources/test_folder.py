@@ -1,0 +1,130 @@
+"""A folder of pictures is replayed in the order of its names."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.sources.bench import Bench
+from app.sources.folder import FolderSource
+from app.sources.listing import list_sources, picture_folders, virtual_sensor
+from app.sources.source import Frame, SourceLost
+from app.sources.stream import Stream
+from gelpolight_core.errors import InputError
+
+WAIT_S = 10.0
+
+
+def picture(
+    number: int, *, kind: type = np.uint8, size: tuple[int, int] = (320, 240)
+) -> np.ndarray:
+    """Return a picture that tells its number."""
+    rng = np.random.default_rng(number)
+    return rng.integers(0, np.iinfo(kind).max, (size[1], size[0], 3), kind, endpoint=True)
+
+
+def write(path: Path, rgb: np.ndarray) -> None:
+    assert cv2.imwrite(str(path), rgb[..., ::-1])
+
+
+def following(source: FolderSource) -> Frame:
+    frame = source.frame(1.0)
+    assert frame is not None
+    return frame
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder with three pictures and a file that is none."""
+    for number, name in enumerate(["a.png", "b.TIFF", "c.png"]):
+        write(tmp_path / name, picture(number))
+    (tmp_path / "notes.txt").write_text("not a picture")
+    return tmp_path
+
+
+def test_pictures_come_in_the_order_of_their_names_again_and_again(folder: Path) -> None:
+    source = FolderSource(folder, rate_hz=60.0)
+    source.open()
+    assert source.size == (320, 240)
+    for number in range(5):
+        frame = following(source)
+        assert frame.number == number
+        assert np.array_equal(frame.rgb, picture(number % 3))
+    source.close()
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif"])
+def test_sixteen_bit_pictures_keep_every_value(tmp_path: Path, suffix: str) -> None:
+    rgb = picture(0, kind=np.uint16)
+    write(tmp_path / f"deep{suffix}", rgb)
+    source = FolderSource(tmp_path)
+    source.open()
+    frame = following(source)
+    assert frame.rgb.dtype == np.uint16
+    assert np.array_equal(frame.rgb, rgb)
+
+
+def test_without_looping_the_last_picture_is_the_end(folder: Path) -> None:
+    stream = Stream(FolderSource(folder, loop=False, rate_hz=60.0))
+    stream.start()
+    with pytest.raises(SourceLost, match="last picture"):
+        stream.capture(4).result(WAIT_S)
+    assert stream.figures().made == 3
+    stream.reopen()
+    assert len(stream.capture(1).result(WAIT_S)) == 1
+    stream.stop()
+
+
+def test_a_picture_of_another_size_is_refused_by_its_name(folder: Path) -> None:
+    write(folder / "d.png", picture(3, size=(160, 120)))
+    source = FolderSource(folder, rate_hz=60.0)
+    source.open()
+    for _ in range(3):
+        following(source)
+    with pytest.raises(InputError, match=r"d\.png: the picture is 160x120 pixels"):
+        source.frame(1.0)
+
+
+def test_a_damaged_picture_is_refused_by_its_name(folder: Path) -> None:
+    (folder / "a.png").write_bytes((folder / "a.png").read_bytes()[:200])
+    with pytest.raises(InputError, match=r"a\.png"):
+        FolderSource(folder).open()
+
+
+@pytest.mark.parametrize("name", ["empty", "missing"])
+def test_a_folder_without_pictures_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="no PNG or TIFF"):
+        FolderSource(tmp_path / name).open()
+
+
+def test_the_rate_is_kept_and_read_back(folder: Path) -> None:
+    source = FolderSource(folder)
+    assert source.set("rate_hz", 20.2) == 20.0
+    source.open()
+    began = time.monotonic()
+    for _ in range(5):
+        following(source)
+    assert time.monotonic() - began >= 4 / 20.0 - 0.01
+    assert source.frame(0.0) is None
+    with pytest.raises(InputError, match="exposure_ms"):
+        source.set("exposure_ms", 1.0)
+    source.close()
+    with pytest.raises(SourceLost, match="closed"):
+        source.frame(0.0)
+
+
+def test_the_list_names_the_virtual_sensor_and_the_folders_that_are_there(folder: Path) -> None:
+    bench = Bench()
+    found = list_sources([virtual_sensor(bench), picture_folders([folder, folder / "gone"])])
+    assert [(info.kind, info.name) for info in found] == [
+        ("virtual", "Virtual sensor virtual-1"),
+        ("folder", folder.name),
+    ]
+    for info in found:
+        source = info.open()
+        assert (source.kind, source.name) == (info.kind, info.name)

@@ -1,0 +1,118 @@
+"""A processor works on the newest frame; failures are results like others."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from app.sources.mailbox import Mailbox
+from app.sources.processor import Failure, Outcome, Processor
+from app.sources.source import Frame
+from gelpolight_core.errors import InputError
+
+WAIT_S = 10.0
+
+
+def frame(number: int) -> Frame:
+    return Frame(np.zeros((2, 3, 3), np.uint8), number, 0.0)
+
+
+def number_of(item: Frame) -> int:
+    return item.number
+
+
+class Line:
+    """A processor between two mailboxes."""
+
+    def __init__(self) -> None:
+        self.inbox: Mailbox[Frame] = Mailbox()
+        self.outbox: Mailbox[Outcome[int] | Failure] = Mailbox()
+        self.processor = Processor(self.inbox, number_of, self.outbox)
+
+    def result(self, number: int) -> Outcome[int] | Failure:
+        """Have a frame processed."""
+        self.inbox.put(frame(number))
+        item = self.outbox.take(WAIT_S)
+        assert item is not None
+        return item
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    line = Line()
+    line.processor.start()
+    yield line
+    line.processor.stop()
+
+
+def test_a_result_names_its_frame_and_its_function(line: Line) -> None:
+    first = line.result(5)
+    assert isinstance(first, Outcome)
+    assert (first.value, first.frame.number, first.generation) == (5, 5, 0)
+    assert line.processor.replace(lambda item: -item.number) == 1
+    second = line.result(6)
+    assert isinstance(second, Outcome)
+    assert (second.value, second.generation) == (-6, 1)
+
+
+def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line: Line) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+
+    def slow(item: Frame) -> int:
+        begun.set()
+        assert go_on.wait(WAIT_S)
+        return -1
+
+    line.processor.replace(slow)
+    line.inbox.put(frame(0))
+    assert begun.wait(WAIT_S)
+    newest = line.processor.replace(number_of)
+    line.inbox.put(frame(1))
+    go_on.set()
+    item = line.outbox.take(WAIT_S)
+    assert isinstance(item, Outcome)
+    assert (item.value, item.generation) == (1, newest)
+    assert line.outbox.take() is None
+
+
+def test_what_a_person_can_mend_is_told_and_the_thread_goes_on(line: Line) -> None:
+    def refuse(item: Frame) -> int:
+        raise InputError("it is dark", where="picture", advice="Switch the LEDs on")
+
+    line.processor.replace(refuse)
+    item = line.result(0)
+    assert isinstance(item, Failure)
+    assert item.sentence == "picture: it is dark. Switch the LEDs on."
+    line.processor.replace(number_of)
+    assert isinstance(line.result(1), Outcome)
+
+
+def test_a_fault_is_logged_once_and_told_each_time(
+    line: Line, caplog: pytest.LogCaptureFixture
+) -> None:
+    line.processor.replace(lambda item: item.number // 0)
+    for number in range(3):
+        item = line.result(number)
+        assert isinstance(item, Failure)
+        assert "ZeroDivisionError" in item.sentence
+    assert caplog.text.count("Traceback") == 1
+
+
+def test_times_are_kept(line: Line) -> None:
+    for number in range(4):
+        line.result(number)
+    figures = line.processor.figures()
+    assert figures.rate_hz > 0.0
+    assert figures.last_ms >= 0.0 and figures.median_ms >= 0.0
+
+
+def test_it_can_be_stopped_and_started_again(line: Line) -> None:
+    with pytest.raises(RuntimeError):
+        line.processor.start()
+    line.processor.stop()
+    line.processor.stop()
+    line.processor.start()
+    assert isinstance(line.result(0), Outcome)

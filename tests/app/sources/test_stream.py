@@ -1,0 +1,257 @@
+"""Frames reach their readers, losses are counted, and threads end when they are told to."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
+
+import numpy as np
+import pytest
+
+from app.sources.mailbox import Mailbox
+from app.sources.source import Frame, Setting, SourceLost
+from app.sources.stream import Stream
+from gelpolight_core.errors import InputError
+
+WAIT_S = 10.0  # far more than a loaded machine takes; only a failing test waits so long
+
+
+def frame(number: int, *, settled: bool = True, time_s: float | None = None) -> Frame:
+    """Return a tiny frame that was made just now."""
+    return Frame(
+        np.zeros((2, 3, 3), np.uint8),
+        number,
+        time.monotonic() if time_s is None else time_s,
+        settled,
+    )
+
+
+class ByHand:
+    """A source whose frames the test hands out; an exception in their place is raised."""
+
+    kind, name, size = "virtual", "by hand", (3, 2)
+
+    def __init__(self) -> None:
+        self.next: queue.Queue[Frame | Exception] = queue.Queue()
+        self.calls: list[str] = []
+
+    def open(self) -> None:
+        """Note the call."""
+        self.calls.append("open")
+
+    def frame(self, timeout_s: float) -> Frame | None:
+        """Return what the test put there."""
+        try:
+            item = self.next.get(timeout=min(timeout_s, 0.02))
+        except queue.Empty:
+            return None
+        if isinstance(item, Exception):
+            raise item
+        return item
+
+    def settings(self) -> tuple[Setting, ...]:
+        """Return none."""
+        return ()
+
+    def set(self, key: str, value: float) -> float:
+        """Change nothing."""
+        return value
+
+    def close(self) -> None:
+        """Note the call."""
+        self.calls.append("close")
+
+
+@pytest.fixture
+def source() -> ByHand:
+    return ByHand()
+
+
+@pytest.fixture
+def stream(source: ByHand) -> Iterator[Stream]:
+    stream = Stream(source)
+    stream.start()
+    yield stream
+    stream.stop()
+
+
+def lost_sentence(stream: Stream) -> str:
+    """Wait until a stream is lost; return why."""
+    limit = time.monotonic() + WAIT_S
+    while time.monotonic() < limit:
+        if (lost := stream.figures().lost) is not None:
+            return lost
+        time.sleep(0.005)
+    raise AssertionError("the stream was not lost")
+
+
+def test_a_mailbox_holds_the_newest_and_says_what_was_lost() -> None:
+    box: Mailbox[str] = Mailbox()
+    assert box.take() is None
+    assert not box.put("old")
+    assert box.put("new")
+    assert box.take() == "new"
+    assert box.take(0.01) is None
+
+
+def test_a_mailbox_wakes_its_reader() -> None:
+    box: Mailbox[int] = Mailbox()
+    writer = threading.Timer(0.02, box.put, [7])
+    writer.start()
+    assert box.take(WAIT_S) == 7
+    writer.join()
+
+
+def test_the_newest_frame_is_at_hand(source: ByHand, stream: Stream) -> None:
+    source.next.put(frame(0))
+    got = stream.newest.take(WAIT_S)
+    assert got is not None and got.number == 0
+
+
+def test_frames_that_never_came_are_counted(source: ByHand, stream: Stream) -> None:
+    numbers = [0, 1, 4, 5, 9]
+    capture = stream.capture(len(numbers))
+    for number in numbers:
+        source.next.put(frame(number))
+    capture.result(WAIT_S)
+    figures = stream.figures()
+    assert (figures.made, figures.dropped) == (10, 5)
+    assert figures.unseen == 4  # nobody looked, and the mailbox holds the last one
+
+
+def test_a_capture_holds_only_settled_frames_made_after_the_call(
+    source: ByHand, stream: Stream
+) -> None:
+    early = time.monotonic()
+    capture = stream.capture(2)
+    source.next.put(frame(0, time_s=early))
+    source.next.put(frame(1, settled=False))
+    for number in (2, 3, 4):
+        source.next.put(frame(number))
+    assert [f.number for f in capture.result(WAIT_S)] == [2, 3]
+
+
+def test_a_capture_can_be_given_up(source: ByHand, stream: Stream) -> None:
+    given_up, other = stream.capture(3), stream.capture(2)
+    assert given_up.cancel()
+    source.next.put(frame(0))
+    source.next.put(frame(1))
+    assert len(other.result(WAIT_S)) == 2
+    with pytest.raises(CancelledError):
+        given_up.result(0)
+
+
+def test_a_capture_of_a_stream_that_is_stopped_says_so(source: ByHand) -> None:
+    stream = Stream(source)
+    with pytest.raises(SourceLost, match="stopped"):
+        stream.capture(1).result(WAIT_S)
+    stream.start()
+    waiting = stream.capture(16)
+    stream.stop()
+    with pytest.raises(SourceLost, match="stopped"):
+        waiting.result(WAIT_S)
+    with pytest.raises(SourceLost):
+        stream.capture(1).result(WAIT_S)
+
+
+def test_a_lost_source_says_why_and_can_be_opened_again(source: ByHand, stream: Stream) -> None:
+    waiting = stream.capture(16)
+    source.next.put(frame(0))
+    source.next.put(SourceLost("it was unplugged", where="camera", advice="Plug it in"))
+    assert lost_sentence(stream) == "camera: it was unplugged. Plug it in."
+    with pytest.raises(SourceLost, match="unplugged"):
+        waiting.result(WAIT_S)
+    with pytest.raises(SourceLost, match="unplugged"):
+        stream.capture(1).result(WAIT_S)
+    stream.reopen()
+    again = stream.capture(1)
+    source.next.put(frame(0))
+    assert len(again.result(WAIT_S)) == 1
+    assert stream.figures().lost is None
+    stream.stop()
+    assert source.calls == ["open", "close", "open", "close"]
+
+
+def test_a_source_that_cannot_be_opened_says_why(source: ByHand) -> None:
+    def refuse() -> None:
+        raise InputError("it is in use", where="camera", advice="Close the other program")
+
+    source.open = refuse  # type: ignore[method-assign]
+    stream = Stream(source)
+    stream.start()
+    assert "in use" in lost_sentence(stream)
+    stream.stop()
+
+
+def test_a_silent_source_is_lost(source: ByHand) -> None:
+    stream = Stream(source, silence_s=0.05)
+    stream.start()
+    source.next.put(frame(0))
+    assert "no picture has come" in lost_sentence(stream)
+    stream.stop()
+
+
+def test_a_fault_of_a_source_is_logged_and_told(
+    source: ByHand, stream: Stream, caplog: pytest.LogCaptureFixture
+) -> None:
+    source.next.put(ZeroDivisionError())
+    assert "fault of this program" in lost_sentence(stream)
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_every_reader_gets_every_frame_until_it_fails(
+    source: ByHand, stream: Stream, caplog: pytest.LogCaptureFixture
+) -> None:
+    seen: list[int] = []
+
+    def broken(item: Frame) -> None:
+        raise RuntimeError("broken reader")
+
+    stream.add_tap(broken)
+    stream.add_tap(lambda item: seen.append(item.number))
+    capture = stream.capture(3)
+    for number in range(3):
+        source.next.put(frame(number))
+    capture.result(WAIT_S)
+    assert seen == [0, 1, 2]
+    assert caplog.text.count("Traceback") == 1
+
+
+def test_a_removed_reader_gets_no_more(source: ByHand, stream: Stream) -> None:
+    box: Mailbox[Frame] = Mailbox()
+    stream.add_tap(box.put)
+    stream.remove_tap(box.put)
+    capture = stream.capture(1)
+    source.next.put(frame(0))
+    capture.result(WAIT_S)
+    assert box.take() is None
+
+
+def test_a_stream_can_be_stopped_at_any_time_and_is_not_started_twice(stream: Stream) -> None:
+    with pytest.raises(RuntimeError):
+        stream.start()
+    stream.stop()
+    stream.stop()
+
+
+def test_the_memory_of_a_frame_is_locked() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        frame(0).rgb[0, 0, 0] = 1
+
+
+@pytest.mark.parametrize(
+    "rgb", [np.zeros((2, 3), np.uint8), np.zeros((2, 3, 3), np.float32)], ids=["grey", "float"]
+)
+def test_a_frame_is_a_colour_picture_of_whole_numbers(rgb: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="a frame"):
+        Frame(rgb, 0, 0.0)
+
+
+def test_a_setting_takes_the_nearest_value_in_its_range() -> None:
+    setting = Setting("exposure_ms", "Exposure", "ms", 0.1, 100.0, 0.1, 10.0)
+    assert setting.nearest(0.7000001) == 0.7
+    assert setting.nearest(1e9) == 100.0
+    assert setting.nearest(-3.0) == 0.1

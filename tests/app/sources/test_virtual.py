@@ -1,0 +1,278 @@
+"""The virtual sensor delivers what a camera would: every state, with the camera's noise."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.sources.bench import ITEMS, Bench
+from app.sources.noise import NoiseLevel, noisy
+from app.sources.rendering import state_of
+from app.sources.source import Frame, SourceLost
+from app.sources.stream import Stream
+from app.sources.virtual import ROOM_LIGHT, VirtualSource
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor, Whiteboard
+
+WAIT_S = 30.0
+
+
+def design_without_noise(design: SensorDesign) -> SensorDesign:
+    return replace(design, camera=replace(design.camera, shot_variance=0.0, read_sd=0.0))
+
+
+def settled(source: VirtualSource) -> Frame:
+    """Return the first frame that shows what lies on the bench."""
+    limit = time.monotonic() + WAIT_S
+    while time.monotonic() < limit:
+        frame = source.frame(0.2)
+        if frame is not None and frame.settled:
+            return frame
+    raise AssertionError("the virtual sensor did not come to rest")
+
+
+@pytest.fixture
+def source(bench: Bench) -> Iterator[VirtualSource]:
+    bench.adjust(rate_hz=60.0)
+    source = VirtualSource(bench)
+    source.open()
+    yield source
+    source.close()
+
+
+@pytest.mark.parametrize("item", ITEMS)
+def test_without_noise_each_state_is_the_virtual_sensors_picture(
+    source: VirtualSource, item: str
+) -> None:
+    bench = source.bench
+    bench.adjust(noise=0.0)
+    bench.lay(item)
+    bench.arrange(size_mm=3.0)
+    got = settled(source)
+    sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
+    expected = sensor.frame(state_of(bench, bench.design, bench.scene))
+    assert np.array_equal(got.rgb, expected)
+
+
+def test_a_stage_shows_what_a_simulated_session_holds(source: VirtualSource) -> None:
+    bench = source.bench
+    bench.adjust(noise=0.0)
+    bench.show("whiteboard")
+    sensor = VirtualSensor(design_without_noise(bench.design), bench.seed)
+    assert np.array_equal(settled(source).rgb, sensor.frame(Whiteboard()))
+
+
+def test_a_coarse_picture_comes_first_and_is_not_called_settled() -> None:
+    bench = Bench(SensorDesign().scaled(0.5))
+    source = VirtualSource(bench)
+    bench.lay("ball")
+    bench.adjust(noise=0.0, rate_hz=60.0)
+    source.open()
+    limit = time.monotonic() + WAIT_S
+    first = None
+    while first is None and time.monotonic() < limit:
+        first = source.frame(0.2)
+    last = settled(source)
+    source.close()
+    assert first is not None and not first.settled
+    assert first.rgb.shape == last.rgb.shape == (480, 640, 3)
+    # What is pressed is already in its place: the two differ at edges and fine pattern alone.
+    difference = np.abs(first.rgb.astype(int) - last.rgb)
+    assert np.median(difference) <= 1
+    assert np.mean(difference > 20) < 0.02
+
+
+@pytest.mark.parametrize("bit_depth", [8, 16])
+def test_mean_and_spread_are_those_of_the_virtual_sensors_noise(bit_depth: int) -> None:
+    design = SensorDesign().scaled(0.25)
+    # Noise of several counts, so that rounding does not hide it.
+    camera = replace(design.camera, bit_depth=bit_depth, shot_variance=4e-4, read_sd=0.01)
+    design = replace(design, camera=camera)
+    bench = Bench(design)
+    bench.adjust(rate_hz=60.0)
+    source = VirtualSource(bench)
+    source.open()
+    settled(source)
+    ours = np.stack([settled(source).rgb for _ in range(12)]).astype(float)
+    source.close()
+    sensor = VirtualSensor(design, bench.seed)
+    theirs = np.stack([sensor.frame(BareMembrane()) for _ in range(12)]).astype(float)
+    light = sensor.brightness(BareMembrane())
+    full = 2.0**bit_depth - 1.0
+    for low, high in ((0.02, 0.1), (0.1, 0.3), (0.3, 0.7)):
+        chosen = (light > low) & (light < high)
+        many = ours[:, chosen]
+        # The mean of n values of spread s is known to s / sqrt(n), the spread to s / sqrt(2 n).
+        spread = theirs[:, chosen].std(axis=0, ddof=1)
+        error = spread.mean() / np.sqrt(many.size)
+        assert many.mean() == pytest.approx(theirs[:, chosen].mean(), abs=6.0 * error)
+        variance = many.var(axis=0, ddof=1).mean()
+        assert variance == pytest.approx(
+            theirs[:, chosen].var(axis=0, ddof=1).mean(), rel=6.0 * np.sqrt(4.0 / many.size)
+        )
+        expected = camera.shot_variance * light[chosen].mean() + camera.read_sd**2
+        assert variance / full**2 == pytest.approx(expected, rel=0.02)
+
+
+def test_noise_does_not_repeat_and_has_no_pattern() -> None:
+    level = np.full((200, 300, 3), 100.0, np.float32)
+    noise = NoiseLevel(0.0, 9.0)
+    one, two = (
+        noisy(level, noise, seed=seed, bit_depth=8).astype(float) - 100.0 for seed in (1, 2)
+    )
+    limit = 5.0 / np.sqrt(one.size)  # five standard deviations of a correlation of nothing
+
+    def correlation(a: np.ndarray, b: np.ndarray) -> float:
+        return abs(float(np.corrcoef(a.ravel(), b.ravel())[0, 1]))
+
+    assert correlation(one, two) < limit
+    assert correlation(one[:, 1:], one[:, :-1]) < limit
+    assert correlation(one[1:], one[:-1]) < limit
+    assert correlation(one[..., 0], one[..., 1]) < 2.0 * limit
+    # Over many frames no row and no column stands out.
+    mean = np.mean([noisy(level, noise, seed=s, bit_depth=8) for s in range(40)], axis=0) - 100.0
+    assert np.abs(mean.mean(axis=(1, 2))).max() < 5.0 * 3.0 / np.sqrt(40 * 900)
+    assert np.abs(mean.mean(axis=(0, 2))).max() < 5.0 * 3.0 / np.sqrt(40 * 600)
+
+
+def test_a_board_is_grey_with_one_noise(source: VirtualSource) -> None:
+    source.bench.lay("checkerboard")
+    rgb = settled(source).rgb
+    assert np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
+
+
+def test_exposure_and_gain_brighten_and_saturate(source: VirtualSource) -> None:
+    source.bench.adjust(noise=0.0)
+    usual = settled(source).rgb.astype(float)
+    assert source.set("exposure_ms", 5.0) == 5.0
+    assert settled(source).rgb.astype(float) == pytest.approx(0.5 * usual, abs=1.0)
+    assert source.set("exposure_ms", 10.0) == 10.0
+    assert source.set("gain_db", 6.02) == 6.0
+    factor = 10.0 ** (6.0 / 20.0)
+    assert settled(source).rgb.astype(float) == pytest.approx(
+        np.minimum(255.0, factor * usual), abs=0.5 * factor + 0.5
+    )
+    source.set("gain_db", 24.0)
+    bright = settled(source).rgb
+    assert bright.max() == 255
+    assert (bright == 255).mean() > 0.1
+
+
+def test_gain_amplifies_noise_and_exposure_does_not() -> None:
+    camera = SensorDesign().camera
+    usual, amplified = NoiseLevel.of_camera(camera), NoiseLevel.of_camera(camera, gain=4.0)
+    assert amplified.read == pytest.approx(16.0 * usual.read)
+    assert amplified.shot == pytest.approx(4.0 * usual.shot)
+
+
+def test_settings_are_read_back_and_unknown_ones_refused(source: VirtualSource) -> None:
+    source.set("rate_hz", 1e9)
+    values = {setting.key: setting.value for setting in source.settings()}
+    assert values == {"exposure_ms": 10.0, "gain_db": 0.0, "rate_hz": 60.0}
+    with pytest.raises(InputError, match="focus"):
+        source.set("focus", 1.0)
+
+
+def test_room_light_lifts_the_dark(source: VirtualSource) -> None:
+    source.bench.adjust(noise=0.0)
+    dark = settled(source).rgb[:4, :4].mean(axis=(0, 1))
+    source.bench.switch("room_light", True)
+    lit = settled(source).rgb[:4, :4].mean(axis=(0, 1))
+    assert lit - dark == pytest.approx(255.0 * np.array(ROOM_LIGHT), abs=1.0)
+
+
+def test_a_membrane_left_on_shows_in_the_place_of_the_mirror(source: VirtualSource) -> None:
+    source.bench.adjust(noise=0.0)
+    bare = settled(source).rgb
+    source.bench.switch("membrane_on", True)
+    source.bench.lay("mirror")
+    assert np.array_equal(settled(source).rgb, bare)
+
+
+def test_too_much_light_saturates(source: VirtualSource) -> None:
+    source.bench.lay("whiteboard")
+    source.bench.switch("too_bright", True)
+    assert (settled(source).rgb == 255).any(axis=2).mean() > 0.1
+
+
+def test_frames_nobody_came_for_are_counted_as_made(source: VirtualSource) -> None:
+    first = settled(source)
+    time.sleep(0.2)
+    later = settled(source)
+    # 60 Hz for 0.2 s; a frame may wait at either end.
+    assert later.number - first.number >= 10
+    assert later.time_s - first.time_s >= 0.2
+
+
+def test_a_long_exposure_slows_the_camera(source: VirtualSource) -> None:
+    source.set("exposure_ms", 100.0)
+    settled(source)
+    first, second = settled(source), settled(source)
+    assert second.time_s - first.time_s > 0.09
+
+
+def test_a_camera_that_stops_is_told_and_can_be_opened_again(bench: Bench) -> None:
+    stream = Stream(VirtualSource(bench))
+    stream.start()
+    assert len(stream.capture(2).result(WAIT_S)) == 2
+    waiting = stream.capture(10_000)
+    bench.switch("camera_stops", True)
+    with pytest.raises(SourceLost, match="camera has stopped"):
+        waiting.result(WAIT_S)
+    assert "camera has stopped" in (stream.figures().lost or "")
+    bench.switch("camera_stops", False)
+    stream.reopen()
+    assert len(stream.capture(2).result(WAIT_S)) == 2
+    stream.stop()
+
+
+def test_closing_is_quick_even_while_a_dear_picture_is_made() -> None:
+    source = VirtualSource(Bench())
+    source.bench.lay("coin")
+    source.open()
+    # The small preview is there and the coin of the full size is being pressed.
+    while source.frame(0.2) is None:
+        pass
+    began = time.monotonic()
+    source.close()
+    assert time.monotonic() - began < 1.0
+    assert not any(thread.name == "virtual sensor" for thread in threading.enumerate())
+
+
+def test_twenty_rounds_of_opening_and_closing_leave_nothing(bench: Bench) -> None:
+    stream = Stream(VirtualSource(bench))
+    before = threading.active_count()
+    for _ in range(20):
+        stream.start()
+        stream.capture(1).result(WAIT_S)
+        began = time.monotonic()
+        stream.stop()
+        assert time.monotonic() - began < 1.0
+    assert threading.active_count() == before
+
+
+def test_a_fault_while_rendering_is_told_by_the_stream(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(VirtualSensor, "brightness", broken)
+    stream = Stream(VirtualSource(bench))
+    stream.start()
+    with pytest.raises(SourceLost, match="fault of this program"):
+        stream.capture(1).result(WAIT_S)
+    stream.stop()
+
+
+def test_a_closed_source_says_so(bench: Bench) -> None:
+    source = VirtualSource(bench)
+    with pytest.raises(SourceLost, match="closed"):
+        source.frame(0.0)
+    source.close()
