@@ -108,7 +108,7 @@ def facts(entry: Entry, summary: CalibrationSummary) -> str:
             serial=summary.serial, model=summary.model, w=width, h=height
         ),
         tr("Made {when} {who} from session {session}, program {version}").format(
-            when=made_cell(entry).text,
+            when=made_cell(entry).tip or tr("at an unknown time"),
             who=tr("by {name}").format(name=summary.operator) if summary.operator else "",
             session=summary.session,
             version=summary.program_version,

@@ -126,11 +126,12 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
 
 
 def made_cell(entry: Entry) -> Cell:
-    """Return when a calibration was made, in local time."""
+    """Return the day on which a calibration was made, with the local time as a tip."""
     made = entry.created
     if made is None:
         return Cell(tr("unknown"), key=0.0)
-    return Cell(made.astimezone().strftime("%Y-%m-%d %H:%M"), key=made.timestamp())
+    local = made.astimezone()
+    return Cell(f"{local:%Y-%m-%d}", tip=f"{local:%Y-%m-%d %H:%M}", key=made.timestamp())
 
 
 def age_cell(age_days: float | None, oldest_days: float) -> Cell:

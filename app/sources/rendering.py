@@ -33,6 +33,7 @@ _LOG = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 
 _PREVIEW_WIDTH_PX = 480
+_DARK = 1e-6  # far below one count of any camera
 _STOP_S = 1.0
 
 
@@ -199,12 +200,15 @@ class _Makers:
         if scene.item in BOARDS or self._small is None or self._large is None:
             return self._enlarged(small)
         # What is pressed changes the bare membrane's picture by a smooth factor, beside which the
-        # membrane's own fine pattern stays sharp.
+        # membrane's own fine pattern stays sharp; so does its rim, where nothing is divided.
         if self._bare is None:
             self._bare = self._large.brightness(BareMembrane())
         bare = self._small.brightness(BareMembrane())
-        dark = bare < 1e-6
-        return self._bare * self._enlarged(np.where(dark, 1.0, small / np.where(dark, 1.0, bare)))
+        outside = (bare.max(axis=2) < _DARK).astype(np.uint8)
+        inside = cv2.dilate(outside, np.ones((5, 5), np.uint8)) == 0
+        factor = np.ones_like(bare)
+        np.divide(small, np.maximum(bare, _DARK), out=factor, where=inside[..., None])
+        return self._bare * self._enlarged(factor)
 
     def _enlarged(self, picture: Array) -> Array:
         camera = self._bench.design.camera

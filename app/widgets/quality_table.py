@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QEvent, QRect, QSize, Qt
-from PySide6.QtGui import QGuiApplication, QKeySequence
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -26,6 +26,8 @@ from gelpolight_core.translation import tr
 VERDICT_COLUMN, LABEL_COLUMN, VALUE_COLUMN, LIMIT_COLUMN = range(4)
 COLUMNS = 4
 ROW_HEIGHT = 24
+# Rounding alone; no figure's limit is near.
+TINY = 1e-9
 MARGIN = 6
 
 
@@ -42,7 +44,9 @@ def value_text(figure: Figure) -> str:
     """Return a figure's value with its unit; counts without decimals."""
     if not math.isfinite(figure.value):
         return tr("unknown")
-    if not figure.unit and figure.value == round(figure.value):
+    if abs(figure.value) < TINY:
+        number = "0"
+    elif not figure.unit and figure.value == round(figure.value):
         number = f"{figure.value:.0f}"
     else:
         number = f"{figure.value:.3g}" if abs(figure.value) < 1000.0 else f"{figure.value:.0f}"
@@ -66,6 +70,19 @@ def _higher_is_better(figure: Figure, limit: float) -> bool:
     return beyond if figure.verdict is Verdict.PASS else figure.value < limit
 
 
+class _Grid(QTableWidget):
+    """A table whose copy key copies rows; the view's own copies a single cell."""
+
+    copy_asked = Signal()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Copy, or do what a table does."""
+        if event.matches(QKeySequence.StandardKey.Copy):
+            self.copy_asked.emit()
+        else:
+            super().keyPressEvent(event)
+
+
 class QualityTableWidget(QWidget):
     """Shows a QualityTable as high as it is; rows are updated in place.
 
@@ -82,7 +99,7 @@ class QualityTableWidget(QWidget):
         named(self, name, accessible)
         self._shown: tuple[tuple[str, bool], ...] = ()
         self._table = QualityTable()
-        self._grid = named(QTableWidget(0, COLUMNS, self), f"{name}.table", accessible)
+        self._grid = named(_Grid(0, COLUMNS, self), f"{name}.table", accessible)
         # Verdict, figure, value and limit say themselves what they are.
         self._grid.horizontalHeader().hide()
         self._grid.verticalHeader().hide()
@@ -100,9 +117,8 @@ class QualityTableWidget(QWidget):
         header.setMinimumSectionSize(80)
         header.sectionResized.connect(self._fit)
         self._grid.verticalHeader().setMinimumSectionSize(1)
-        copy = make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
-        copy.setShortcut(QKeySequence.StandardKey.Copy)
-        copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
+        self._grid.copy_asked.connect(self.copy)
         self._grid.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         layout = QVBoxLayout(self)
