@@ -202,7 +202,7 @@ class CalibrationController(QObject):
         self._decide(tr("Place the mirror spot"), replace(now, spots_px=spots), Stage.LIGHTS)
 
     def place_spot_near(self, led: int, place: Point, path: Path) -> None:
-        """Place an LED's mirror spot on the spot that a person points at, or where there is none."""
+        """Place an LED's mirror spot on the one that a person points at, or where none is."""
 
         def done(near: Point | None) -> None:
             self.place_spot(led, near or place)

@@ -54,14 +54,14 @@ class CalibratePage(QWidget):
     # What the window asks of a page
 
     def enter(self) -> None:
-        """The page is shown."""
+        """Show what is new, and look at the camera."""
         self._shown = True
         self.start.show_recent(self.context.settings.recent_sessions)
         if self.wizard is not None:
             self.wizard.enter()
 
     def leave(self) -> None:
-        """The page is left: the camera is let go."""
+        """Let the camera go."""
         self._shown = False
         if self.wizard is not None:
             self.wizard.leave()

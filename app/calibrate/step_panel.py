@@ -35,6 +35,8 @@ class StepPanel(QScrollArea):
 
     Signals
     -------
+    lay_wanted()
+        Put on the virtual bench what this step asks for.
     capture_wanted()
         Take a picture now.
     import_wanted()
@@ -49,6 +51,7 @@ class StepPanel(QScrollArea):
         Compute what is stale.
     """
 
+    lay_wanted = Signal()
     capture_wanted = Signal()
     import_wanted = Signal()
     automatic_changed = Signal(bool)
@@ -123,8 +126,11 @@ class StepPanel(QScrollArea):
         buttons.addWidget(self.capture, 2)
         buttons.addWidget(self.import_files, 1)
         self.capturing = QWidget()
+        self.lay = lay_button("calibrate.lay")
+        self.lay.clicked.connect(self.lay_wanted)
         column = QVBoxLayout(self.capturing)
         column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.lay)
         column.addWidget(self.live)
         column.addWidget(self.radius_row)
         column.addLayout(buttons)
@@ -214,6 +220,18 @@ class StepPanel(QScrollArea):
         self.progress.setFormat(f"{title}  %p %" if title else "")
         self.progress.setRange(0, 100 if share > 0.0 else 0)
         self.progress.setValue(round(100 * share))
+
+
+def lay_button(name: str) -> QPushButton:
+    """Return the button of the virtual bench; hidden where the camera is a real one."""
+    button = named(
+        QPushButton(tr("Put it on the &virtual bench")),
+        name,
+        tr("Put on the virtual bench what this step asks for"),
+        tr("Each time the next view or press, as a technician would arrange it"),
+    )
+    button.hide()
+    return button
 
 
 def _wrapped(*, lines: int = 0) -> QLabel:

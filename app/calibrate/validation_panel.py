@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from app.calibrate.assembly import AssemblyPicture
 from app.calibrate.states import state_colour
-from app.calibrate.step_panel import WIDTH
+from app.calibrate.step_panel import WIDTH, lay_button
 from app.calibrate.steps import Step
 from app.calibrate.trial import KnownObject, Trial
 from app.widgets.naming import named
@@ -31,12 +31,15 @@ class ValidationPanel(QScrollArea):
 
     Signals
     -------
+    lay_wanted()
+        Put on the virtual bench what this step asks for.
     trial_wanted()
         Capture and measure now.
     keep_wanted()
         Record the trial as this calibration's validation.
     """
 
+    lay_wanted = Signal()
     trial_wanted = Signal()
     keep_wanted = Signal()
 
@@ -66,6 +69,9 @@ class ValidationPanel(QScrollArea):
         for widget in (title, picture, task, self.calibration):
             column.addWidget(widget)
         column.addLayout(self._build_form())
+        self.lay = lay_button("validation.lay")
+        self.lay.clicked.connect(self.lay_wanted)
+        column.addWidget(self.lay)
         self.measure = named(
             QPushButton(tr("&Measure the press")),
             "validation.measure",

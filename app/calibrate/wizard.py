@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMainWindow,
+    QScrollArea,
     QStackedWidget,
     QTabWidget,
     QToolBar,
@@ -25,7 +26,7 @@ from app.calibrate.controller import CalibrationController, Seen
 from app.calibrate.detection import Detection
 from app.calibrate.film_strip import FilmStrip
 from app.calibrate.look import look_for, read_raw
-from app.calibrate.maps import MapsView, panels_of, refraction_panels
+from app.calibrate.maps import MapsView, Panel, panels_of, refraction_panels
 from app.calibrate.result_view import ResultView
 from app.calibrate.saving import Saving
 from app.calibrate.setup_form import SetupForm
@@ -34,6 +35,7 @@ from app.calibrate.step_list import StepList
 from app.calibrate.step_panel import StepPanel
 from app.calibrate.steps import all_steps
 from app.calibrate.takes import takes_of
+from app.calibrate.trial import KnownObject
 from app.calibrate.validating import Validating
 from app.calibrate.validation_panel import ValidationPanel
 from app.live.live_view import LiveView
@@ -86,6 +88,7 @@ class Wizard(QMainWindow):
         self._looked_at = ""
         self._statuses: dict[Stage, StageStatus] = project.statuses()
         self._paused_until = 0.0
+        self._tried = 0
         self._stream: Stream | None = None
         self._build()
         self._build_actions()
@@ -93,6 +96,7 @@ class Wizard(QMainWindow):
         self.saving = Saving(self.controller, self.result, context=context)
         self.validating = Validating(self.controller, self.validation, context=context)
         self.saving.saved.connect(self.validating.take)
+        self.validating.show_pictures_in(self._show_trial)
         self._status_tick = QTimer(self)
         self._status_tick.setInterval(STATUS_MS)
         self._status_tick.timeout.connect(self._show_figures)
@@ -150,6 +154,10 @@ class Wizard(QMainWindow):
         self.history.setWidget(self._undo_view)
         self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.history)
         self.history.hide()
+        self.bench_dock = QDockWidget(tr("Virtual bench"), self)
+        named(self.bench_dock, "calibrate.bench", tr("Virtual bench"))
+        self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, self.bench_dock)
+        self.bench_dock.hide()
 
     def _build_actions(self) -> None:
         bar = QToolBar(tr("Session"), self)
@@ -174,6 +182,10 @@ class Wizard(QMainWindow):
         history = self.history.toggleViewAction()
         history.setText(tr("History"))
         bar.addAction(history)
+        self.bench_action = self.bench_dock.toggleViewAction()
+        self.bench_action.setText(tr("Virtual bench"))
+        self.bench_action.setVisible(False)
+        bar.addAction(self.bench_action)
         bar.addSeparator()
         bar.addWidget(self.caption)
         make_action(
@@ -199,6 +211,9 @@ class Wizard(QMainWindow):
         panel.cancel_wanted.connect(self.controller.jobs.cancel)
         panel.recompute_wanted.connect(self._recompute)
         panel.radius.valueChanged.connect(self._on_radius)
+        panel.lay_wanted.connect(self._lay_on_bench)
+        self.validation.lay_wanted.connect(self._lay_on_bench)
+        self.view.clicked.connect(self._on_clicked)
         self.strip.chosen.connect(self.look_at)
         self.strip.excluded.connect(self._on_excluded)
         self.view.moved.connect(self._on_moved)
@@ -219,23 +234,26 @@ class Wizard(QMainWindow):
     # The page around
 
     def enter(self) -> None:
-        """The wizard is shown: look at the camera."""
+        """Look at the camera, as the wizard is shown."""
         self._on_source()
         self._status_tick.start()
 
     def leave(self) -> None:
-        """The wizard is hidden: let the camera go."""
+        """Let the camera go, as the wizard is hidden."""
         self._status_tick.stop()
         self._let_camera_go()
 
     def close_session(self) -> None:
         """End all work; everything captured and decided is on disk."""
         self.leave()
+        if isinstance(self.curves, QWidget) and hasattr(self.curves, "close_editor"):
+            self.curves.close_editor()
         self.controller.close()
 
     def _on_source(self) -> None:
         self._let_camera_go()
         info = self.context.source.info
+        self._show_bench()
         if info is None:
             self.view.say(tr("No camera. Choose a source, or import pictures."))
             return
@@ -246,6 +264,44 @@ class Wizard(QMainWindow):
         if not self._looked_at:
             self.view.set_stream(self._stream)
         self._arm()
+
+    def _show_bench(self) -> None:
+        """Offer the virtual bench where the virtual sensor is the camera."""
+        source = self.context.source
+        virtual = source.info is not None and source.info.kind == "virtual"
+        self.bench_action.setVisible(virtual)
+        self.panel.lay.setVisible(virtual)
+        self.validation.lay.setVisible(virtual)
+        if not virtual or source.bench is None:
+            self.bench_dock.hide()
+        elif self.bench_dock.widget() is None:
+            from app.bench.bench_panel import BenchPanel  # only the demo needs it
+
+            scroll = QScrollArea()
+            scroll.setWidgetResizable(True)
+            scroll.setWidget(BenchPanel(bench=source.bench))
+            self.bench_dock.setWidget(scroll)
+
+    def _lay_on_bench(self) -> None:
+        """Put on the virtual bench what this step asks for; each time the next view or press."""
+        bench = self.context.source.bench
+        if bench is None:
+            return
+        folder = self.step.folder or "presses"
+        count = len(self.project.session.found(folder)) if self.step.folder else self._tried
+        self._tried += not self.step.folder
+        scene = bench.show(folder, count % bench.steps(folder))
+        if self.step.stage is Stage.BALLS:
+            self.panel.radius.setValue(0.5 * scene.size_mm)
+        elif not self.step.folder:
+            self.validation.show_known(KnownObject(scene.item, scene.size_mm, scene.depth_mm))
+        self._look_live()
+
+    def _on_clicked(self, u: float, v: float) -> None:
+        """Move what lies on the virtual bench to where the person clicked in the live picture."""
+        bench = self.context.source.bench
+        if bench is not None and self.bench_dock.isVisible() and not self._looked_at:
+            bench.drag_to(u, v)
 
     def _let_camera_go(self) -> None:
         self.controller.set_stream(None)
@@ -346,7 +402,7 @@ class Wizard(QMainWindow):
         self._count_captures()
         self.result.show_statuses(self._statuses, running)
         panels = panels_of(self.step.stages[0] if self.step.stages else None, self.project.results)
-        if self.step.key != "refraction":
+        if self.step.key not in ("refraction", "validation"):
             self.maps.show_panels(panels)
             self.tabs.setTabVisible(1, bool(panels))
         self._show_radius()
@@ -528,6 +584,13 @@ class Wizard(QMainWindow):
         self.panel.show_work(title, share)
         if not title:
             self._refresh()
+
+    def _show_trial(self, panel: Panel) -> None:
+        """Show the depth of a validation's press."""
+        if self.step.key == "validation":
+            self.maps.show_panels((panel,))
+            self.tabs.setTabVisible(1, True)
+            self.tabs.setCurrentIndex(1)
 
     def _show_refraction(self) -> None:
         """Show the press that is most oblique, or the one chosen, before and after."""
