@@ -37,6 +37,7 @@ from gelpolight_core.translation import tr
 TICK_MS = 16
 # Words and figures five times a second: faster than they can be read.
 CHECK_S = 0.2
+RATE_S = 0.5
 # One pixel in nine: still a hundred thousand of a small camera.
 CHECK_STRIDE = 3
 NUDGE_PX = 0.2
@@ -103,6 +104,7 @@ class LiveView(QWidget):
         self._overlay = Overlay()
         self._best_focus = BestFocus()
         self._checked_s = -math.inf
+        self._rate_told_s = -math.inf
         self._pointer = (math.nan, math.nan)
         self._shown_frames = 0
         self._tools = PictureTools(self)
@@ -233,6 +235,7 @@ class LiveView(QWidget):
         frame = self._stream.newest.take()
         if frame is not None:
             self._show(frame.rgb)
+        self._tell_rate(self._stream)
 
     def _show(self, rgb: Rgb) -> None:
         resized = self._rgb is None or self._rgb.shape != rgb.shape
@@ -260,12 +263,16 @@ class LiveView(QWidget):
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():
             self._histogram.show_counts(channel_histograms(thin))
-        if self._stream is not None:
-            figures = self._stream.figures()
-            self._checks.show_rate(
-                figures.lost
-                or tr("{r:.0f} frames/s, {d} dropped").format(r=figures.rate_hz, d=figures.dropped)
-            )
+
+    def _tell_rate(self, stream: StreamLike) -> None:
+        """Tell the rate, or, when frames come no more, why."""
+        now_s = time.monotonic()
+        if now_s - self._rate_told_s < RATE_S:
+            return
+        self._rate_told_s = now_s
+        figures = stream.figures()
+        rate = tr("{r:.0f} frames/s, {d} dropped").format(r=figures.rate_hz, d=figures.dropped)
+        self._checks.show_rate(figures.lost or rate)
 
     def _draw_overlay(self) -> None:
         shown = self._overlay if self._tools.is_on("overlay") else Overlay()
@@ -364,6 +371,9 @@ class LiveView(QWidget):
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: D102
         super().hideEvent(event)
         self._tick.stop()
+        if self._nudge_end.isActive():
+            self._nudge_end.stop()
+            self._end_nudge()
 
     def _place_histogram(self) -> None:
         corner = self._picture.rect().bottomRight()
