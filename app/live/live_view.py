@@ -258,11 +258,10 @@ class LiveView(QWidget):
         self._picture.show_rgb(shown)
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
-        thin = np.ascontiguousarray(rgb[::CHECK_STRIDE, ::CHECK_STRIDE])
         self._checks.show_exposure(measure_exposure(rgb))
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():
-            self._histogram.show_counts(channel_histograms(thin))
+            self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
     def _tell_rate(self, stream: StreamLike) -> None:
         """Tell the rate, or, when frames come no more, why."""
@@ -332,7 +331,7 @@ class LiveView(QWidget):
         radius_step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ControlModifier else NUDGE_PX
         match event.key():
             case Qt.Key.Key_Left | Qt.Key.Key_Right | Qt.Key.Key_Up | Qt.Key.Key_Down:
-                du, dv = _ARROWS[event.key()]
+                du, dv = _ARROWS[Qt.Key(event.key())]
                 handle = move(handle, step * du, step * dv, self._drawing_size())
             case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
                 handle = resize(handle, radius_step)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
 
-Rgb = NDArray[np.uint8] | NDArray[np.uint16]
+Rgb = NDArray[np.uint8] | NDArray[np.uint16]  # or one channel of it
 
 # A twentieth of a percent may be glints and hot pixels, which say nothing of the exposure.
 SATURATED_WARN = 0.0005
@@ -55,8 +55,7 @@ def end_of_scale(rgb: Rgb) -> int:
 
 def brightest_channel(rgb: Rgb) -> Rgb:
     """Return the largest of the three channels at every pixel, (rows, columns)."""
-    red, green, blue = cv2.split(rgb)
-    return np.asarray(cv2.max(cv2.max(red, green), blue))
+    return np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
 
 
 def saturated(rgb: Rgb) -> NDArray[np.uint8]:
@@ -67,7 +66,7 @@ def saturated(rgb: Rgb) -> NDArray[np.uint8]:
     """
     top = end_of_scale(rgb)
     limit = 254 if top == 255 else 0xFEFF
-    return np.asarray(cv2.compare(brightest_channel(rgb), float(limit), cv2.CMP_GT), np.uint8)
+    return (brightest_channel(rgb) > limit).view(np.uint8) * np.uint8(255)
 
 
 def measure_exposure(rgb: Rgb) -> Exposure:

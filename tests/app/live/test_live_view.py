@@ -425,9 +425,17 @@ def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
 def test_tools_follow_the_theme(view: LiveView) -> None:
     button = child(view, "live.fit")
     before = button.icon().cacheKey()
-    palette = view.palette()
+    application = QApplication.instance()
+    usual, sheet = QApplication.palette(), application.styleSheet()
+    palette = QApplication.palette()
     palette.setColor(palette.ColorRole.ButtonText, QColor("#ff0000"))
-    view.setPalette(palette)
-    QApplication.processEvents()
-    assert button.icon().cacheKey() != before
-    assert button.icon().pixmap(20, 20).toImage().pixelColor(3, 3).red() > 200
+    try:
+        QApplication.setPalette(palette)
+        # Under a style sheet, Qt tells widgets of another palette when the sheet is set anew.
+        application.setStyleSheet(sheet + " ")
+        QApplication.processEvents()
+        assert button.icon().cacheKey() != before
+        assert button.icon().pixmap(20, 20).toImage().pixelColor(3, 3).red() > 200
+    finally:
+        QApplication.setPalette(usual)
+        application.setStyleSheet(sheet)
