@@ -22,9 +22,9 @@ from app.live.picture_checks import (
     BestFocus,
     Rgb,
     channel_histograms,
-    end_of_scale,
     measure_exposure,
     measure_focus,
+    pixel_text,
 )
 from app.live.picture_view import PictureView
 from app.live.tools import PictureTools
@@ -388,20 +388,6 @@ _ARROWS = {
     Qt.Key.Key_Up: (0.0, -1.0),
     Qt.Key.Key_Down: (0.0, 1.0),
 }
-
-
-def pixel_text(rgb: Rgb, u: float, v: float) -> str:
-    """Return the numbers of the pixel at (u, v), empty outside the picture."""
-    rows, columns = rgb.shape[:2]
-    if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
-        return ""
-    column, row = math.floor(u + 0.5), math.floor(v + 0.5)
-    top = end_of_scale(rgb)
-    values = (
-        f"{name} {int(value)} ({100.0 * int(value) / top:.0f} %)"
-        for name, value in zip(("R", "G", "B"), rgb[row, column], strict=True)
-    )
-    return f"u {column}, v {row}:  " + "   ".join(values)
 
 
 def _pictures_folder() -> Path:

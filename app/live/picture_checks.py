@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -166,3 +167,17 @@ def channel_histograms(rgb: Rgb, bins: int = 64) -> NDArray[np.int64]:
     return np.stack(
         [np.bincount(rgb[..., k].ravel() >> shift, minlength=bins) for k in range(3)]
     ).astype(np.int64)
+
+
+def pixel_text(rgb: Rgb, u: float, v: float) -> str:
+    """Return the numbers of the pixel at (u, v), empty outside the picture."""
+    rows, columns = rgb.shape[:2]
+    if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
+        return ""
+    column, row = math.floor(u + 0.5), math.floor(v + 0.5)
+    top = end_of_scale(rgb)
+    values = (
+        f"{name} {int(value)} ({100.0 * int(value) / top:.0f} %)"
+        for name, value in zip(("R", "G", "B"), rgb[row, column], strict=True)
+    )
+    return f"u {column}, v {row}:  " + "   ".join(values)

@@ -17,8 +17,9 @@ from PySide6.QtWidgets import QApplication, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.live.drawing import ROLE_COLOURS
-from app.live.live_view import LiveView, pixel_text
+from app.live.live_view import LiveView
 from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay
+from app.live.picture_checks import pixel_text
 from gelpolight_core.errors import InputError
 
 HEIGHT, WIDTH = 60, 80
@@ -323,7 +324,7 @@ def test_sixteen_bit_frames_are_shown_and_read_in_their_own_numbers(view: LiveVi
 
 def test_the_readout_knows_where_the_picture_ends() -> None:
     rgb = black()
-    assert pixel_text(rgb, -0.4, WIDTH / 2).startswith("u 0, v 40") is (WIDTH / 2 < HEIGHT)
+    assert pixel_text(rgb, -0.4, HEIGHT - 0.6).startswith(f"u 0, v {HEIGHT - 1}:")
     for u, v in ((-0.6, 5.0), (5.0, -0.6), (WIDTH - 0.4, 5.0), (5.0, HEIGHT - 0.4)):
         assert pixel_text(rgb, u, v) == ""
     assert pixel_text(rgb, float("nan"), float("nan")) == ""
