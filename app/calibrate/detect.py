@@ -58,8 +58,9 @@ GLANCE_PX = 480
 # such views show the distortion, more add little.
 LEAST_TILT_DEG = 10.0
 FLAT_VIEWS = 2
-# A tilt by ten degrees or a shift by half a square moves the corners by more.
-SAME_VIEW_OF_SQUARE = 0.5
+# A board that tilts by ten degrees to the other side moves its corners by this much, and is
+# worth having.
+SAME_VIEW_OF_SQUARE = 0.2
 # A mirror image this far from its expected place is more than any mounting is off.
 LED_OFF_OF_WIDTH = 0.05
 

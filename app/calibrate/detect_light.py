@@ -100,10 +100,12 @@ def detect_background(
         area, small = _prepare(rgb, table)
         full = saturated(rgb) > 0
         pressed = np.zeros(area.shape, np.bool_)
+        good = tr("The membrane is lit well.")
         if whiteboard is not None and whiteboard.shape == rgb.shape:
             white = _small(whiteboard)
             _refuse_whiteboard(small, white, area)
             pressed = _find_pressed(small, white, area)
+            good = tr("The membrane is lit well and nothing touches it.")
         marks = Overlay(
             lines=rim.lines,
             masks=_masks(full, _enlarge(pressed, rgb)),
@@ -114,7 +116,7 @@ def detect_background(
             judge("pressed", tr("Area that looks pressed in"), 100.0 * share(pressed, area), "%",
                   fail=0.0, advice=tr("Lift off whatever touches the membrane, and wipe it clean")),
         )  # fmt: skip
-        return judged(marks, figures, tr("The membrane is lit well and nothing touches it."))
+        return judged(marks, figures, good)
 
     return or_refusal(look, marks=rim)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.live.overlay import Note, Overlay
+from app.live.overlay import Note, Overlay, Role
 from app.live.picture_checks import Rgb, end_of_scale
 from gelpolight_core.errors import InputError
 from gelpolight_core.lights.mirror import MirrorSpots
@@ -82,7 +82,7 @@ def figure_text(figure: Figure) -> str:
 
 def with_note(detection: Detection) -> Overlay:
     """Return a detection's overlay with its sentence in the corner, for a view without a page."""
-    role = "good" if detection.ready else "bad"
+    role: Role = "good" if detection.ready else "bad"
     marks = detection.overlay
     note = Note(detection.sentence, role)
     return Overlay(marks.markers, marks.circles, marks.lines, marks.masks, (*marks.notes, note))

@@ -113,7 +113,7 @@ def working_rim(table: ResamplingTable) -> Line:
         table.valid.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
     )
     longest = max(borders, key=len)[::4, 0] if borders else np.zeros((0, 2))
-    return Line(seen_at(table, longest), "info", closed=True)
+    return Line(seen_at(table, np.asarray(longest, np.float64)), "info", closed=True)
 
 
 def working_area(table: ResamplingTable, shape: tuple[int, int]) -> NDArray[np.bool_]:

@@ -36,7 +36,7 @@ def moving_share(before: Rgb, now: Rgb) -> float:
     sigma = _noise(before, now) * scale
     blocks = _blocks(now) * scale
     change = np.abs(blocks - _blocks(before) * scale)
-    limit = NOISE_SD * np.hypot(sigma / BLOCK_PX, REPEATABILITY * blocks)
+    limit = NOISE_SD * sigma / BLOCK_PX + REPEATABILITY * blocks
     return float((change > limit).any(axis=2).mean())
 
 

@@ -26,7 +26,10 @@ class FocusBar(QWidget):
             tr("Turn the lens until the bar is full and falls on either side"),
         )
         self.share = 0.0
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        policy = QSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        # Stills have no focus to turn to; the picture above must not jump for that.
+        policy.setRetainSizeWhenHidden(True)
+        self.setSizePolicy(policy)
 
     def sizeHint(self) -> QSize:  # noqa: D102
         return QSize(170, 18)

@@ -9,12 +9,13 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from app.live.drawing import ROLE_COLOURS
+from app.live.overlay import Role
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 MARGIN_PX = 6
 # Dashes tell the channels apart without colour, as the letters beside them say.
-CHANNELS = (
+CHANNELS: tuple[tuple[Role, str, Qt.PenStyle], ...] = (
     ("led0", tr("R"), Qt.PenStyle.SolidLine),
     ("led1", tr("G"), Qt.PenStyle.DashLine),
     ("led2", tr("B"), Qt.PenStyle.DotLine),

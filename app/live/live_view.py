@@ -22,9 +22,9 @@ from app.live.picture_checks import (
     BestFocus,
     Rgb,
     channel_histograms,
-    end_of_scale,
     measure_exposure,
     measure_focus,
+    pixel_text,
 )
 from app.live.picture_view import PictureView
 from app.live.tools import PictureTools
@@ -37,6 +37,7 @@ from gelpolight_core.translation import tr
 TICK_MS = 16
 # Words and figures five times a second: faster than they can be read.
 CHECK_S = 0.2
+RATE_S = 0.5
 # One pixel in nine: still a hundred thousand of a small camera.
 CHECK_STRIDE = 3
 NUDGE_PX = 0.2
@@ -103,6 +104,7 @@ class LiveView(QWidget):
         self._overlay = Overlay()
         self._best_focus = BestFocus()
         self._checked_s = -math.inf
+        self._rate_told_s = -math.inf
         self._pointer = (math.nan, math.nan)
         self._shown_frames = 0
         self._tools = PictureTools(self)
@@ -233,6 +235,7 @@ class LiveView(QWidget):
         frame = self._stream.newest.take()
         if frame is not None:
             self._show(frame.rgb)
+        self._tell_rate(self._stream)
 
     def _show(self, rgb: Rgb) -> None:
         resized = self._rgb is None or self._rgb.shape != rgb.shape
@@ -255,17 +258,20 @@ class LiveView(QWidget):
         self._picture.show_rgb(shown)
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
-        thin = np.ascontiguousarray(rgb[::CHECK_STRIDE, ::CHECK_STRIDE])
         self._checks.show_exposure(measure_exposure(rgb))
         self._checks.focus.show_share(self._best_focus.update(measure_focus(rgb), now_s))
         if self._histogram.isVisible():
-            self._histogram.show_counts(channel_histograms(thin))
-        if self._stream is not None:
-            figures = self._stream.figures()
-            self._checks.show_rate(
-                figures.lost
-                or tr("{r:.0f} frames/s, {d} dropped").format(r=figures.rate_hz, d=figures.dropped)
-            )
+            self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
+
+    def _tell_rate(self, stream: StreamLike) -> None:
+        """Tell the rate, or, when frames come no more, why."""
+        now_s = time.monotonic()
+        if now_s - self._rate_told_s < RATE_S:
+            return
+        self._rate_told_s = now_s
+        figures = stream.figures()
+        rate = tr("{r:.0f} frames/s, {d} dropped").format(r=figures.rate_hz, d=figures.dropped)
+        self._checks.show_rate(figures.lost or rate)
 
     def _draw_overlay(self) -> None:
         shown = self._overlay if self._tools.is_on("overlay") else Overlay()
@@ -325,7 +331,7 @@ class LiveView(QWidget):
         radius_step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ControlModifier else NUDGE_PX
         match event.key():
             case Qt.Key.Key_Left | Qt.Key.Key_Right | Qt.Key.Key_Up | Qt.Key.Key_Down:
-                du, dv = _ARROWS[event.key()]
+                du, dv = _ARROWS[Qt.Key(event.key())]
                 handle = move(handle, step * du, step * dv, self._drawing_size())
             case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
                 handle = resize(handle, radius_step)
@@ -364,6 +370,9 @@ class LiveView(QWidget):
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: D102
         super().hideEvent(event)
         self._tick.stop()
+        if self._nudge_end.isActive():
+            self._nudge_end.stop()
+            self._end_nudge()
 
     def _place_histogram(self) -> None:
         corner = self._picture.rect().bottomRight()
@@ -379,20 +388,6 @@ _ARROWS = {
     Qt.Key.Key_Up: (0.0, -1.0),
     Qt.Key.Key_Down: (0.0, 1.0),
 }
-
-
-def pixel_text(rgb: Rgb, u: float, v: float) -> str:
-    """Return the numbers of the pixel at (u, v), empty outside the picture."""
-    rows, columns = rgb.shape[:2]
-    if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
-        return ""
-    column, row = math.floor(u + 0.5), math.floor(v + 0.5)
-    top = end_of_scale(rgb)
-    values = (
-        f"{name} {int(value)} ({100.0 * int(value) / top:.0f} %)"
-        for name, value in zip(("R", "G", "B"), rgb[row, column], strict=True)
-    )
-    return f"u {column}, v {row}:  " + "   ".join(values)
 
 
 def _pictures_folder() -> Path:

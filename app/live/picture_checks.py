@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
 
-Rgb = NDArray[np.uint8] | NDArray[np.uint16]
+Rgb = NDArray[np.uint8] | NDArray[np.uint16]  # or one channel of it
 
 # A twentieth of a percent may be glints and hot pixels, which say nothing of the exposure.
 SATURATED_WARN = 0.0005
@@ -55,8 +56,7 @@ def end_of_scale(rgb: Rgb) -> int:
 
 def brightest_channel(rgb: Rgb) -> Rgb:
     """Return the largest of the three channels at every pixel, (rows, columns)."""
-    red, green, blue = cv2.split(rgb)
-    return np.asarray(cv2.max(cv2.max(red, green), blue))
+    return np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
 
 
 def saturated(rgb: Rgb) -> NDArray[np.uint8]:
@@ -67,7 +67,7 @@ def saturated(rgb: Rgb) -> NDArray[np.uint8]:
     """
     top = end_of_scale(rgb)
     limit = 254 if top == 255 else 0xFEFF
-    return np.asarray(cv2.compare(brightest_channel(rgb), float(limit), cv2.CMP_GT), np.uint8)
+    return (brightest_channel(rgb) > limit).view(np.uint8) * np.uint8(255)
 
 
 def measure_exposure(rgb: Rgb) -> Exposure:
@@ -167,3 +167,17 @@ def channel_histograms(rgb: Rgb, bins: int = 64) -> NDArray[np.int64]:
     return np.stack(
         [np.bincount(rgb[..., k].ravel() >> shift, minlength=bins) for k in range(3)]
     ).astype(np.int64)
+
+
+def pixel_text(rgb: Rgb, u: float, v: float) -> str:
+    """Return the numbers of the pixel at (u, v), empty outside the picture."""
+    rows, columns = rgb.shape[:2]
+    if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
+        return ""
+    column, row = math.floor(u + 0.5), math.floor(v + 0.5)
+    top = end_of_scale(rgb)
+    values = (
+        f"{name} {int(value)} ({100.0 * int(value) / top:.0f} %)"
+        for name, value in zip(("R", "G", "B"), rgb[row, column], strict=True)
+    )
+    return f"u {column}, v {row}:  " + "   ".join(values)

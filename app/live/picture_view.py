@@ -24,6 +24,7 @@ SURROUND = "#15171a"
 # From this magnification on pixels are shown as squares, which is what one zooms in for.
 SQUARES_FROM = 1.5
 LEAST_SHOWN_PX = 6.0
+FARTHEST_PX = 8000.0
 
 
 class PictureView(pg.GraphicsView):  # type: ignore[misc]
@@ -95,13 +96,14 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
             self._size = size
             # Half a pixel: the first pixel's centre, not its corner, is (0, 0).
             self._image.setRect(QRectF(-0.5, -0.5, *size))
+            # Far enough out for full size in any window, not so far that the picture is lost.
+            reach = max(4.0 * max(size), FARTHEST_PX)
             self._box.setLimits(
                 minXRange=LEAST_SHOWN_PX,
-                maxXRange=8.0 * size[0],
-                xMin=-4.0 * size[0],
-                xMax=5.0 * size[0],
-                yMin=-4.0 * size[1],
-                yMax=5.0 * size[1],
+                xMin=-reach,
+                xMax=size[0] + reach,
+                yMin=-reach,
+                yMax=size[1] + reach,
             )
             self.fit()
 
@@ -140,12 +142,17 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         return float(at.x()), float(at.y())
 
     def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
+        if not hasattr(self, "_placeholder"):  # the base class resizes itself while being made
+            super().resizeEvent(event)
+            return
+        scale = self.scale_px
         super().resizeEvent(event)
-        if hasattr(self, "_placeholder"):  # the base class resizes itself while it is being made
-            self._placeholder.setGeometry(self.rect().adjusted(20, 20, -20, -20))
-            if self._fitted:
-                self.fit()
-            self.resized.emit()
+        self._placeholder.setGeometry(self.rect().adjusted(20, 20, -20, -20))
+        if self._fitted:
+            self.fit()
+        else:
+            self._scale_to(scale)
+        self.resized.emit()
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: D102
         super().leaveEvent(event)

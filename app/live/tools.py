@@ -94,7 +94,8 @@ class PictureTools(QWidget):
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_buttons"):
+        changes = (QEvent.Type.PaletteChange, QEvent.Type.StyleChange)
+        if event.type() in changes and hasattr(self, "_buttons"):
             for name, button in self._buttons.items():
                 button.setIcon(self._icon(name))
 

@@ -1,0 +1,442 @@
+"""The live view: what is shown, where, and what a person can do with it."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QColor, QImage, QMouseEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QToolButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.live.drawing import ROLE_COLOURS
+from app.live.live_view import LiveView
+from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay
+from app.live.picture_checks import pixel_text
+from gelpolight_core.errors import InputError
+
+HEIGHT, WIDTH = 60, 80
+
+
+class Slot:
+    """A mailbox of one."""
+
+    def __init__(self) -> None:
+        self.frame: Any = None
+        self.lock = threading.Lock()
+
+    def take(self) -> Any:
+        """Return the frame and empty the slot."""
+        with self.lock:
+            frame, self.frame = self.frame, None
+        return frame
+
+
+class FakeStream:
+    """A stream into which a test puts frames."""
+
+    def __init__(self) -> None:
+        self.newest = Slot()
+        self.lost: str | None = None
+
+    def put(self, rgb: np.ndarray) -> None:
+        """Make `rgb` the newest frame."""
+        self.newest.frame = SimpleNamespace(rgb=rgb, number=1, time_s=0.0)
+
+    def figures(self) -> SimpleNamespace:
+        """Return what a stream tells of itself."""
+        return SimpleNamespace(rate_hz=30.0, made=1, dropped=2, lost=self.lost)
+
+
+@pytest.fixture
+def view(qtbot: QtBot) -> LiveView:
+    """Return a view on the screen."""
+    made = LiveView()
+    qtbot.addWidget(made)
+    made.resize(900, 760)
+    made.show()
+    qtbot.waitExposed(made)
+    return made
+
+
+def black() -> np.ndarray:
+    """Return a black picture."""
+    return np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+
+
+def child(view: LiveView, name: str) -> Any:
+    """Return a part of the view by its object name."""
+    found = view.findChild(QWidget, name)
+    assert found is not None, name
+    return found
+
+
+def pixels(widget: QWidget) -> np.ndarray:
+    """Return what a widget shows, (rows, columns, 3)."""
+    image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+    flat = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+    return flat[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
+
+
+def middle(mask: np.ndarray) -> tuple[float, float]:
+    """Return the centroid (x, y) of true pixels, in points from the first pixel's corner."""
+    rows, columns = np.nonzero(mask)
+    assert rows.size
+    return float(columns.mean() + 0.5), float(rows.mean() + 0.5)
+
+
+def mouse(picture: Any, kind: QEvent.Type, at: tuple[float, float], held: bool) -> None:
+    """Send the picture a mouse event at a place in it, as the window system would."""
+    QTest.qWait(12)  # the scene takes at most a hundred moves a second
+    place = QPointF(*at)
+    left, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
+    button = none if kind == QEvent.Type.MouseMove else left
+    event = QMouseEvent(
+        kind,
+        place,
+        QPointF(picture.viewport().mapToGlobal(place.toPoint())),
+        button,
+        left if held else none,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    QApplication.sendEvent(picture.viewport(), event)
+
+
+def drag(view: LiveView, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """Drag with the left button from one picture point to another, in small steps."""
+    picture = child(view, "live.picture")
+    route = [np.add(start, np.subtract(end, start) * t) for t in np.linspace(0.0, 1.0, 9)]
+    places = [picture.view_position(*point) for point in route]
+    mouse(picture, QEvent.Type.MouseMove, places[0], False)
+    mouse(picture, QEvent.Type.MouseButtonPress, places[0], True)
+    for place in places[1:]:
+        mouse(picture, QEvent.Type.MouseMove, place, True)
+    mouse(picture, QEvent.Type.MouseButtonRelease, places[-1], False)
+    QApplication.processEvents()
+
+
+@pytest.mark.parametrize(("u", "v"), [(0, 0), (7, 5), (WIDTH - 1, HEIGHT - 1)])
+def test_whole_numbers_are_pixel_centres(view: LiveView, u: int, v: int) -> None:
+    """Not their corners: half a pixel would spoil every mark that a person sets."""
+    rgb = black()
+    rgb[v, u] = 255
+    view.show_picture(rgb)
+    picture = child(view, "live.picture")
+    x, y = picture.view_position(u, v)
+    shown = middle(pixels(picture).min(axis=2) > 128)
+    # A picture pixel is ten on the screen; smoothing and rounding leave one.
+    assert shown == pytest.approx((x, y), abs=1.0)
+
+
+@pytest.mark.parametrize("kind", ["cross", "plus", "ring", "dot"])
+def test_a_marker_sits_on_the_centre_of_its_pixel(view: LiveView, kind: Any) -> None:
+    rgb = black()
+    rgb[20, 30] = (60, 60, 60)
+    view.show_picture(rgb)
+    picture = child(view, "live.picture")
+    pixel = middle(pixels(picture)[..., 0] > 50)
+    view.set_overlay(Overlay(markers=(Marker(30.0, 20.0, kind, "good"),)))
+    green = np.array(QColor(ROLE_COLOURS["good"]).getRgb()[:3])
+    marked = (np.abs(pixels(picture).astype(int) - green) < 60).all(axis=2)
+    assert middle(marked) == pytest.approx(pixel, abs=1.0)
+
+
+def test_every_kind_of_mark_shows_and_can_be_switched_off(view: LiveView) -> None:
+    view.show_picture(black())
+    picture = child(view, "live.picture")
+    bare = pixels(picture)
+    area = np.zeros((HEIGHT, WIDTH), bool)
+    area[5:9, 5:9] = True
+    items: dict[str, Any] = {
+        "markers": Marker(40.0, 30.0, "cross", "good", text="1"),
+        "circles": Circle(40.0, 30.0, 12.0, "expected", handle="ball"),
+        "lines": Line(np.array([[5.0, 50.0], [70.0, 50.0], [70.0, 55.0]]), "info", closed=True),
+        "masks": Mask(area, "bad"),
+        "notes": Note("Ball found", "good"),
+    }
+    for kind, item in items.items():
+        view.set_overlay(Overlay(**{kind: (item,)}))
+        assert (pixels(picture) != bare).any(), kind
+    child(view, "live.overlay").click()
+    np.testing.assert_array_equal(pixels(picture), bare)
+    view.set_overlay(Overlay(notes=(Note("later", "bad"),)))
+    np.testing.assert_array_equal(pixels(picture), bare)
+
+
+def test_a_masked_pixel_is_tinted_and_its_neighbours_are_not(view: LiveView) -> None:
+    view.show_picture(black())
+    picture = child(view, "live.picture")
+    area = np.zeros((HEIGHT, WIDTH), bool)
+    area[20, 30] = True
+    view.set_overlay(Overlay(masks=(Mask(area, "bad"),)))
+    shown = pixels(picture)
+    assert middle(shown[..., 0] > 60) == pytest.approx(picture.view_position(30, 20), abs=1.0)
+
+
+def test_a_dragged_circle_tells_where_it_went(view: LiveView, qtbot: QtBot) -> None:
+    view.show_picture(black())
+    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
+    with qtbot.waitSignal(view.moved) as told:
+        drag(view, (40.0, 30.0), (45.0, 26.0))
+    assert told.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (45.0, 26.0, 12.0))]
+
+
+def test_a_dragged_rim_resizes_the_circle(view: LiveView, qtbot: QtBot) -> None:
+    view.show_picture(black())
+    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
+    with qtbot.waitSignal(view.moved) as told:
+        drag(view, (52.0, 30.0), (56.0, 30.0))
+    assert told.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (40.0, 30.0, 16.0))]
+
+
+def test_marks_without_a_handle_let_the_picture_be_moved(view: LiveView, qtbot: QtBot) -> None:
+    view.show_picture(black())
+    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good"),)))
+    picture = child(view, "live.picture")
+    before = picture.view_position(40.0, 30.0)
+    with qtbot.assertNotEmitted(view.moved):
+        drag(view, (40.0, 30.0), (45.0, 30.0))
+    after = picture.view_position(40.0, 30.0)
+    assert after[0] - before[0] == pytest.approx(5.0 * picture.scale_px, rel=0.2)
+
+
+def test_a_newer_result_does_not_tear_a_handle_from_the_hand(view: LiveView) -> None:
+    view.show_picture(black())
+    circle = Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),))
+    view.set_overlay(circle)
+    picture = child(view, "live.picture")
+    places = [picture.view_position(u, 30.0) for u in (40.0, 42.0, 44.0, 46.0)]
+    mouse(picture, QEvent.Type.MouseMove, places[0], False)
+    mouse(picture, QEvent.Type.MouseButtonPress, places[0], True)
+    for place in places[1:]:
+        mouse(picture, QEvent.Type.MouseMove, place, True)
+    view.set_overlay(circle)
+    assert picture.overlay.handles[0].u > 43.0
+    mouse(picture, QEvent.Type.MouseButtonRelease, places[-1], False)
+
+
+def test_arrow_keys_nudge_the_chosen_handle(view: LiveView, qtbot: QtBot) -> None:
+    view.show_picture(black())
+    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
+    qtbot.keyClick(view, Qt.Key.Key_PageDown)
+    with qtbot.waitSignal(view.moved) as told:
+        qtbot.keyClick(view, Qt.Key.Key_Right)
+        qtbot.keyClick(view, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
+        qtbot.keyClick(view, Qt.Key.Key_Plus)
+        qtbot.keyClick(view, Qt.Key.Key_Minus, Qt.KeyboardModifier.ControlModifier)
+    assert told.args == ["ball", *(pytest.approx(x) for x in (40.2, 28.0, 10.2))]
+
+
+def test_hiding_the_view_does_not_lose_a_nudge(view: LiveView, qtbot: QtBot) -> None:
+    view.show_picture(black())
+    view.set_overlay(Overlay(markers=(Marker(5.0, 6.0, "plus", "led0", handle="mirror.0"),)))
+    qtbot.keyClick(view, Qt.Key.Key_PageDown)
+    qtbot.keyClick(view, Qt.Key.Key_Down)
+    with qtbot.waitSignal(view.moved) as told:
+        view.hide()
+    assert told.args == ["mirror.0", 5.0, pytest.approx(6.2), 0.0]
+
+
+def test_the_newest_frame_of_a_stream_is_shown(view: LiveView, qtbot: QtBot) -> None:
+    stream = FakeStream()
+    view.set_stream(stream)
+    rgb = black()
+    rgb[:] = (0, 90, 0)
+    stream.put(rgb)
+    picture = child(view, "live.picture")
+    qtbot.waitUntil(lambda: bool((pixels(picture)[300, 450] == (0, 90, 0)).all()))
+    assert child(view, "live.rate").text() == "30 frames/s, 2 dropped"
+    assert child(view, "live.focus").isVisible()
+
+
+def test_nothing_is_drawn_while_no_frame_comes(view: LiveView, qtbot: QtBot) -> None:
+    stream = FakeStream()
+    view.set_stream(stream)
+    stream.put(black())
+    qtbot.waitUntil(lambda: stream.newest.frame is None)
+    qtbot.wait(50)
+    painted = []
+    item = child(view, "live.picture").overlay
+    paint = item.paint
+    item.paint = lambda *a: (painted.append(1), paint(*a))
+    qtbot.wait(150)
+    assert not painted
+
+
+def test_a_frozen_picture_stays_while_the_stream_goes_on(view: LiveView, qtbot: QtBot) -> None:
+    stream = FakeStream()
+    view.set_stream(stream)
+    stream.put(np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
+    picture = child(view, "live.picture")
+    qtbot.waitUntil(lambda: bool((pixels(picture)[300, 450] == 90).all()))
+    view.freeze(True)
+    stream.put(np.full((HEIGHT, WIDTH, 3), 30, np.uint8))
+    qtbot.wait(80)
+    assert (pixels(picture)[300, 450] == 90).all()
+    view.freeze(False)
+    qtbot.waitUntil(lambda: bool((pixels(picture)[300, 450] == 30).all()))
+
+
+def test_why_the_camera_was_lost_is_told(view: LiveView, qtbot: QtBot) -> None:
+    stream = FakeStream()
+    view.set_stream(stream)
+    stream.put(black())
+    qtbot.waitUntil(lambda: stream.newest.frame is None)
+    stream.lost = "Camera: it was unplugged. Plug it in again."
+    qtbot.waitUntil(lambda: child(view, "live.rate").text() == stream.lost, timeout=3000)
+
+
+def test_without_a_stream_the_view_says_so(view: LiveView) -> None:
+    view.show_picture(black())
+    view.set_stream(None)
+    picture = child(view, "live.picture")
+    words = [label.text() for label in picture.findChildren(QWidget) if hasattr(label, "text")]
+    assert "No camera. Choose a source." in words
+    assert picture.picture_size == (0, 0)
+
+
+def test_stripes_come_and_go_on_a_still(view: LiveView) -> None:
+    view.show_picture(np.full((HEIGHT, WIDTH, 3), 255, np.uint8))
+    picture = child(view, "live.picture")
+    magenta = (255, 0, 255)
+    assert not (pixels(picture) == magenta).all(axis=2).any()
+    view.zebra(True)
+    assert (pixels(picture) == magenta).all(axis=2).mean() > 0.2
+    view.zebra(False)
+    assert not (pixels(picture) == magenta).all(axis=2).any()
+
+
+def test_sixteen_bit_frames_are_shown_and_read_in_their_own_numbers(view: LiveView) -> None:
+    rgb = np.full((HEIGHT, WIDTH, 3), 30000, np.uint16)
+    view.show_picture(rgb)
+    assert (pixels(child(view, "live.picture"))[300, 450] == 30000 >> 8).all()
+    assert pixel_text(rgb, 3.4, 4.6) == (
+        "u 3, v 5:  R 30000 (46 %)   G 30000 (46 %)   B 30000 (46 %)"
+    )
+
+
+def test_the_readout_knows_where_the_picture_ends() -> None:
+    rgb = black()
+    assert pixel_text(rgb, -0.4, HEIGHT - 0.6).startswith(f"u 0, v {HEIGHT - 1}:")
+    for u, v in ((-0.6, 5.0), (5.0, -0.6), (WIDTH - 0.4, 5.0), (5.0, HEIGHT - 0.4)):
+        assert pixel_text(rgb, u, v) == ""
+    assert pixel_text(rgb, float("nan"), float("nan")) == ""
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_a_snapshot_holds_the_very_numbers_and_no_marks(
+    view: LiveView, tmp_path: Path, dtype: type
+) -> None:
+    rgb = np.random.default_rng(1).integers(0, np.iinfo(dtype).max, (HEIGHT, WIDTH, 3), dtype)
+    view.show_picture(rgb)
+    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good"),)))
+    view.zebra(True)
+    path = tmp_path / "shot.png"
+    view.snapshot(path)
+    read = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(read[..., ::-1], rgb)
+
+
+def test_the_snapshot_key_writes_into_the_folder_and_says_where(
+    view: LiveView, qtbot: QtBot, tmp_path: Path
+) -> None:
+    view.snapshot_folder = tmp_path / "pictures"
+    view.show_picture(black())
+    with qtbot.waitSignal(view.saved) as told:
+        child(view, "live.snapshot").click()
+    assert Path(told.args[0]).parent == tmp_path / "pictures"
+    assert Path(told.args[0]).is_file()
+
+
+def test_a_snapshot_of_nothing_is_refused_in_a_sentence(view: LiveView, qtbot: QtBot) -> None:
+    with pytest.raises(InputError, match="Choose a source"):
+        view.snapshot(Path("never.png"))
+    with qtbot.waitSignal(view.refused) as told:
+        child(view, "live.snapshot").click()
+    assert "there is no picture" in told.args[0]
+
+
+def test_fit_full_size_and_double_click(view: LiveView) -> None:
+    view.show_picture(black())
+    picture = child(view, "live.picture")
+    fitted = picture.scale_px
+    assert fitted == pytest.approx(
+        min(picture.width() / WIDTH, picture.height() / HEIGHT), rel=0.02
+    )
+    view.full_size()
+    assert picture.scale_px == pytest.approx(1.0, rel=1e-6)
+    assert child(view, "live.zoom").text() == "100 %"
+    view.resize(700, 600)
+    assert picture.scale_px == pytest.approx(1.0, rel=0.01)
+    place = picture.view_position(20.0, 20.0)
+    mouse(picture, QEvent.Type.MouseButtonDblClick, place, True)
+    mouse(picture, QEvent.Type.MouseButtonRelease, place, False)
+    assert picture.scale_px > 4.0
+    view.full_size()
+    view.fit()
+    assert picture.scale_px > 4.0
+    view.resize(500, 400)
+    QApplication.processEvents()
+    assert picture.scale_px == pytest.approx(
+        min(picture.width() / WIDTH, picture.height() / HEIGHT), rel=0.02
+    )
+
+
+def test_a_click_tells_the_pixel(view: LiveView, qtbot: QtBot) -> None:
+    view.show_picture(black())
+    picture = child(view, "live.picture")
+    place = picture.view_position(33.0, 21.0)
+    with qtbot.waitSignal(view.clicked) as told:
+        mouse(picture, QEvent.Type.MouseButtonPress, place, True)
+        mouse(picture, QEvent.Type.MouseButtonRelease, place, False)
+    assert told.args == [pytest.approx(33.0, abs=0.1), pytest.approx(21.0, abs=0.1)]
+
+
+def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
+    view: LiveView, qtbot: QtBot
+) -> None:
+    view.show_picture(black())
+    view.activateWindow()
+    view.setFocus()
+    qtbot.waitUntil(view.isActiveWindow)
+    buttons = view.findChildren(QToolButton)
+    assert len(buttons) == 7
+    for button in buttons:
+        assert button.objectName().startswith("live.")
+        assert button.accessibleName()
+        assert button.toolTip().endswith(")")
+    for key, name in (
+        (Qt.Key.Key_Z, "zebra"),
+        (Qt.Key.Key_H, "histogram"),
+        (Qt.Key.Key_O, "overlay"),
+    ):
+        before = child(view, f"live.{name}").isChecked()
+        qtbot.keyClick(view, key)
+        assert child(view, f"live.{name}").isChecked() is not before
+    assert child(view, "live.histogram").objectName()
+
+
+def test_tools_follow_the_theme(view: LiveView) -> None:
+    button = child(view, "live.fit")
+    before = button.icon().cacheKey()
+    application = QApplication.instance()
+    usual, sheet = QApplication.palette(), application.styleSheet()
+    palette = QApplication.palette()
+    palette.setColor(palette.ColorRole.ButtonText, QColor("#ff0000"))
+    try:
+        QApplication.setPalette(palette)
+        # Under a style sheet, Qt tells widgets of another palette when the sheet is set anew.
+        application.setStyleSheet(sheet + " ")
+        QApplication.processEvents()
+        assert button.icon().cacheKey() != before
+        assert button.icon().pixmap(20, 20).toImage().pixelColor(3, 3).red() > 200
+    finally:
+        QApplication.setPalette(usual)
+        application.setStyleSheet(sheet)
