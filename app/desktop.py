@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from ctypes.util import find_library
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt
+from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt, QTimer
 from PySide6.QtGui import QGuiApplication, QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
@@ -50,7 +50,7 @@ def run(arguments: Sequence[str] = ()) -> int:
     """
     refuse_without_screen()
     application = make_application()
-    context = make_context(demo="--demo" in arguments)
+    context = make_context()
     crash = context.log.start()
     faults = Faults(context.toasts)
     faults.install()
@@ -59,6 +59,8 @@ def run(arguments: Sequence[str] = ()) -> int:
         window = MainWindow(context=context)
         window.show_page(context.settings.last_page)
         window.show()
+        if "--demo" in arguments:
+            QTimer.singleShot(0, window.begin_demo)  # after the window is up
         if crash:
             context.toasts.show(
                 tr("The program ended in a crash last time; the log says where."),
@@ -133,14 +135,12 @@ def make_application() -> QApplication:
 
 
 def make_context(
-    *, demo: bool = False, settings_file: Path | None = None, log_folder: Path | None = None
+    *, settings_file: Path | None = None, log_folder: Path | None = None
 ) -> AppContext:
     """Return what all pages share.
 
     Parameters
     ----------
-    demo : bool
-        Whether the virtual sensor shall be the source.
     settings_file, log_folder : Path, optional
         Elsewhere than in the user's own folders.
     """
@@ -153,7 +153,6 @@ def make_context(
         source=SourceChoice(),
         requests=Requests(),
         log=Log(log_folder),
-        demo=demo,
     )
 
 
