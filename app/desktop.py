@@ -21,6 +21,7 @@ from app.shell.faults import Faults
 from app.shell.icons import application_icon
 from app.shell.log import Log
 from app.shell.main_window import MainWindow
+from app.shell.preload import Preload
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
@@ -28,6 +29,9 @@ from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
+
+# The first page is drawn and answers before anything heavy is loaded beside it.
+FIRST_LOOK_MS = 300
 
 
 def run(arguments: Sequence[str] = ()) -> int:
@@ -68,7 +72,10 @@ def run(arguments: Sequence[str] = ()) -> int:
                 with_log=True,
             )
         stop_listening = _close_on_signals(window)
+        preload = Preload([*(e.module for e in window.entries.values()), "app.sources.virtual"])
+        QTimer.singleShot(FIRST_LOOK_MS, preload.start)
         status = application.exec()
+        preload.stop()
         stop_listening()
     finally:
         faults.uninstall()

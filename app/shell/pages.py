@@ -42,19 +42,23 @@ class PageEntry:
     factory: str
 
     @property
+    def module(self) -> str:
+        """Name of the page's module."""
+        return self.factory.partition(":")[0]
+
+    @property
     def exists(self) -> bool:
         """Whether the module is there."""
-        module = self.factory.partition(":")[0]
-        parent = module.rpartition(".")[0]
+        parent = self.module.rpartition(".")[0]
         return (
             importlib.util.find_spec(parent) is not None
-            and importlib.util.find_spec(module) is not None
+            and importlib.util.find_spec(self.module) is not None
         )
 
     def make(self, context: AppContext) -> QWidget:
         """Load and make the page."""
-        module, _, name = self.factory.partition(":")
-        page: QWidget = getattr(importlib.import_module(module), name)(context=context)
+        name = self.factory.partition(":")[2]
+        page: QWidget = getattr(importlib.import_module(self.module), name)(context=context)
         return page
 
 
