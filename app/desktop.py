@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from ctypes.util import find_library
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt
+from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt, QTimer
 from PySide6.QtGui import QGuiApplication, QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
@@ -21,6 +21,7 @@ from app.shell.faults import Faults
 from app.shell.icons import application_icon
 from app.shell.log import Log
 from app.shell.main_window import MainWindow
+from app.shell.preload import Preload
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
@@ -28,6 +29,9 @@ from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
+
+# The first page is drawn and answers before anything heavy is loaded beside it.
+FIRST_LOOK_MS = 300
 
 
 def run(arguments: Sequence[str] = ()) -> int:
@@ -50,7 +54,7 @@ def run(arguments: Sequence[str] = ()) -> int:
     """
     refuse_without_screen()
     application = make_application()
-    context = make_context(demo="--demo" in arguments)
+    context = make_context()
     crash = context.log.start()
     faults = Faults(context.toasts)
     faults.install()
@@ -59,6 +63,8 @@ def run(arguments: Sequence[str] = ()) -> int:
         window = MainWindow(context=context)
         window.show_page(context.settings.last_page)
         window.show()
+        if "--demo" in arguments:
+            QTimer.singleShot(0, window.begin_demo)  # after the window is up
         if crash:
             context.toasts.show(
                 tr("The program ended in a crash last time; the log says where."),
@@ -66,7 +72,10 @@ def run(arguments: Sequence[str] = ()) -> int:
                 with_log=True,
             )
         stop_listening = _close_on_signals(window)
+        preload = Preload([*(e.module for e in window.entries.values()), "app.sources.virtual"])
+        QTimer.singleShot(FIRST_LOOK_MS, preload.start)
         status = application.exec()
+        preload.stop()
         stop_listening()
     finally:
         faults.uninstall()
@@ -133,14 +142,12 @@ def make_application() -> QApplication:
 
 
 def make_context(
-    *, demo: bool = False, settings_file: Path | None = None, log_folder: Path | None = None
+    *, settings_file: Path | None = None, log_folder: Path | None = None
 ) -> AppContext:
     """Return what all pages share.
 
     Parameters
     ----------
-    demo : bool
-        Whether the virtual sensor shall be the source.
     settings_file, log_folder : Path, optional
         Elsewhere than in the user's own folders.
     """
@@ -153,7 +160,6 @@ def make_context(
         source=SourceChoice(),
         requests=Requests(),
         log=Log(log_folder),
-        demo=demo,
     )
 
 

@@ -149,7 +149,7 @@ class BenchPanel(QWidget):
         back.clicked.connect(lambda: self._step_pose(-1))
         on.clicked.connect(lambda: self._step_pose(1))
         for button in (back, on):
-            button.setMinimumWidth(0)
+            button.setMaximumWidth(60)  # a narrow dock
         return _row([self._pose, back, on])
 
     def _number(self, key: str, accessible: str, unit: str, step: float) -> QDoubleSpinBox:

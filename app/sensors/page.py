@@ -95,7 +95,7 @@ class SensorsPage(QWidget):
             self,
             "sensors.demo",
             tr("Try the &virtual sensor"),
-            requests.demo.emit,
+            requests.begin_demo.emit,
             icon_name="demo",
             tip=tr("Everything works as with a camera, without one"),
         )

@@ -12,24 +12,45 @@ if TYPE_CHECKING:
     from app.shell.settings import Settings
     from app.shell.status import StatusModel
     from app.shell.toasts import Toasts
+    from app.sources.bench import Bench
     from app.sources.source import SourceInfo
     from app.workspace.workspace import Workspace
 
 
 class SourceChoice(QObject):
-    """The source that is chosen; opening and closing it is the live pages' part."""
+    """The source that is chosen; opening and closing it is the live pages' part.
+
+    Attributes
+    ----------
+    info : SourceInfo or None
+        The source.
+    bench : Bench or None
+        What lies on the virtual sensor; None until that was the source for the first time.
+    """
 
     changed = Signal()
 
     def __init__(self) -> None:
         super().__init__()
         self.info: SourceInfo | None = None
+        self.bench: Bench | None = None
 
     def choose(self, info: SourceInfo | None) -> None:
         """Choose a source, or none."""
         if info is not self.info:
             self.info = info
             self.changed.emit()
+
+    def choose_virtual_sensor(self) -> None:
+        """Choose the virtual sensor; what lies on its bench stays there."""
+        from app.sources.bench import Bench  # heavy: it knows the sensor's optics
+        from app.sources.listing import virtual_sensor
+        from gelpolight_core.design.sensor_design import SensorDesign
+
+        if self.bench is None:
+            self.bench = Bench(SensorDesign())
+        if self.info is None or self.info.kind != "virtual":
+            self.choose(*virtual_sensor(self.bench)())
 
 
 class Requests(QObject):
@@ -39,7 +60,8 @@ class Requests(QObject):
     path = Signal(str, str)  # name, path: show that page and let it open a folder or file
     session = Signal(str)  # folder: calibrate from it, and remember it
     choose_session = Signal()  # the same, with the folder still to be chosen by the person
-    demo = Signal()  # put the virtual sensor in as the source, and begin
+    demo = Signal()  # put the virtual sensor in as the source
+    begin_demo = Signal()  # that, and begin to calibrate it
     library_changed = Signal()  # calibrations were added, removed, validated or put into use
 
 
@@ -54,4 +76,3 @@ class AppContext:
     source: SourceChoice
     requests: Requests
     log: Log
-    demo: bool = False

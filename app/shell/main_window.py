@@ -77,6 +77,8 @@ class MainWindow(QMainWindow):
         requests.path.connect(self.open_path_in)
         requests.session.connect(self.open_session)
         requests.choose_session.connect(self.choose_session)
+        requests.demo.connect(context.source.choose_virtual_sensor)
+        requests.begin_demo.connect(self.begin_demo)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         self._restore_layout()
 
@@ -151,6 +153,17 @@ class MainWindow(QMainWindow):
             _call(self.page(name), "open_path", Path(path))
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
+
+    def begin_demo(self) -> None:
+        """Put the virtual sensor in as the source, and begin to calibrate it where that is there.
+
+        A page that knows how to begin on it (``begin_demo``) is asked to.
+        """
+        self.context.requests.demo.emit()
+        if "calibrate" not in self.entries:
+            return
+        self.show_page("calibrate")
+        _call(self.page("calibrate"), "begin_demo")
 
     # Sessions and files
 

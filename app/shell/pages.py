@@ -21,7 +21,8 @@ class PageEntry:
 
     A page is a QWidget whose class takes the keyword ``context`` (an AppContext). It may have
     ``enter()`` and ``leave()`` (it is shown, it is left), ``may_close() -> bool`` (asked before
-    the window closes) and ``open_path(path)`` (a folder or file was dropped or chosen).
+    the window closes), ``open_path(path)`` (a folder or file was dropped or chosen) and
+    ``begin_demo()`` (begin on the virtual sensor).
 
     Attributes
     ----------
@@ -41,19 +42,23 @@ class PageEntry:
     factory: str
 
     @property
+    def module(self) -> str:
+        """Name of the page's module."""
+        return self.factory.partition(":")[0]
+
+    @property
     def exists(self) -> bool:
         """Whether the module is there."""
-        module = self.factory.partition(":")[0]
-        parent = module.rpartition(".")[0]
+        parent = self.module.rpartition(".")[0]
         return (
             importlib.util.find_spec(parent) is not None
-            and importlib.util.find_spec(module) is not None
+            and importlib.util.find_spec(self.module) is not None
         )
 
     def make(self, context: AppContext) -> QWidget:
         """Load and make the page."""
-        module, _, name = self.factory.partition(":")
-        page: QWidget = getattr(importlib.import_module(module), name)(context=context)
+        name = self.factory.partition(":")[2]
+        page: QWidget = getattr(importlib.import_module(self.module), name)(context=context)
         return page
 
 

@@ -39,14 +39,14 @@ QToolBar#navigation QToolButton:hover {{ background: {button}; }}
 QToolBar#navigation QToolButton:checked {{ background: {base}; border-color: {line};
     font-weight: 600; }}
 QToolBar#navigation QToolButton:focus {{ border-color: {accent}; }}
-QToolButton {{ border: 1px solid {line}; border-radius: 4px; padding: 4px 8px;
+QToolButton {{ border: 1px solid {line}; border-radius: 4px; padding: 4px 5px;
     background: {button}; }}
 QToolBar QToolButton, QToolButton[autoRaise="true"] {{ background: transparent;
     border-color: transparent; }}
 QToolButton:hover {{ background: {alternate}; border-color: {line}; }}
 QToolButton:pressed, QToolButton:checked {{ background: {line}; }}
 QToolButton:disabled {{ color: {disabled}; }}
-QToolButton:focus {{ border: 2px solid {accent}; padding: 3px 7px; }}
+QToolButton:focus {{ border: 2px solid {accent}; padding: 3px 4px; }}
 QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
 """
 

@@ -41,6 +41,9 @@ class Page(QWidget):
     def may_close(self) -> bool:
         return self.closable
 
+    def begin_demo(self) -> None:
+        self.events.append("begin demo")
+
     def open_path(self, path: Path) -> None:
         if path.name == "bad":
             raise InputError("it is bad", where=str(path), advice="Take another")
@@ -315,6 +318,20 @@ def test_everything_that_takes_the_focus_has_a_name(context: AppContext, qtbot: 
         if widget.focusPolicy() & Qt.FocusPolicy.TabFocus and widget.isVisible() and not inner:
             assert widget.objectName(), widget
             assert widget.accessibleName(), widget
+
+
+def test_the_demo_puts_the_virtual_sensor_in_once(window: MainWindow) -> None:
+    source = window.context.source
+    chosen = []
+    source.changed.connect(lambda: chosen.append(source.info))
+    window.begin_demo()
+    bench = source.bench
+    window.context.requests.demo.emit()
+    assert source.bench is bench
+    assert [info.kind for info in chosen] == ["virtual"]
+    assert chosen[0].open().bench is bench
+    assert window.page_name == "calibrate"
+    assert window.page("calibrate").events == ["enter", "begin demo"]
 
 
 def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
