@@ -2,26 +2,117 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
+import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from ctypes.util import find_library
+from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, Qt
+from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt
 from PySide6.QtGui import QGuiApplication, QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
 from app.shell import theme
 from app.shell.context import AppContext, Requests, SourceChoice
+from app.shell.faults import Faults
 from app.shell.icons import application_icon
+from app.shell.log import Log
 from app.shell.main_window import MainWindow
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
 from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+
+def run(arguments: Sequence[str] = ()) -> int:
+    """Show the main window until it is closed.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        ``--demo`` puts the virtual sensor in as the source.
+
+    Returns
+    -------
+    status : int
+        Exit status.
+
+    Raises
+    ------
+    InputError
+        If there is no screen to show a window on.
+    """
+    refuse_without_screen()
+    application = make_application()
+    context = make_context(demo="--demo" in arguments)
+    crash = context.log.start()
+    faults = Faults(context.toasts)
+    faults.install()
+    try:
+        theme.apply(application, context.settings.theme)
+        window = MainWindow(context=context)
+        window.show_page(context.settings.last_page)
+        window.show()
+        if crash:
+            context.toasts.show(
+                tr("The program ended in a crash last time; the log says where."),
+                "warn",
+                with_log=True,
+            )
+        stop_listening = _close_on_signals(window)
+        status = application.exec()
+        stop_listening()
+    finally:
+        faults.uninstall()
+        context.log.stop()
+    return status
+
+
+def refuse_without_screen() -> None:
+    """Refuse in one sentence where Qt would abort: no display, or one that does not answer."""
+    if not sys.platform.startswith("linux") or os.environ.get("QT_QPA_PLATFORM"):
+        return
+    if os.environ.get("WAYLAND_DISPLAY"):
+        return
+    display = os.environ.get("DISPLAY", "")
+    if not display or not _answers(display):
+        raise InputError(
+            tr("there is no screen to show a window on"),
+            where=f"DISPLAY={display}",
+            advice=tr(
+                "Start it on a desktop, use ssh -X, or use the commands, which need no screen "
+                "(gelpolight --help)"
+            ),
+        )
+
+
+def _answers(display: str) -> bool:
+    """Whether an X server takes a connection; True where that cannot be asked."""
+    name = find_library("xcb")
+    if name is None:
+        return True
+    xcb = ctypes.CDLL(name)
+    xcb.xcb_connect.restype = ctypes.c_void_p
+    xcb.xcb_connect.argtypes = [ctypes.c_char_p, ctypes.c_void_p]
+    xcb.xcb_connection_has_error.argtypes = [ctypes.c_void_p]
+    xcb.xcb_disconnect.argtypes = [ctypes.c_void_p]
+    connection = xcb.xcb_connect(display.encode(), None)
+    refused = bool(xcb.xcb_connection_has_error(connection))
+    xcb.xcb_disconnect(connection)
+    return not refused
 
 
 def make_application() -> QApplication:
     """Return the application, made with what must be set before it exists."""
+    before = QApplication.instance()
+    if isinstance(before, QApplication):
+        return before
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(
         Qt.HighDpiScaleFactorRoundingPolicy.PassThrough
     )
@@ -32,7 +123,7 @@ def make_application() -> QApplication:
     surface.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
     surface.setDepthBufferSize(24)
     QSurfaceFormat.setDefaultFormat(surface)
-    application = QApplication.instance() or QApplication(sys.argv[:1])
+    application = QApplication(sys.argv[:1])
     application.setApplicationName(APPLICATION)
     application.setApplicationDisplayName("GelPoLight Studio")
     application.setApplicationVersion(__version__)
@@ -41,9 +132,19 @@ def make_application() -> QApplication:
     return application
 
 
-def make_context(*, demo: bool = False) -> AppContext:
-    """Return what all pages share."""
-    settings = Settings()
+def make_context(
+    *, demo: bool = False, settings_file: Path | None = None, log_folder: Path | None = None
+) -> AppContext:
+    """Return what all pages share.
+
+    Parameters
+    ----------
+    demo : bool
+        Whether the virtual sensor shall be the source.
+    settings_file, log_folder : Path, optional
+        Elsewhere than in the user's own folders.
+    """
+    settings = Settings(settings_file)
     return AppContext(
         settings=settings,
         workspace=Workspace(settings.workspace_folder),
@@ -51,19 +152,32 @@ def make_context(*, demo: bool = False) -> AppContext:
         toasts=Toasts(),
         source=SourceChoice(),
         requests=Requests(),
+        log=Log(log_folder),
         demo=demo,
     )
 
 
-def run(arguments: Sequence[str] = ()) -> int:
-    """Show the main window until it is closed; return the exit status."""
-    application = make_application()
-    context = make_context(demo="--demo" in arguments)
-    theme.apply(application, context.settings.theme)
-    window = MainWindow(context=context)
-    names = list(window.entries)
-    last = context.settings.last_page
-    window.show_page(last if last in names else names[0])
-    window.resize(1280, 800)
-    window.show()
-    return application.exec()
+def _close_on_signals(window: MainWindow) -> Callable[[], None]:
+    """Close the window on Ctrl-C and on the system's request to end; return how to undo that.
+
+    Qt's loop runs no Python by itself: the signal writes into a socket on which Qt listens.
+    """
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    before_fd = signal.set_wakeup_fd(theirs.fileno())
+    before = {
+        number: signal.signal(number, lambda *_: window.close())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    notifier = QSocketNotifier(ours.fileno(), QSocketNotifier.Type.Read)
+    notifier.activated.connect(lambda *_: ours.recv(64))
+
+    def undo() -> None:
+        notifier.setEnabled(False)
+        signal.set_wakeup_fd(before_fd)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        ours.close()
+        theirs.close()
+
+    return undo

@@ -1,8 +1,9 @@
 #!/bin/sh
 # Makes .venv in the checkout: the locked libraries by their hashes, then the project itself, editable.
 #
-#     sh packaging/setup.sh run     what the program needs
-#     sh packaging/setup.sh test    that, and what the checks and tests need
+#     sh packaging/setup.sh run         what the program needs
+#     sh packaging/setup.sh commands    the same without the system libraries of a window, for machines without a screen
+#     sh packaging/setup.sh test        what the program, the checks and the tests need
 #
 # Safe to run again; quick when nothing has changed. PYTHON=/path/to/python chooses another Python.
 # What the system lacks is installed with apt-get, as root or by sudo, and only when it is missing.
@@ -11,10 +12,10 @@ cd "$(dirname "$0")/.."
 
 kind=${1:-run}
 case $kind in
-run) lock=packaging/requirements.lock ;;
+run | commands) lock=packaging/requirements.lock ;;
 test) lock=packaging/requirements-dev.lock ;;
 *)
-    echo "packaging/setup.sh: unknown argument \"$kind\"; use run or test." >&2
+    echo "packaging/setup.sh: unknown argument \"$kind\"; use run, commands or test." >&2
     exit 2
     ;;
 esac
@@ -24,6 +25,29 @@ libraries_stamp=$venv/gelpolight-libraries # "run HASH" or "test HASH": written 
 project_stamp=$venv/gelpolight-project
 trusted_authorities=/etc/ssl/certs/ca-certificates.crt
 step="looking at this machine"
+
+# What Qt's window needs from the system: the library that is looked for, and the Debian package that has it.
+window_libraries="
+libEGL.so.1             libegl1
+libGL.so.1              libgl1
+libOpenGL.so.0          libopengl0
+libdbus-1.so.3          libdbus-1-3
+libfontconfig.so.1      libfontconfig1
+libglib-2.0.so.0        libglib2.0-0
+libX11-xcb.so.1         libx11-xcb1
+libxcb-cursor.so.0      libxcb-cursor0
+libxcb-icccm.so.4       libxcb-icccm4
+libxcb-image.so.0       libxcb-image0
+libxcb-keysyms.so.1     libxcb-keysyms1
+libxcb-randr.so.0       libxcb-randr0
+libxcb-render-util.so.0 libxcb-render-util0
+libxcb-shape.so.0       libxcb-shape0
+libxcb-sync.so.1        libxcb-sync1
+libxcb-xfixes.so.0      libxcb-xfixes0
+libxcb-xinerama.so.0    libxcb-xinerama0
+libxcb-xkb.so.1         libxcb-xkb1
+libxkbcommon-x11.so.0   libxkbcommon-x11-0
+"
 
 explain_failure() {
     [ "$1" -eq 0 ] || echo "The set-up failed while $step: see above. It can be run again as it is." >&2
@@ -82,6 +106,27 @@ install_packages() { # PACKAGE...
     $as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
+# By the libraries, not by the names of packages, which differ between systems.
+missing_for_a_window() {
+    present=$(PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null) || return 0
+    echo "$window_libraries" | while read -r library package; do
+        [ -n "$library" ] || continue
+        case $present in
+        *"$library "*) ;;
+        *) echo "$package" ;;
+        esac
+    done
+}
+
+install_what_windows_need() {
+    # shellcheck disable=SC2046 # names of packages hold no spaces
+    set -- $(missing_for_a_window)
+    if [ "$kind" = test ] && ! command -v Xvfb >/dev/null 2>&1; then
+        set -- "$@" xvfb
+    fi
+    [ $# -eq 0 ] || install_packages "$@"
+}
+
 install_what_the_system_lacks() {
     set --
     if ! makes_environments "$python"; then
@@ -115,6 +160,9 @@ pip() {
 hash_of() { # FILE...: together with where the environment stands, which it cannot survive being moved from
     { pwd -P && cat "$@"; } | sha256sum | cut -d ' ' -f 1
 }
+
+[ "$kind" = commands ] || install_what_windows_need
+[ "$kind" = test ] || kind=run # the same libraries, as far as .venv is concerned
 
 # One set of versions in both locks, so that the test environment also serves the program.
 libraries=$(hash_of packaging/requirements.lock packaging/requirements-dev.lock)

@@ -105,7 +105,7 @@ def test_every_dependency_is_locked() -> None:
         (RUNTIME_LOCK, project["dependencies"]),
         (DEV_LOCK, project["optional-dependencies"]["dev"]),
     ):
-        names = {re.split(r"[<>=!~\[ ]", requirement)[0] for requirement in wanted}
+        names = {re.split(r"[<>=!~\[ ]", requirement)[0].lower() for requirement in wanted}
         assert names <= pins(lock).keys()
 
 

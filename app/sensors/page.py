@@ -1,11 +1,35 @@
-"""The Sensors page."""
+"""The Sensors page: the library at the left, the chosen calibration at the right."""
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from collections.abc import Callable
+from pathlib import Path
 
+from PySide6.QtCore import QItemSelectionModel, QSortFilterProxyModel, Qt, QUrl
+from PySide6.QtGui import QAction, QDesktopServices
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFileDialog,
+    QHeaderView,
+    QSplitter,
+    QStackedWidget,
+    QTableView,
+    QToolBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.sensors.details import Details
+from app.sensors.library_actions import LibraryActions, show_in_use
+from app.sensors.model import LibraryModel
+from app.sensors.welcome import Welcome
+from app.shell.actions import make_action
 from app.shell.context import AppContext
+from app.shell.pages import all_pages
 from app.widgets.naming import named
+from app.workspace.library import Entry
+from app.workspace.workspace import ENDING
+from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.translation import tr
 
 
@@ -15,5 +39,204 @@ class SensorsPage(QWidget):
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
         self._context = context
+        self._library = LibraryActions(context)
         named(self, "sensors", tr("Sensors"))
-        QVBoxLayout(self).addWidget(QLabel(tr("No sensors yet."), self))
+        self._make_actions()
+        self._model = LibraryModel(lambda: context.settings.limits.age_days)
+        self._sorted = QSortFilterProxyModel(self)
+        self._sorted.setSourceModel(self._model)
+        self._sorted.setSortRole(Qt.ItemDataRole.UserRole)
+        self._table = self._build_table()
+        self._details = Details((self.use, self.reveal, self.remove))
+        split = QSplitter(Qt.Orientation.Horizontal, self)
+        split.addWidget(self._table)
+        split.addWidget(self._details)
+        split.setStretchFactor(0, 3)
+        split.setStretchFactor(1, 2)
+        split.setChildrenCollapsible(False)
+        self._stack = QStackedWidget(self)
+        self._stack.addWidget(Welcome(self._ways_to_begin()))
+        self._stack.addWidget(self._build_library(split))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._stack)
+        context.requests.library_changed.connect(self.refresh)
+        self.refresh()
+
+    def _make_actions(self) -> None:
+        requests = self._context.requests
+        self.new = make_action(
+            self,
+            "sensors.new",
+            tr("&New sensor"),
+            lambda: requests.page.emit("calibrate"),
+            keys=("Ctrl+N",),
+            icon_name="add",
+            tip=tr("Calibrate a sensor from its camera"),
+        )
+        self.session = make_action(
+            self,
+            "sensors.session",
+            tr("Open &session folder"),
+            requests.choose_session.emit,
+            icon_name="folder",
+            tip=tr("Calibrate from pictures that were taken before"),
+        )
+        self.import_ = make_action(
+            self,
+            "sensors.import",
+            tr("&Import calibration"),
+            self.choose_calibrations,
+            keys=("Ctrl+I",),
+            icon_name="import",
+            tip=tr("Copy calibration files into the library"),
+        )
+        self.demo = make_action(
+            self,
+            "sensors.demo",
+            tr("Try the &virtual sensor"),
+            requests.demo.emit,
+            icon_name="demo",
+            tip=tr("Everything works as with a camera, without one"),
+        )
+        self.use = make_action(
+            self,
+            "sensors.use",
+            tr("&Use"),
+            lambda: self._with_chosen(self._library.use),
+            keys=("Ctrl+U",),
+            icon_name="use",
+            tip=tr("Measure with this calibration"),
+        )
+        self.reveal = make_action(
+            self,
+            "sensors.reveal",
+            tr("Show in &folder"),
+            lambda: self._with_chosen(lambda entry: _open_folder(entry.path.parent)),
+            icon_name="folder",
+        )
+        self.remove = make_action(
+            self,
+            "sensors.remove",
+            tr("&Remove"),
+            lambda: self._with_chosen(self._library.remove),
+            keys=("Del",),
+            icon_name="remove",
+            tip=tr("Move it to the trash folder of the workspace"),
+        )
+        there = {entry.name for entry in all_pages()}
+        for action in (self.new, self.session, self.demo):
+            action.setVisible("calibrate" in there)
+            action.setEnabled("calibrate" in there)
+
+    def _ways_to_begin(self) -> tuple[QAction, ...]:
+        ways = (self.demo, self.new, self.session, self.import_)
+        return tuple(action for action in ways if action.isEnabled())
+
+    def _build_table(self) -> QTableView:
+        table = named(QTableView(self), "sensors.table", tr("Calibrations"))
+        table.setModel(self._sorted)
+        table.setSortingEnabled(True)
+        table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        table.setAlternatingRowColors(True)
+        table.setShowGrid(False)
+        table.setWordWrap(False)
+        table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        table.setTabKeyNavigation(False)
+        table.verticalHeader().hide()
+        table.verticalHeader().setDefaultSectionSize(30)
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setStretchLastSection(True)
+        header.setHighlightSections(False)
+        table.selectionModel().selectionChanged.connect(self._show_chosen)
+        table.doubleClicked.connect(lambda _: self.use.trigger())
+        return table
+
+    def _build_library(self, split: QSplitter) -> QWidget:
+        bar = named(QToolBar(self), "sensors.bar", tr("Library"))
+        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        for action in (self.new, self.session, self.import_):
+            bar.addAction(action)
+            bar.widgetForAction(action).setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        library = QWidget(self)
+        column = QVBoxLayout(library)
+        column.setContentsMargins(12, 6, 12, 8)
+        column.addWidget(bar)
+        column.addWidget(split, 1)
+        return library
+
+    def enter(self) -> None:
+        """Look at the folder anew: files may have come from elsewhere."""
+        self.refresh()
+
+    def open_path(self, path: Path) -> None:
+        """Import a calibration file and choose it."""
+        place = self._library.import_files([path])
+        if place is not None:
+            self._choose(place)
+
+    def choose_calibrations(self) -> None:
+        """Let the person choose files to import."""
+        settings = self._context.settings
+        names, _ = QFileDialog.getOpenFileNames(
+            self,
+            tr("Import calibrations"),
+            str(settings.last_folder),
+            tr("Calibrations ({pattern})").format(pattern=f"*{ENDING}"),
+        )
+        if names:
+            settings.last_folder = Path(names[0]).parent
+            place = self._library.import_files(Path(name) for name in names)
+            if place is not None:
+                self._choose(place)
+
+    def chosen(self) -> Entry | None:
+        """Return the calibration that is chosen."""
+        rows = self._table.selectionModel().selectedRows()
+        return self._model.entry(self._sorted.mapToSource(rows[0]).row()) if rows else None
+
+    def refresh(self) -> None:
+        """Show what is in the workspace now; what was chosen stays chosen."""
+        chosen = self.chosen()
+        entries = self._library.entries()
+        self._model.set_entries(entries)
+        self._stack.setCurrentIndex(1 if entries else 0)
+        show_in_use(self._context, entries)
+        used = next((entry for entry in entries if entry.in_use), None)
+        known = {entry.path for entry in entries}
+        if chosen is not None and chosen.path in known:
+            self._choose(chosen.path)
+        elif entries:
+            self._choose((used or entries[0]).path)
+        else:
+            self._show_chosen()
+
+    def _choose(self, path: Path) -> None:
+        for row in range(self._sorted.rowCount()):
+            index = self._sorted.index(row, 0)
+            if self._model.entry(self._sorted.mapToSource(index).row()).path == path:
+                self._table.selectionModel().setCurrentIndex(
+                    index,
+                    QItemSelectionModel.SelectionFlag.ClearAndSelect
+                    | QItemSelectionModel.SelectionFlag.Rows,
+                )
+
+    def _show_chosen(self) -> None:
+        entry = self.chosen()
+        self._details.show_entry(entry)
+        self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
+        self.reveal.setEnabled(entry is not None)
+        self.remove.setEnabled(entry is not None)
+
+    def _with_chosen(self, function: Callable[[Entry], None]) -> None:
+        entry = self.chosen()
+        if entry is not None:
+            function(entry)
+
+
+def _open_folder(folder: Path) -> None:
+    make_folder(folder)
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))

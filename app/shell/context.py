@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 
 if TYPE_CHECKING:
+    from app.shell.log import Log
     from app.shell.settings import Settings
     from app.shell.status import StatusModel
     from app.shell.toasts import Toasts
@@ -36,6 +37,9 @@ class Requests(QObject):
 
     page = Signal(str)  # name: show that page
     path = Signal(str, str)  # name, path: show that page and let it open a folder or file
+    session = Signal(str)  # folder: calibrate from it, and remember it
+    choose_session = Signal()  # the same, with the folder still to be chosen by the person
+    demo = Signal()  # put the virtual sensor in as the source, and begin
     library_changed = Signal()  # calibrations were added, removed, validated or put into use
 
 
@@ -49,4 +53,5 @@ class AppContext:
     toasts: Toasts
     source: SourceChoice
     requests: Requests
+    log: Log
     demo: bool = False

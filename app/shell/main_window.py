@@ -6,16 +6,43 @@ from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QAction, QActionGroup, QCloseEvent
-from PySide6.QtWidgets import QMainWindow, QSizePolicy, QStackedWidget, QToolBar, QWidget
+from PySide6.QtGui import (
+    QAction,
+    QActionGroup,
+    QCloseEvent,
+    QDragEnterEvent,
+    QDropEvent,
+    QGuiApplication,
+)
+from PySide6.QtWidgets import (
+    QApplication,
+    QDialog,
+    QFileDialog,
+    QMainWindow,
+    QSizePolicy,
+    QStackedWidget,
+    QToolBar,
+    QWidget,
+)
 
+from app.shell import theme
+from app.shell.about import AboutDialog
 from app.shell.context import AppContext
+from app.shell.dropping import dropped_paths, is_session, sort_dropped
 from app.shell.icons import icon
+from app.shell.log_window import LogWindow
+from app.shell.menus import Menus
 from app.shell.pages import PageEntry, all_pages
+from app.shell.preferences import PreferencesDialog
+from app.shell.shortcuts import ShortcutSheet
 from app.shell.status import StatusLine
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
+
+FIRST_SIZE = QSize(1280, 800)
+# Raised when toolbars change, so that an older layout is not forced onto a newer window.
+LAYOUT_VERSION = 1
 
 
 class MainWindow(QMainWindow):
@@ -34,23 +61,31 @@ class MainWindow(QMainWindow):
         named(self, "main", tr("GelPoLight Studio"))
         self.setWindowTitle(tr("GelPoLight Studio"))
         self.setMinimumSize(800, 560)
+        self.setAcceptDrops(True)
         self.context = context
         self.entries = {entry.name: entry for entry in pages or all_pages()}
         self._made: dict[str, QWidget] = {}
+        self._log_window: LogWindow | None = None
         self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
         self.setCentralWidget(self._stack)
         self.page_actions = self._build_navigation()
+        self.menus = Menus(self)
         self.setStatusBar(StatusLine(context.status))
         context.toasts.attach(self._stack, self.show_log)
-        context.requests.page.connect(self.show_page)
-        context.requests.path.connect(self.open_path_in)
+        requests = context.requests
+        requests.page.connect(self.show_page)
+        requests.path.connect(self.open_path_in)
+        requests.session.connect(self.open_session)
+        requests.choose_session.connect(self.choose_session)
+        QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
+        self._restore_layout()
 
     def _build_navigation(self) -> dict[str, QAction]:
         bar = named(QToolBar(tr("Navigation"), self), "navigation", tr("Navigation"))
         bar.setMovable(False)
+        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
         bar.setIconSize(QSize(28, 28))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
-        bar.toggleViewAction().setEnabled(False)
         group = QActionGroup(self)
         actions = {}
         for number, entry in enumerate(self.entries.values(), start=1):
@@ -70,6 +105,14 @@ class MainWindow(QMainWindow):
         self.addToolBar(Qt.ToolBarArea.LeftToolBarArea, bar)
         return actions
 
+    def _restore_layout(self) -> None:
+        geometry, state = self.context.settings.window_state()
+        if not self.restoreGeometry(geometry):
+            self.resize(FIRST_SIZE)
+        self.restoreState(state, LAYOUT_VERSION)
+
+    # Pages
+
     @property
     def page_name(self) -> str:
         """Name of the page that is shown; empty before the first."""
@@ -85,8 +128,10 @@ class MainWindow(QMainWindow):
         return self._made[name]
 
     def show_page(self, name: str) -> None:
-        """Show a page."""
-        before = self._stack.currentWidget()
+        """Show a page; a name that is not registered is the first page's."""
+        if name not in self.entries:
+            name = next(iter(self.entries))
+        before = self._stack.currentWidget() if self._made else None
         after = self.page(name)
         self.page_actions[name].setChecked(True)
         if after is before:
@@ -107,8 +152,96 @@ class MainWindow(QMainWindow):
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
 
+    # Sessions and files
+
+    def choose_session(self) -> None:
+        """Let the person choose a session folder, and open it."""
+        settings = self.context.settings
+        chosen = QFileDialog.getExistingDirectory(
+            self, tr("Open a session folder"), str(settings.last_folder)
+        )
+        if chosen:
+            self.open_session(Path(chosen))
+
+    def open_session(self, folder: Path | str) -> None:
+        """Calibrate from a session folder, and remember it."""
+        folder = Path(folder)
+        if not is_session(folder):
+            error = InputError(
+                tr("this is no session folder: it holds no session.toml"),
+                where=str(folder),
+                advice=tr("Choose the folder that holds session.toml and the stages' pictures"),
+            )
+            self.context.toasts.show(str(error), "fail")
+            return
+        self.context.settings.last_folder = folder.parent
+        self.context.settings.add_recent_session(folder)
+        self.open_path_in("calibrate", str(folder))
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Take session folders and calibration files."""
+        if sort_dropped(dropped_paths(event.mimeData())):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open the session folder, or add the calibrations to the library."""
+        self.open_dropped(dropped_paths(event.mimeData()))
+        event.acceptProposedAction()
+
+    def open_dropped(self, paths: tuple[Path, ...]) -> None:
+        """Open what was dropped."""
+        dropped = sort_dropped(paths)
+        for path in dropped.calibrations:
+            self.open_path_in("sensors", str(path))
+        for folder in dropped.sessions[:1]:
+            self.open_session(folder)
+        if len(dropped.sessions) > 1:
+            self.context.toasts.show(tr("Only the first session folder was opened."))
+
+    # Dialogs
+
     def show_log(self) -> None:
         """Show the log."""
+        if self._log_window is None:
+            self._log_window = LogWindow(self.context.log, self)
+        self._log_window.show()
+        self._log_window.raise_()
+
+    def show_preferences(self) -> None:
+        """Show the preferences."""
+        dialog = PreferencesDialog(self.context.settings, self)
+        dialog.theme_changed.connect(self.set_theme)
+        dialog.workspace_changed.connect(self._set_workspace)
+        dialog.limits_changed.connect(self.context.requests.library_changed)
+        _show(dialog)
+
+    def show_shortcuts(self) -> None:
+        """Show all shortcuts."""
+        _show(ShortcutSheet(self))
+
+    def show_about(self) -> None:
+        """Show what this program is made of."""
+        _show(AboutDialog(self))
+
+    def set_theme(self, choice: str) -> None:
+        """Show a theme and remember it."""
+        self.context.settings.theme = choice
+        self.menus.themes[choice].setChecked(True)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        theme.apply(application, choice)
+
+    def _follow_desktop(self) -> None:
+        if self.context.settings.theme == "system":
+            self.set_theme("system")
+
+    def _set_workspace(self, folder: str) -> None:
+        self.context.workspace.folder = Path(folder)
+        self.context.requests.library_changed.emit()
+
+    def toggle_full_screen(self) -> None:
+        """Fill the screen, or go back."""
+        self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask the pages, then leave the one that is shown and remember the window."""
@@ -118,12 +251,21 @@ class MainWindow(QMainWindow):
         shown = self._stack.currentWidget()
         if shown is not None:
             _call(shown, "leave")
-        self.context.settings.keep_window_state(self.saveGeometry(), self.saveState())
-        self.context.settings.save()
+        settings = self.context.settings
+        settings.keep_window_state(self.saveGeometry(), self.saveState(LAYOUT_VERSION))
+        settings.save()
         self.context.toasts.clear()
         for page in self._made.values():
             page.close()
+        if self._log_window is not None:
+            self._log_window.close()
         super().closeEvent(event)
+
+
+def _show(dialog: QDialog) -> None:
+    """Show a dialog beside the work, not in its way."""
+    dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    dialog.show()
 
 
 def _call(page: QWidget, method: str, *arguments: Any, default: Any = None) -> Any:

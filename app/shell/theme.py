@@ -34,11 +34,20 @@ QStatusBar QLabel {{ padding: 1px 8px; }}
 QToolBar#navigation {{ background: {alternate}; border: none; border-right: 1px solid {line};
     padding: 6px; spacing: 4px; }}
 QToolBar#navigation QToolButton {{ border: 2px solid transparent; border-radius: 6px;
-    padding: 8px 4px; min-width: 76px; }}
+    padding: 8px 4px; min-width: 76px; background: transparent; }}
 QToolBar#navigation QToolButton:hover {{ background: {button}; }}
 QToolBar#navigation QToolButton:checked {{ background: {base}; border-color: {line};
     font-weight: 600; }}
 QToolBar#navigation QToolButton:focus {{ border-color: {accent}; }}
+QToolButton {{ border: 1px solid {line}; border-radius: 4px; padding: 4px 8px;
+    background: {button}; }}
+QToolBar QToolButton, QToolButton[autoRaise="true"] {{ background: transparent;
+    border-color: transparent; }}
+QToolButton:hover {{ background: {alternate}; border-color: {line}; }}
+QToolButton:pressed, QToolButton:checked {{ background: {line}; }}
+QToolButton:disabled {{ color: {disabled}; }}
+QToolButton:focus {{ border: 2px solid {accent}; padding: 3px 7px; }}
+QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
 """
 
 

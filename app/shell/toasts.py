@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QHBoxLayout,
@@ -39,6 +39,8 @@ WORDS = {"info": tr("Note"), "pass": tr("Done"), "warn": tr("Attention"), "fail"
 class Toast(QWidget):
     """One message with its buttons."""
 
+    gone = Signal()
+
     def __init__(
         self, parent: QWidget, text: str, kind: str, actions: tuple[tuple[str, Callable], ...]
     ) -> None:
@@ -52,6 +54,7 @@ class Toast(QWidget):
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         sign = QLabel(self)
+        self._label.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
         sign.setPixmap(icon(*ICONS[kind]).pixmap(22, 22))
         sign.setAlignment(Qt.AlignmentFlag.AlignTop)
         close = named(QToolButton(self), "toast.close", tr("Close the message"), tr("Close"))
@@ -79,6 +82,16 @@ class Toast(QWidget):
         self._timer.timeout.connect(self.dismiss)
         self._restart()
 
+    def height_for(self, width: int) -> int:
+        """Return the height that the message needs at a width."""
+        layout = self.layout()
+        layout.activate()
+        return (
+            layout.totalHeightForWidth(width)
+            if layout.hasHeightForWidth()
+            else (layout.totalSizeHint().height())
+        )
+
     def again(self) -> None:
         """Count the same message instead of showing it twice."""
         self.times += 1
@@ -93,8 +106,8 @@ class Toast(QWidget):
     def dismiss(self) -> None:
         """Go away."""
         self._timer.stop()
+        self.gone.emit()
         self.hide()
-        self.setParent(None)
         self.deleteLater()
 
     def enterEvent(self, event: QEvent) -> None:
@@ -123,6 +136,7 @@ class Toasts(QObject):
     def __init__(self) -> None:
         super().__init__()
         self._host: QWidget | None = None
+        self._shown: list[Toast] = []
         self._show_log: Callable[[], None] | None = None
 
     def attach(self, host: QWidget, show_log: Callable[[], None]) -> None:
@@ -130,6 +144,7 @@ class Toasts(QObject):
         self._host = host
         self._show_log = show_log
         host.installEventFilter(self)
+        host.destroyed.connect(self._detach)
 
     def show(
         self,
@@ -163,17 +178,25 @@ class Toasts(QObject):
         if with_log and self._show_log is not None:
             actions = (*actions, (tr("Show log"), self._show_log))
         toast = Toast(self._host, text, kind, actions)
-        for old in self.shown()[:-MOST]:
+        toast.gone.connect(lambda: self._forget(toast))
+        self._shown.append(toast)
+        for old in self._shown[:-MOST]:
             old.dismiss()
-        toast.installEventFilter(self)
         toast.show()
         self._place()
 
     def shown(self) -> list[Toast]:
         """Return the messages that are shown, oldest first."""
-        if self._host is None:
-            return []
-        return self._host.findChildren(Toast, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        return list(self._shown)
+
+    def _detach(self) -> None:
+        self._host = None
+        self._shown.clear()
+
+    def _forget(self, toast: Toast) -> None:
+        if toast in self._shown:
+            self._shown.remove(toast)
+            self._place()
 
     def clear(self) -> None:
         """Close all messages."""
@@ -182,7 +205,7 @@ class Toasts(QObject):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Follow the window's size."""
-        if event.type() in (QEvent.Type.Resize, QEvent.Type.Hide):
+        if event.type() == QEvent.Type.Resize:
             self._place()
         return False
 
@@ -192,7 +215,7 @@ class Toasts(QObject):
         width = min(WIDTH, self._host.width() - 2 * MARGIN)
         bottom = self._host.height() - MARGIN
         for toast in reversed(self.shown()):
-            height = max(toast.heightForWidth(width), toast.sizeHint().height())
+            height = toast.height_for(width)
             bottom -= height
             toast.setGeometry(self._host.width() - width - MARGIN, bottom, width, height)
             toast.raise_()

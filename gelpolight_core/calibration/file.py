@@ -11,7 +11,6 @@ import hashlib
 import io
 import json
 import zipfile
-import zlib
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,20 +19,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
-from gelpolight_core.errors import InputError
+from gelpolight_core.calibration.manifest import (
+    FORMAT,
+    MANIFEST,
+    UNREADABLE,
+    VERSION,
+    damaged,
+    missing,
+    read_manifest,
+    read_member,
+    read_quality,
+)
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import MAX_PIXELS, SensorData
-from gelpolight_core.translation import tr
 
-FORMAT = "gelpolight-calibration"
-VERSION = 1
-MANIFEST = "manifest.json"
-MANIFEST_LIMIT = 4_000_000
 NODES_LIMIT = 10_000
 LEAST_BACKGROUND = -0.2
 # A fixed time stamp: the same calibration gives the same bytes.
@@ -84,45 +87,17 @@ def read_calibration(path: Path) -> Calibration:
         calibration has.
     """
     if not path.is_file():
-        raise InputError(
-            tr("there is no such file"),
-            where=str(path),
-            advice=tr("Make one with gelpolight calibrate"),
-        )
+        raise missing(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            manifest = _read_manifest(archive, path)
+            manifest = read_manifest(archive, path)
             arrays = {
                 name: _read_array(archive, name, entry, path)
                 for name, entry in manifest["arrays"].items()
             }
         return _build(manifest, arrays)
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-        OSError,
-        NotImplementedError,
-        RuntimeError,
-        RecursionError,
-        KeyError,
-        IndexError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        ArithmeticError,
-    ) as error:
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, error: Exception) -> InputError:
-    return InputError(
-        tr("the calibration is damaged or is not one ({error})").format(
-            error=str(error).splitlines()[0] if str(error) else type(error).__name__
-        ),
-        where=str(path),
-        advice=tr("Take a copy, or calibrate again from the session"),
-    )
+    except UNREADABLE as error:
+        raise damaged(path, error) from error
 
 
 def _encode(array: NDArray[Any]) -> bytes:
@@ -188,40 +163,6 @@ def _grid_of(c: Calibration) -> dict[str, Any]:
     }
 
 
-def _read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
-    text = _read_member(archive, MANIFEST, MANIFEST_LIMIT)
-    manifest = json.loads(text)
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise ValueError("no calibration manifest")
-    version = manifest.get("version")
-    if type(version) is int and version > VERSION:
-        raise InputError(
-            tr("the calibration has version {v} and this program knows version {k}").format(
-                v=version, k=VERSION
-            ),
-            where=str(path),
-            advice=tr("Use a newer version of GelPoLight Studio"),
-        )
-    if version != VERSION:
-        raise ValueError(f"version {version!r}")
-    stated = _read_member(archive, f"{MANIFEST}.sha256", 64)
-    if hashlib.sha256(text).hexdigest().encode() != stated:
-        raise ValueError("the manifest's checksum is wrong")
-    return manifest
-
-
-def _read_member(archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
-    """Read a member whose declared size is within its limit, before memory is taken."""
-    info = archive.getinfo(name)
-    if info.file_size > limit:
-        raise ValueError(f"{name} declares {info.file_size} bytes")
-    with archive.open(info) as stream:
-        data = stream.read(limit + 1)
-    if len(data) != info.file_size:
-        raise ValueError(f"{name} is cut short")
-    return data
-
-
 def _read_array(
     archive: zipfile.ZipFile, name: str, entry: dict[str, Any], path: Path
 ) -> NDArray[Any]:
@@ -234,7 +175,7 @@ def _read_array(
         count *= n
     if count > 3 * MAX_PIXELS:
         raise ValueError(f"{name} declares {count} values")
-    data = _read_member(archive, f"{name}.npy", count * kind.itemsize + 4096)
+    data = read_member(archive, f"{name}.npy", count * kind.itemsize + 4096)
     if hashlib.sha256(data).hexdigest() != entry["sha256"]:
         raise ValueError(f"the checksum of {name} is wrong")
     array = np.load(io.BytesIO(data), allow_pickle=False)
@@ -265,7 +206,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         factors=arrays["factors"],
         reflectance=_read_reflectance(arrays),
         noise=arrays["noise"],
-        quality={stage: _read_quality(rows) for stage, rows in manifest["quality"].items()},
+        quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
         provenance=Provenance(**manifest["provenance"]),
         full=_read_full(manifest["full"], arrays) if "full" in manifest else None,
     )
@@ -315,12 +256,6 @@ def _read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMo
         misfit=float(entry["misfit"]),
         held_out=(before, after),
         kept=str(entry["kept"]),
-    )
-
-
-def _read_quality(rows: list[dict[str, Any]]) -> QualityTable:
-    return QualityTable(
-        tuple(Figure(**{**row, "verdict": Verdict(row["verdict"])}) for row in rows)
     )
 
 

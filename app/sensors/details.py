@@ -1,0 +1,135 @@
+"""The chosen calibration: where it comes from, how good every stage is, what can be done."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.sensors.model import made_cell
+from app.shell.icons import icon
+from app.widgets.naming import named
+from app.widgets.quality_table import QualityTableWidget, verdict_word
+from app.workspace.library import Entry
+from gelpolight_core.calibration.manifest import CalibrationSummary
+from gelpolight_core.quality import Verdict
+from gelpolight_core.translation import tr
+
+
+class Details(QWidget):
+    """Shows one calibration, or what to do when none is chosen."""
+
+    def __init__(self, actions: tuple[QAction, ...]) -> None:
+        super().__init__()
+        named(self, "sensors.details", tr("Details of the calibration"))
+        self._title = named(QLabel(self), "sensors.details.title", tr("Calibration"))
+        self._facts = named(QLabel(self), "sensors.details.facts", tr("Where it comes from"))
+        for label in (self._title, self._facts):
+            label.setWordWrap(True)
+            label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        buttons = QHBoxLayout()
+        for action in actions:
+            button = named(
+                QToolButton(self), f"{action.objectName()}.button", action.text().replace("&", "")
+            )
+            button.setDefaultAction(action)
+            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        self._area = named(QScrollArea(self), "sensors.details.stages", tr("Quality of the stages"))
+        self._area.setWidgetResizable(True)
+        self._area.setFrameShape(QFrame.Shape.NoFrame)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 0, 0, 0)
+        layout.addWidget(self._title)
+        layout.addWidget(self._facts)
+        layout.addLayout(buttons)
+        layout.addWidget(self._area, 1)
+
+    def show_entry(self, entry: Entry | None) -> None:
+        """Show a calibration, or none."""
+        if entry is None:
+            self._title.setText("")
+            self._facts.setText(tr("Choose a calibration to see how good it is."))
+            self._area.setWidget(QWidget())
+            return
+        self._title.setText(f"<h3>{entry.path.stem}</h3>")
+        if entry.summary is None:
+            self._facts.setText(
+                tr("This file cannot be read: {reason}").format(reason=entry.broken)
+            )
+        else:
+            self._facts.setText(facts(entry, entry.summary))
+        self._area.setWidget(_stages(entry))
+
+
+def _stages(entry: Entry) -> QWidget:
+    """Return the quality tables of all stages, one below the other."""
+    stages = QWidget()
+    column = QVBoxLayout(stages)
+    column.setContentsMargins(0, 0, 8, 0)
+    for stage, table in (entry.summary.quality if entry.summary is not None else {}).items():
+        title = tr(stage).replace("_", " ").capitalize()
+        column.addWidget(_heading(title, table.verdict))
+        shown = QualityTableWidget(f"sensors.quality.{stage}", title, stages)
+        shown.set_table(table)
+        column.addWidget(shown)
+    column.addStretch(1)
+    return stages
+
+
+def _heading(title: str, verdict: Verdict) -> QWidget:
+    heading = QWidget()
+    row = QHBoxLayout(heading)
+    row.setContentsMargins(0, 10, 0, 0)
+    sign = QLabel(heading)
+    sign.setPixmap(icon(verdict.value, verdict.value).pixmap(18, 18))
+    row.addWidget(sign)
+    row.addWidget(QLabel(f"<b>{title}</b>", heading))
+    row.addWidget(QLabel(verdict_word(verdict), heading))
+    row.addStretch(1)
+    return heading
+
+
+def facts(entry: Entry, summary: CalibrationSummary) -> str:
+    """Return where a calibration comes from, and whether it was tried."""
+    width, height = summary.picture_size
+    lines = [
+        tr("Sensor {serial}, model {model}, pictures of {w} x {h} px").format(
+            serial=summary.serial, model=summary.model, w=width, h=height
+        ),
+        tr("Made {when} {who} from session {session}, program {version}").format(
+            when=made_cell(entry).tip or tr("at an unknown time"),
+            who=tr("by {name}").format(name=summary.operator) if summary.operator else "",
+            session=summary.session,
+            version=summary.program_version,
+        ),
+    ]
+    trial = entry.validation
+    if trial is None or entry.validation_note:
+        note = entry.validation_note or tr("press an object of known size before you trust it")
+        lines.append(tr("Not validated: {note}.").format(note=note))
+    else:
+        word = tr("Validated") if trial.passed else tr("Validation failed")
+        lines.append(f"{word}: {trial.indenter}, {trial.when} {trial.who}".rstrip())
+        said = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
+        lines += [
+            said.format(
+                what=c.quantity,
+                a=c.measured_mm,
+                b=c.true_mm,
+                e=c.error_percent,
+                l=c.limit_percent,
+            )
+            for c in trial.comparisons
+        ]
+    return "\n".join(lines)

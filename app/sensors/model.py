@@ -1,0 +1,163 @@
+"""The list of calibrations as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
+
+from app.shell import theme
+from app.shell.icons import icon
+from app.widgets.quality_table import verdict_word
+from app.workspace.library import Entry
+from gelpolight_core.translation import tr
+
+Index = QModelIndex | QPersistentModelIndex
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What one place of the table shows."""
+
+    text: str
+    icon: str = ""
+    role: str = ""
+    tip: str = ""
+    key: Any = ""
+
+
+class LibraryModel(QAbstractTableModel):
+    """One row for each calibration.
+
+    Parameters
+    ----------
+    oldest_days : callable
+        Returns the age beyond which a calibration is marked.
+    """
+
+    TITLES = ("", "Sensor", "Made", "Age", "Verdict", "Validated", "Model", "Identity")
+
+    def __init__(self, oldest_days: Callable[[], float]) -> None:
+        super().__init__()
+        self._oldest_days = oldest_days
+        self._entries: tuple[Entry, ...] = ()
+        self._cells: list[tuple[Cell, ...]] = []
+
+    def set_entries(self, entries: tuple[Entry, ...]) -> None:
+        """Show other calibrations."""
+        now = datetime.now(UTC)
+        self.beginResetModel()
+        self._entries = entries
+        self._cells = [cells_of(entry, now, self._oldest_days()) for entry in entries]
+        self.endResetModel()
+
+    def entry(self, row: int) -> Entry:
+        """Return the calibration of a row."""
+        return self._entries[row]
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008
+        """Return the number of calibrations."""
+        return 0 if parent.isValid() else len(self._entries)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008
+        """Return the number of columns."""
+        return 0 if parent.isValid() else len(self.TITLES)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        """Return a column's title."""
+        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            return self.TITLES[section] and tr(self.TITLES[section])
+        return None
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """Return what a place shows."""
+        cell = self._cells[index.row()][index.column()]
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return cell.text
+            case Qt.ItemDataRole.DecorationRole if cell.icon:
+                return icon(cell.icon, cell.role)
+            case Qt.ItemDataRole.ForegroundRole if cell.role:
+                return theme.colour(cell.role)
+            case Qt.ItemDataRole.ToolTipRole:
+                return cell.tip or None
+            case Qt.ItemDataRole.AccessibleTextRole:
+                return cell.text or cell.tip
+            case Qt.ItemDataRole.UserRole:
+                return cell.key or cell.text
+        return None
+
+
+def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...]:
+    """Return what a calibration's row shows."""
+    if entry.summary is None:
+        nothing = Cell("")
+        return (
+            _in_use(entry),
+            Cell(entry.serial),
+            nothing,
+            nothing,
+            Cell(tr("Broken"), "broken", "fail", entry.broken, key=3),
+            nothing,
+            nothing,
+            Cell(entry.path.name, tip=str(entry.path)),
+        )
+    verdict = entry.summary.verdict
+    return (
+        _in_use(entry),
+        Cell(entry.serial),
+        made_cell(entry),
+        age_cell(entry.age_days(now), oldest_days),
+        Cell(
+            verdict_word(verdict),
+            verdict.value,
+            verdict.value,
+            key=("pass", "warn", "fail").index(verdict.value),
+        ),
+        validated_cell(entry),
+        Cell(entry.summary.model),
+        Cell(entry.summary.identity, tip=str(entry.path)),
+    )
+
+
+def made_cell(entry: Entry) -> Cell:
+    """Return the day on which a calibration was made, with the local time as a tip."""
+    made = entry.created
+    if made is None:
+        return Cell(tr("unknown"), key=0.0)
+    local = made.astimezone()
+    return Cell(f"{local:%Y-%m-%d}", tip=f"{local:%Y-%m-%d %H:%M}", key=made.timestamp())
+
+
+def age_cell(age_days: float | None, oldest_days: float) -> Cell:
+    """Return an age in words, marked when it is beyond the limit."""
+    if age_days is None:
+        return Cell("", key=0.0)
+    if age_days < 1.0:
+        text = tr("today")
+    else:
+        text = tr("{n} d").format(n=int(age_days))
+    if age_days <= oldest_days:
+        return Cell(text, key=age_days)
+    tip = tr("Older than {n:.0f} days: gel hardens and yellows. Validate it, or calibrate again.")
+    return Cell(text, "stale", "stale", tip.format(n=oldest_days), key=age_days)
+
+
+def validated_cell(entry: Entry) -> Cell:
+    """Return whether a calibration was tried on an object of known size."""
+    trial = entry.validation
+    if entry.validated and trial is not None:
+        tip = tr("{what}, {when}").format(what=trial.indenter, when=trial.when)
+        return Cell(tr("Yes"), "validated", "pass", tip, key=2)
+    if trial is not None and not entry.validation_note:
+        return Cell(tr("Failed"), "fail", "fail", trial.indenter, key=1)
+    return Cell(tr("No"), "", "muted", entry.validation_note, key=0)
+
+
+def _in_use(entry: Entry) -> Cell:
+    return Cell("", "use", "accent", tr("In use"), key=1) if entry.in_use else Cell("", key=0)

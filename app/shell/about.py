@@ -1,0 +1,105 @@
+"""About: what this is, the versions of its parts, its licences."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+from PySide6.QtCore import Qt, qVersion
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.shell.icons import application_icon, icon
+from app.widgets.naming import named
+from gelpolight_core import __version__
+from gelpolight_core.translation import tr
+
+PARTS = (
+    "PySide6-Essentials",
+    "pyqtgraph",
+    "numpy",
+    "scipy",
+    "numba",
+    "opencv-contrib-python-headless",
+    "matplotlib",
+    "tifffile",
+    "trimesh",
+    "pyvista",
+    "vtk",
+)
+
+
+def versions() -> tuple[tuple[str, str], ...]:
+    """Return the name and version of the program and of the parts that are installed."""
+    found = [
+        ("GelPoLight Studio", __version__),
+        ("Python", platform.python_version()),
+        ("Qt", qVersion()),
+    ]
+    for part in PARTS:
+        try:
+            found.append((part, version(part)))
+        except PackageNotFoundError:
+            continue  # an optional part
+    found.append((tr("System"), platform.platform()))
+    return tuple(found)
+
+
+class AboutDialog(QDialog):
+    """What a person sends along with a question."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "about", tr("About GelPoLight Studio"))
+        self.setWindowTitle(tr("About GelPoLight Studio"))
+        sign = QLabel(self)
+        sign.setPixmap(application_icon().pixmap(64, 64))
+        title = QLabel(f"<h2>GelPoLight Studio {__version__}</h2>", self)
+        what = QLabel(
+            tr("Calibrates a point-lit tactile sensor, shows its depth map, and measures."), self
+        )
+        what.setWordWrap(True)
+        words = QVBoxLayout()
+        words.addWidget(title)
+        words.addWidget(what)
+        top = QHBoxLayout()
+        top.addWidget(sign, 0, Qt.AlignmentFlag.AlignTop)
+        top.addLayout(words, 1)
+        rows = "".join(
+            f"<tr><td>{name}&nbsp;&nbsp;</td><td>{number}</td></tr>" for name, number in versions()
+        )
+        table = named(QLabel(f"<table>{rows}</table>", self), "about.versions", tr("Versions"))
+        table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        licences = QLabel(
+            tr(
+                "Licence: BSD 3-Clause. Qt and PySide6 are used under the LGPL 3; the other parts "
+                "under BSD, MIT, Apache and PSF licences of their own."
+            ),
+            self,
+        )
+        licences.setWordWrap(True)
+        copy = named(
+            QPushButton(icon("copy"), tr("Copy"), self), "about.copy", tr("Copy the versions")
+        )
+        copy.clicked.connect(self.copy)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        buttons.addButton(copy, QDialogButtonBox.ButtonRole.ActionRole)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.addLayout(top)
+        layout.addWidget(table)
+        layout.addWidget(licences)
+        layout.addWidget(buttons)
+
+    def copy(self) -> None:
+        """Put the versions on the clipboard."""
+        text = "\n".join(f"{name} {number}" for name, number in versions())
+        QGuiApplication.clipboard().setText(text)

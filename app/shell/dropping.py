@@ -1,0 +1,43 @@
+"""What can be dropped onto the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QMimeData
+
+from app.workspace.workspace import ENDING
+
+DESCRIPTION = "session.toml"
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped:
+    """The session folders and the calibration files among what was dropped."""
+
+    sessions: tuple[Path, ...] = ()
+    calibrations: tuple[Path, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Whether there is anything for this program."""
+        return bool(self.sessions or self.calibrations)
+
+
+def is_session(folder: Path) -> bool:
+    """Whether a folder is a session's."""
+    return (folder / DESCRIPTION).is_file()
+
+
+def sort_dropped(paths: tuple[Path, ...]) -> Dropped:
+    """Find session folders and calibrations; ``session.toml`` itself stands for its folder."""
+    sessions = [p.parent if p.name == DESCRIPTION else p for p in paths]
+    return Dropped(
+        sessions=tuple(dict.fromkeys(p for p in sessions if is_session(p))),
+        calibrations=tuple(p for p in paths if p.suffix.lower() == ENDING and p.is_file()),
+    )
+
+
+def dropped_paths(data: QMimeData) -> tuple[Path, ...]:
+    """Return the local files and folders of a drag."""
+    return tuple(Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile())

@@ -1,0 +1,104 @@
+"""The log, to be read and copied."""
+
+from __future__ import annotations
+
+import logging
+
+from PySide6.QtCore import QTimer, QUrl
+from PySide6.QtGui import QCloseEvent, QDesktopServices, QFontDatabase, QGuiApplication, QShowEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDialog,
+    QHBoxLayout,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.shell.icons import icon
+from app.shell.log import KEPT, Log
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+REFRESH_MS = 250
+
+
+class LogWindow(QDialog):
+    """Shows the records of this run, newest last."""
+
+    def __init__(self, log: Log, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._log = log
+        self._seen = 0
+        named(self, "log", tr("Log"))
+        self.setWindowTitle(tr("Log"))
+        self.resize(900, 480)
+        self._levels = named(QComboBox(self), "log.level", tr("Show from this level on"))
+        for label, level in (
+            (tr("Everything"), logging.DEBUG),
+            (tr("Notes and worse"), logging.INFO),
+            (tr("Warnings and worse"), logging.WARNING),
+            (tr("Errors only"), logging.ERROR),
+        ):
+            self._levels.addItem(label, level)
+        self._levels.setCurrentIndex(1)
+        self._levels.currentIndexChanged.connect(self._show_anew)
+        self._text = named(QPlainTextEdit(self), "log.text", tr("Records of the log"))
+        self._text.setReadOnly(True)
+        self._text.setMaximumBlockCount(KEPT)
+        self._text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self._text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        copy = named(QPushButton(icon("copy"), tr("Copy"), self), "log.copy", tr("Copy the log"))
+        copy.clicked.connect(self.copy)
+        folder = named(
+            QPushButton(icon("folder"), tr("Open folder"), self),
+            "log.folder",
+            tr("Open the folder of the log files"),
+            str(log.folder),
+        )
+        folder.clicked.connect(
+            lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log.folder)))
+        )
+        row = QHBoxLayout()
+        row.addWidget(QLabel(tr("Show"), self))
+        row.addWidget(self._levels)
+        row.addStretch(1)
+        row.addWidget(copy)
+        row.addWidget(folder)
+        layout = QVBoxLayout(self)
+        layout.addLayout(row)
+        layout.addWidget(self._text, 1)
+        self._timer = QTimer(self)
+        self._timer.setInterval(REFRESH_MS)
+        self._timer.timeout.connect(self._show_new)
+
+    def copy(self) -> None:
+        """Put what is shown on the clipboard."""
+        QGuiApplication.clipboard().setText(self._text.toPlainText())
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Begin to follow the log."""
+        self._show_new()
+        self._timer.start()
+        super().showEvent(event)
+
+    def hideEvent(self, event: QCloseEvent) -> None:
+        """Follow it no longer."""
+        self._timer.stop()
+        super().hideEvent(event)
+
+    def _show_anew(self) -> None:
+        self._seen = 0
+        self._text.clear()
+        self._show_new()
+
+    def _show_new(self) -> None:
+        records = self._log.recent.since(self._seen)
+        if not records:
+            return
+        self._seen = records[-1].number
+        lines = [r.text for r in records if r.level >= self._levels.currentData()]
+        if lines:
+            self._text.appendPlainText("\n".join(lines))

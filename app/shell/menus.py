@@ -1,0 +1,130 @@
+"""The menus of the main window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu
+
+from app.shell.actions import make_action
+from app.shell.preferences import THEME_NAMES
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from app.shell.main_window import MainWindow
+
+
+class Menus:
+    """Builds the menu bar of a window and keeps what changes in it up to date."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self._window = window
+        self._recent = named(QMenu(tr("Recent sessions"), window), "file.recent", tr("Recent"))
+        self._recent.aboutToShow.connect(self._fill_recent)
+        self.themes = self._build_themes()
+        self._build_file()
+        self._build_view()
+        self._build_help()
+
+    def _build_file(self) -> None:
+        window = self._window
+        menu = window.menuBar().addMenu(tr("&File"))
+        if "calibrate" in window.entries:
+            menu.addAction(
+                make_action(
+                    window,
+                    "file.session",
+                    tr("&Open session folder…"),
+                    window.choose_session,
+                    keys=("Ctrl+O",),
+                    icon_name="folder",
+                )
+            )
+            menu.addMenu(self._recent)
+            menu.addSeparator()
+        menu.addAction(
+            make_action(
+                window,
+                "file.preferences",
+                tr("&Preferences…"),
+                window.show_preferences,
+                keys=("Ctrl+,",),
+            )
+        )
+        menu.addSeparator()
+        menu.addAction(
+            make_action(window, "file.quit", tr("&Quit"), window.close, keys=("Ctrl+Q",))
+        )
+
+    def _build_view(self) -> None:
+        window = self._window
+        menu = window.menuBar().addMenu(tr("&View"))
+        menu.addActions(list(window.page_actions.values()))
+        menu.addSeparator()
+        themes = menu.addMenu(tr("&Theme"))
+        themes.addActions(list(self.themes.values()))
+        menu.addAction(
+            make_action(
+                window,
+                "view.fullscreen",
+                tr("&Full screen"),
+                window.toggle_full_screen,
+                keys=("F11",),
+            )
+        )
+        menu.addAction(
+            make_action(
+                window, "view.log", tr("&Log"), window.show_log, keys=("Ctrl+L",), icon_name="log"
+            )
+        )
+
+    def _build_help(self) -> None:
+        window = self._window
+        menu = window.menuBar().addMenu(tr("&Help"))
+        menu.addAction(
+            make_action(
+                window,
+                "help.shortcuts",
+                tr("&Keyboard shortcuts"),
+                window.show_shortcuts,
+                keys=("F1", "?"),
+            )
+        )
+        menu.addAction(make_action(window, "help.about", tr("&About"), window.show_about))
+
+    def _build_themes(self) -> dict[str, QAction]:
+        group = QActionGroup(self._window)
+        actions = {}
+        for key, label in THEME_NAMES.items():
+            action = make_action(
+                self._window, f"theme.{key}", label, lambda key=key: self._window.set_theme(key)
+            )
+            action.setCheckable(True)
+            action.setChecked(key == self._window.context.settings.theme)
+            group.addAction(action)
+            actions[key] = action
+        return actions
+
+    def _fill_recent(self) -> None:
+        self._recent.clear()
+        sessions = self._window.context.settings.recent_sessions
+        for folder in sessions:
+            action = self._recent.addAction(_short(folder))
+            action.setToolTip(str(folder))
+            action.triggered.connect(
+                lambda _=False, folder=folder: self._window.open_session(folder)
+            )
+        if sessions:
+            self._recent.addSeparator()
+            forget = self._recent.addAction(tr("Forget these"))
+            forget.triggered.connect(self._window.context.settings.forget_recent_sessions)
+        else:
+            self._recent.addAction(tr("None yet")).setEnabled(False)
+
+
+def _short(folder: Path) -> str:
+    """Return a folder's name and its parent's; an ampersand is no mnemonic."""
+    return f"{folder.name}  ({folder.parent})".replace("&", "&&")

@@ -1,0 +1,71 @@
+"""The sheet of shortcuts, made from the actions themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Shortcut:
+    """One line of the sheet."""
+
+    group: str
+    keys: str
+    text: str
+
+
+def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
+    """Return the shortcuts of all named actions in a window, in the order of their groups.
+
+    An action's group is the first part of its object name (``sensors.import``).
+    """
+    found = []
+    for action in window.findChildren(QAction):
+        keys = ", ".join(
+            s.toString(QKeySequence.SequenceFormat.NativeText) for s in action.shortcuts()
+        )
+        if keys and action.objectName() and action.isEnabled():
+            group = action.objectName().partition(".")[0]
+            found.append(Shortcut(group, keys, action.text().replace("&", "").rstrip(".… ")))
+    return tuple(sorted(dict.fromkeys(found), key=lambda s: s.group))
+
+
+class ShortcutSheet(QDialog):
+    """All shortcuts of the window as it is now."""
+
+    def __init__(self, window: QWidget) -> None:
+        super().__init__(window)
+        named(self, "shortcuts", tr("Keyboard shortcuts"))
+        self.setWindowTitle(tr("Keyboard shortcuts"))
+        self.shortcuts = shortcuts_of(window)
+        rows, group = [], ""
+        for shortcut in self.shortcuts:
+            if shortcut.group != group:
+                group = shortcut.group
+                rows.append(f"<tr><td colspan=2><h4>{group.capitalize()}</h4></td></tr>")
+            rows.append(
+                f"<tr><td><b>{shortcut.keys}</b>&nbsp;&nbsp;&nbsp;</td><td>{shortcut.text}</td></tr>"
+            )
+        sheet = named(
+            QLabel(f"<table cellpadding=2>{''.join(rows)}</table>", self),
+            "shortcuts.table",
+            tr("Shortcuts"),
+        )
+        sheet.setAlignment(Qt.AlignmentFlag.AlignTop)
+        sheet.setMargin(8)
+        area = QScrollArea(self)
+        area.setWidget(sheet)
+        area.setWidgetResizable(True)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.addWidget(area)
+        layout.addWidget(buttons)
+        self.resize(420, 520)

@@ -1,0 +1,219 @@
+"""A stage's quality figures: verdict, value, limit, and what to do where one does not pass."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QSizePolicy,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.shell import theme
+from app.shell.actions import make_action
+from app.shell.icons import icon
+from app.widgets.naming import named
+from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.translation import tr
+
+VERDICT_COLUMN, LABEL_COLUMN, VALUE_COLUMN, LIMIT_COLUMN = range(4)
+COLUMNS = 4
+ROW_HEIGHT = 24
+# Rounding alone; no figure's limit is near.
+TINY = 1e-9
+MARGIN = 6
+
+
+def verdict_word(verdict: Verdict) -> str:
+    """Return the word for a verdict."""
+    return {
+        Verdict.PASS: tr("Pass"),
+        Verdict.WARN: tr("Warning"),
+        Verdict.FAIL: tr("Fail"),
+    }[verdict]
+
+
+def value_text(figure: Figure) -> str:
+    """Return a figure's value with its unit; counts without decimals."""
+    if not math.isfinite(figure.value):
+        return tr("unknown")
+    if abs(figure.value) < TINY:
+        number = "0"
+    elif not figure.unit and figure.value == round(figure.value):
+        number = f"{figure.value:.0f}"
+    else:
+        number = f"{figure.value:.3g}" if abs(figure.value) < 1000.0 else f"{figure.value:.0f}"
+    return f"{number} {figure.unit}".rstrip()
+
+
+def limit_text(figure: Figure) -> str:
+    """Return the limit of a figure for passing, such as "≤ 0.3 px"; empty where it has none."""
+    limit = figure.warn_limit if figure.warn_limit is not None else figure.fail_limit
+    if limit is None:
+        return ""
+    sign = "≥" if _higher_is_better(figure, limit) else "≤"
+    return f"{sign} {limit:.4g} {figure.unit}".rstrip()
+
+
+def _higher_is_better(figure: Figure, limit: float) -> bool:
+    warn, fail = figure.warn_limit, figure.fail_limit
+    if warn is not None and fail is not None and warn != fail:
+        return fail < warn
+    beyond = figure.value > limit
+    return beyond if figure.verdict is Verdict.PASS else figure.value < limit
+
+
+class _Grid(QTableWidget):
+    """A table whose copy key copies rows; the view's own copies a single cell."""
+
+    copy_asked = Signal()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Copy, or do what a table does."""
+        if event.matches(QKeySequence.StandardKey.Copy):
+            self.copy_asked.emit()
+        else:
+            super().keyPressEvent(event)
+
+
+class QualityTableWidget(QWidget):
+    """Shows a QualityTable as high as it is; rows are updated in place.
+
+    Parameters
+    ----------
+    name : str
+        Object name, a dotted path.
+    accessible : str
+        What a screen reader says, such as "Quality of the lens".
+    """
+
+    def __init__(self, name: str, accessible: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, name, accessible)
+        self._shown: tuple[tuple[str, bool], ...] = ()
+        self._table = QualityTable()
+        self._grid = named(_Grid(0, COLUMNS, self), f"{name}.table", accessible)
+        # Verdict, figure, value and limit say themselves what they are.
+        self._grid.horizontalHeader().hide()
+        self._grid.verticalHeader().hide()
+        self._grid.setShowGrid(False)
+        self._grid.setWordWrap(True)
+        self._grid.setFrameShape(QTableWidget.Shape.NoFrame)
+        self._grid.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self._grid.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self._grid.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._grid.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._grid.setTabKeyNavigation(False)
+        header = self._grid.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(LABEL_COLUMN, QHeaderView.ResizeMode.Stretch)
+        header.setMinimumSectionSize(80)
+        header.sectionResized.connect(self._fit)
+        self._grid.verticalHeader().setMinimumSectionSize(1)
+        make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
+        self._grid.copy_asked.connect(self.copy)
+        self._grid.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._grid)
+
+    def set_table(self, table: QualityTable) -> None:
+        """Show a table; the same figures stay on their rows, with what was selected."""
+        self._table = table
+        wanted = tuple((f.key, _has_advice(f)) for f in table.figures)
+        if wanted != self._shown:
+            self._shown = wanted
+            self._grid.clearSpans()
+            self._grid.clearContents()
+            self._grid.setRowCount(sum(1 + advice for _, advice in wanted))
+        row = 0
+        for figure in table.figures:
+            self._show_figure(row, figure)
+            row += 1
+            if _has_advice(figure):
+                self._show_advice(row, figure)
+                row += 1
+        self._fit()
+
+    def texts(self) -> list[list[str]]:
+        """Return what the rows say, for copies and tests."""
+        return [self._row_texts(row) for row in range(self._grid.rowCount())]
+
+    def copy(self) -> None:
+        """Put the selected rows, or all of them, on the clipboard."""
+        chosen = sorted({index.row() for index in self._grid.selectedIndexes()})
+        rows = chosen or range(self._grid.rowCount())
+        text = "\n".join("\t".join(self._row_texts(row)).rstrip() for row in rows)
+        QGuiApplication.clipboard().setText(text)
+
+    def _row_texts(self, row: int) -> list[str]:
+        items = [self._grid.item(row, column) for column in range(COLUMNS)]
+        return ["" if item is None else item.text() for item in items]
+
+    def _show_figure(self, row: int, figure: Figure) -> None:
+        verdict = self._item(row, VERDICT_COLUMN)
+        verdict.setText(verdict_word(figure.verdict))
+        verdict.setIcon(icon(figure.verdict.value, figure.verdict.value))
+        verdict.setForeground(theme.colour(figure.verdict.value))
+        label = self._item(row, LABEL_COLUMN)
+        label.setText(figure.label)
+        label.setToolTip(figure.label)
+        for column, text in (
+            (VALUE_COLUMN, value_text(figure)),
+            (LIMIT_COLUMN, limit_text(figure)),
+        ):
+            item = self._item(row, column)
+            item.setText(text)
+            item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self._grid.item(row, LIMIT_COLUMN).setForeground(theme.colour("muted"))
+
+    def _show_advice(self, row: int, figure: Figure) -> None:
+        self._item(row, VERDICT_COLUMN).setText("")
+        self._item(row, LABEL_COLUMN).setText(f"{figure.advice}.")
+        if self._grid.columnSpan(row, LABEL_COLUMN) == 1:
+            self._grid.setSpan(row, LABEL_COLUMN, 1, COLUMNS - LABEL_COLUMN)
+
+    def _item(self, row: int, column: int) -> QTableWidgetItem:
+        item = self._grid.item(row, column)
+        if item is None:
+            item = QTableWidgetItem()
+            self._grid.setItem(row, column, item)
+        return item
+
+    def _fit(self, *_: int) -> None:
+        """Wrap the advice to the width, and be as high as all rows."""
+        columns = range(LABEL_COLUMN, COLUMNS)
+        width = sum(self._grid.columnWidth(column) for column in columns) - 2 * MARGIN
+        metrics = self._grid.fontMetrics()
+        wrap = int(Qt.TextFlag.TextWordWrap)
+        line = max(ROW_HEIGHT, metrics.height() + MARGIN)
+        for row in range(self._grid.rowCount()):
+            item = self._grid.item(row, LABEL_COLUMN)
+            height = line
+            if item is not None and self._grid.columnSpan(row, LABEL_COLUMN) > 1:
+                area = QRect(0, 0, max(width, 50), 10_000)
+                height = metrics.boundingRect(area, wrap, item.text()).height() + MARGIN
+            self._grid.setRowHeight(row, height)
+        self._grid.setFixedHeight(self._grid.verticalHeader().length())
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Take the colours of a new theme."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_grid"):
+            self.set_table(self._table)
+
+    def minimumSizeHint(self) -> QSize:
+        """Return a width at which the label can still be read."""
+        return QSize(360, super().minimumSizeHint().height())
+
+
+def _has_advice(figure: Figure) -> bool:
+    return figure.verdict is not Verdict.PASS and bool(figure.advice)

@@ -1,0 +1,151 @@
+"""What the tests of the desktop program share: own folders, its theme, a watch for leaks."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import threading
+import time
+import traceback
+import weakref
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, QThread, QTimer
+from PySide6.QtWidgets import QApplication, QWidget
+from shiboken6 import isValid
+
+from app.desktop import make_application, make_context
+from app.shell import theme
+from app.shell.context import AppContext
+
+# tqdm's monitor lives as long as the process; numba and its kind start no Python threads.
+LASTING_THREADS = ("TMonitor",)
+GRACE_S = 1.0
+
+
+@pytest.fixture(scope="session")
+def qapp() -> Iterator[QApplication]:
+    """Return the program's own application, in its light theme."""
+    application = make_application()
+    theme.apply(application, "light")
+    yield application
+
+
+@pytest.fixture(autouse=True)
+def _folders_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the tests out of the settings, logs and documents of whoever runs them."""
+    home = tmp_path / "home"
+    for variable, folder in (
+        ("HOME", "."),
+        ("XDG_CONFIG_HOME", "config"),
+        ("XDG_DATA_HOME", "data"),
+        ("XDG_STATE_HOME", "state"),
+        ("XDG_CACHE_HOME", "cache"),
+        ("XDG_DOCUMENTS_DIR", "documents"),
+    ):
+        (home / folder).mkdir(parents=True, exist_ok=True)
+        monkeypatch.setenv(variable, str(home / folder))
+
+
+@pytest.fixture
+def context(qapp: QApplication, tmp_path: Path) -> Iterator[AppContext]:
+    """Return what all pages are given, with an empty workspace in a folder of its own."""
+    made = make_context(settings_file=tmp_path / "desktop.ini", log_folder=tmp_path / "log")
+    made.workspace.folder = tmp_path / "workspace"
+    made.log.start()
+    yield made
+    made.toasts.clear()
+    made.log.stop()
+    assert logging.getLogger().handlers.count(made.log.recent) == 0
+
+
+class _Started:
+    """Objects that were started in a test, each with the line that did it."""
+
+    def __init__(self, running: Callable[[Any], bool]) -> None:
+        self._running = running
+        self._found: list[tuple[weakref.ref[Any], str]] = []
+
+    def watch(self, kind: type, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Note every start of a kind of object."""
+        start = kind.start
+
+        def noted(this: Any, *arguments: Any) -> None:
+            line = traceback.extract_stack(limit=2)[0]
+            self._found.append((weakref.ref(this), f"{line.filename}:{line.lineno} {line.line}"))
+            start(this, *arguments)
+
+        monkeypatch.setattr(kind, "start", noted)
+
+    @property
+    def any(self) -> bool:
+        """Whether anything was started."""
+        return bool(self._found)
+
+    def left(self) -> list[str]:
+        """Return where those were started that still run; stop them."""
+        lines = []
+        for reference, line in self._found:
+            this = reference()
+            if this is not None and isValid(this) and self._running(this):
+                lines.append(line)
+                if isinstance(this, QTimer):
+                    this.stop()
+                else:
+                    this.quit()
+        return list(dict.fromkeys(lines))
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left_behind(qapp: QApplication, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Fail when a test leaves a thread, a timer or a window behind, and name it."""
+    threads_before = set(threading.enumerate())
+    windows_before = QApplication.topLevelWidgets()
+    timers, qthreads = _Started(QTimer.isActive), _Started(QThread.isRunning)
+    timers.watch(QTimer, monkeypatch)
+    qthreads.watch(QThread, monkeypatch)
+    yield
+    _delete_what_was_deleted()
+    # What is only held by a cycle of references is not in use, and goes with it.
+    if _left_windows(windows_before) or timers.any or qthreads.any:
+        gc.collect()
+        _delete_what_was_deleted()
+    problems = [f"timer started at {line}" for line in timers.left()]
+    problems += [f"QThread started at {line}" for line in qthreads.left()]
+    problems += [f"thread {name}" for name in _left_threads(threads_before)]
+    for widget in _left_windows(windows_before):
+        problems.append(f"window {type(widget).__name__} {widget.objectName()!r}")
+        widget.close()
+        widget.deleteLater()
+    _delete_what_was_deleted()
+    if problems:
+        pytest.fail("left behind: " + "; ".join(problems), pytrace=False)
+
+
+def _delete_what_was_deleted() -> None:
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    QCoreApplication.processEvents()
+
+
+def _left_windows(before: list[QWidget]) -> list[QWidget]:
+    return [
+        widget
+        for widget in QApplication.topLevelWidgets()
+        if widget.parent() is None and not any(widget is old for old in before)
+    ]
+
+
+def _left_threads(before: set[threading.Thread]) -> list[str]:
+    end = time.monotonic() + GRACE_S
+    while True:
+        left = [
+            thread.name
+            for thread in threading.enumerate()
+            if thread not in before and type(thread).__name__ not in LASTING_THREADS
+        ]
+        if not left or time.monotonic() > end:
+            return left
+        time.sleep(0.02)

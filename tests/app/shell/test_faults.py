@@ -1,0 +1,114 @@
+"""No fault ends the program in silence, and nobody is shown a traceback."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import qWarning
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from app.shell.context import AppContext
+from app.shell.faults import Faults
+from app.shell.log import CRASHES, Log
+from gelpolight_core.errors import InputError
+
+
+@pytest.fixture
+def faults(context: AppContext, qtbot: QtBot) -> Iterator[Faults]:
+    host = QWidget()
+    qtbot.addWidget(host)
+    context.toasts.attach(host, lambda: None)
+    made = Faults(context.toasts)
+    made.install()
+    yield made
+    made.uninstall()
+
+
+def log_of(context: AppContext) -> str:
+    return "\n".join(record.text for record in context.log.recent.since(0))
+
+
+def test_a_fault_is_told_in_one_sentence_and_the_log_has_the_rest(
+    faults: Faults, context: AppContext
+) -> None:
+    try:
+        {}["lens"]
+    except KeyError as error:
+        sys.excepthook(KeyError, error, error.__traceback__)
+    (toast,) = context.toasts.shown()
+    assert "fault of this program" in toast.text
+    assert "Traceback" not in toast.text
+    assert "Traceback" in log_of(context)
+
+
+def test_what_a_person_can_mend_is_told_as_it_is(faults: Faults, context: AppContext) -> None:
+    error = InputError("the picture is black", where="mirror_01.png", advice="Switch the LEDs on")
+    sys.excepthook(InputError, error, None)
+    assert context.toasts.shown()[0].text == str(error)
+
+
+def test_a_fault_in_a_thread_is_told_too(faults: Faults, context: AppContext, qtbot: QtBot) -> None:
+    def fail() -> None:
+        raise ZeroDivisionError("in the capture thread")
+
+    thread = threading.Thread(target=fail, name="capture")
+    thread.start()
+    thread.join()
+    qtbot.waitUntil(lambda: len(context.toasts.shown()) == 1)
+    assert "in the capture thread" in context.toasts.shown()[0].text
+    assert "capture" in log_of(context)
+
+
+def test_a_fault_while_something_is_cleaned_up_is_told_too(
+    faults: Faults, context: AppContext
+) -> None:
+    class Fails:
+        def __del__(self) -> None:
+            raise ValueError("while it was deleted")
+
+    Fails()
+    assert "while it was deleted" in context.toasts.shown()[0].text
+
+
+def test_a_thousand_faults_of_a_kind_are_one_message(faults: Faults, context: AppContext) -> None:
+    for _ in range(1000):
+        sys.excepthook(ValueError, ValueError("the same again"), None)
+    assert len(context.toasts.shown()) == 1
+
+
+def test_what_qt_complains_of_is_in_the_log(faults: Faults, context: AppContext) -> None:
+    qWarning("a complaint of Qt")
+    assert "a complaint of Qt" in log_of(context)
+    assert not context.toasts.shown()
+
+
+def test_the_hooks_are_given_back(context: AppContext) -> None:
+    before = (sys.excepthook, threading.excepthook, sys.unraisablehook)
+    faults = Faults(context.toasts)
+    faults.install()
+    assert sys.excepthook != before[0]
+    faults.uninstall()
+    assert (sys.excepthook, threading.excepthook, sys.unraisablehook) == before
+
+
+def test_a_crash_of_the_last_run_is_noticed_once(tmp_path) -> None:
+    for expected in (True, False):
+        if expected:
+            (tmp_path / CRASHES).write_text("Fatal Python error: Segmentation fault")
+        log = Log(tmp_path)
+        assert bool(log.start()) is expected
+        log.stop()
+    assert "Segmentation fault" in (tmp_path / "gelpolight.log").read_text()
+
+
+def test_a_log_folder_that_cannot_be_written_is_replaced(tmp_path) -> None:
+    (tmp_path / "file").write_text("")
+    log = Log(tmp_path / "file")
+    log.start()
+    log.stop()
+    assert log.folder != tmp_path / "file"
+    assert (log.folder / "gelpolight.log").is_file()

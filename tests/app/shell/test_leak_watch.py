@@ -1,0 +1,42 @@
+"""The watch of the tests' own conftest can fail, and names what was left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+CONFTEST = Path(__file__).resolve().parents[1] / "conftest.py"
+ROOT = CONFTEST.parents[2]
+LEAKS = {
+    "timer": (
+        "from PySide6.QtCore import QTimer\nKEPT = []\n",
+        "    timer = QTimer()\n    timer.start(1000)\n    KEPT.append(timer)\n",
+        "timer started at*timer.start(1000)",
+    ),
+    "thread": (
+        "import threading\nEND = threading.Event()\n",
+        "    threading.Thread(target=END.wait, args=(5,), name='left-on', daemon=True).start()\n",
+        "thread left-on",
+    ),
+    "window": (
+        "from PySide6.QtWidgets import QWidget\nKEPT = []\n",
+        "    w = QWidget()\n    w.setObjectName('lost')\n    w.show()\n    KEPT.append(w)\n",
+        "window QWidget 'lost'",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", LEAKS)
+def test_what_is_left_behind_is_named(
+    kind: str, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    above, inside, said = LEAKS[kind]
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    pytester.makeconftest(CONFTEST.read_text("utf-8"))
+    pytester.makepyfile(f"{above}\ndef test_leaks():\n{inside}\ndef test_next():\n    pass\n")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-p", "no:xvfb")
+    result.assert_outcomes(passed=2, errors=1)
+    result.stdout.fnmatch_lines([f"*left behind: *{said}*"])

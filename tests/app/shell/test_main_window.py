@@ -1,0 +1,337 @@
+"""The main window: pages, shortcuts, what is remembered, what can be dropped on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.shell.about import AboutDialog, versions
+from app.shell.context import AppContext
+from app.shell.log_window import LogWindow
+from app.shell.main_window import MainWindow
+from app.shell.pages import PageEntry, all_pages
+from app.shell.preferences import PreferencesDialog
+from app.shell.settings import Limits, Settings
+from app.shell.shortcuts import ShortcutSheet, shortcuts_of
+from app.shell.status import Status, status_texts
+from gelpolight_core.errors import InputError
+
+
+class Page(QWidget):
+    """A page that notes what happens to it."""
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        self.events: list[str] = []
+        self.opened: list[Path] = []
+        self.closable = True
+
+    def enter(self) -> None:
+        self.events.append("enter")
+
+    def leave(self) -> None:
+        self.events.append("leave")
+
+    def may_close(self) -> bool:
+        return self.closable
+
+    def open_path(self, path: Path) -> None:
+        if path.name == "bad":
+            raise InputError("it is bad", where=str(path), advice="Take another")
+        self.opened.append(path)
+
+
+class BarePage(QWidget):
+    """A page with none of the methods that a page may have."""
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+
+
+PAGES = (
+    PageEntry("sensors", "Sensors", "sensors", f"{__name__}:Page"),
+    PageEntry("calibrate", "Calibrate", "calibrate", f"{__name__}:Page"),
+    PageEntry("bare", "Bare", "measure", f"{__name__}:BarePage"),
+)
+MakeWindow = Callable[[], MainWindow]
+
+
+@pytest.fixture
+def make_window(context: AppContext, qtbot: QtBot) -> MakeWindow:
+    def make() -> MainWindow:
+        window = MainWindow(context=context, pages=PAGES)
+        qtbot.addWidget(window)
+        window.show_page("sensors")
+        window.show()
+        window.activateWindow()
+        qtbot.waitActive(window)
+        return window
+
+    return make
+
+
+@pytest.fixture
+def window(make_window: MakeWindow) -> MainWindow:
+    return make_window()
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    folder = tmp_path / "session"
+    folder.mkdir()
+    (folder / "session.toml").write_text("")
+    return folder
+
+
+def test_a_page_is_made_when_it_is_first_opened(window: MainWindow) -> None:
+    assert list(window._made) == ["sensors"]
+    window.show_page("calibrate")
+    assert list(window._made) == ["sensors", "calibrate"]
+    assert window.page("calibrate").events == ["enter"]
+    assert window.page("sensors").events == ["enter", "leave"]
+
+
+def test_the_keyboard_reaches_every_page(window: MainWindow, qtbot: QtBot) -> None:
+    qtbot.keyClick(window, Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
+    assert window.page_name == "calibrate"
+    qtbot.keyClick(window, Qt.Key.Key_3, Qt.KeyboardModifier.ControlModifier)
+    assert window.page_name == "bare"
+    qtbot.keyClick(window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
+    assert window.page_name == "sensors"
+
+
+def test_every_registered_page_of_the_program_can_be_made(
+    context: AppContext, qtbot: QtBot
+) -> None:
+    for entry in all_pages():
+        page = entry.make(context)
+        qtbot.addWidget(page)
+        assert page.objectName()
+
+
+def test_a_page_that_is_not_there_is_not_offered() -> None:
+    assert not PageEntry("x", "X", "sensors", "app.no_such_thing.page:X").exists
+    assert not PageEntry("x", "X", "sensors", "app.sensors.no_such_page:X").exists
+
+
+def test_a_page_can_keep_the_window_open(window: MainWindow) -> None:
+    window.page("sensors").closable = False
+    assert not window.close()
+    assert window.isVisible()
+    window.page("sensors").closable = True
+    assert window.close()
+    assert window.page("sensors").events[-1] == "leave"
+
+
+def test_size_and_page_are_remembered(
+    make_window: MakeWindow, context: AppContext, qtbot: QtBot
+) -> None:
+    first = make_window()
+    first.resize(1111, 777)
+    first.show_page("calibrate")
+    first.close()
+    assert Settings(context.settings.path).last_page == "calibrate"
+    assert make_window().size().toTuple() == (1111, 777)
+
+
+def test_a_settings_file_of_nonsense_harms_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "desktop.ini"
+    path.write_text(
+        "[General]\ntheme=purple\nlast_page=@Variant(x)\nrecent_sessions=\n"
+        "[limits]\nage_days=minus one\nheight_percent=-3\nsize_percent=nan\n"
+        "[window]\ngeometry=7\n"
+    )
+    settings = Settings(path)
+    assert settings.theme == "system"
+    assert settings.limits == Limits()
+    assert settings.recent_sessions == ()
+    assert settings.window_state()[0].isEmpty()
+
+
+def test_settings_survive(tmp_path: Path) -> None:
+    settings = Settings(tmp_path / "desktop.ini")
+    settings.theme = "dark"
+    settings.limits = Limits(age_days=12.0, height_percent=3.0, size_percent=2.0)
+    settings.workspace_folder = tmp_path / "my, sensors; and=more"
+    for number in range(12):
+        settings.add_recent_session(tmp_path / f"session {number}")
+    settings.save()
+    again = Settings(tmp_path / "desktop.ini")
+    assert again.theme == "dark"
+    assert again.limits == Limits(12.0, 3.0, 2.0)
+    assert again.workspace_folder == settings.workspace_folder
+    assert again.recent_sessions[0] == tmp_path / "session 11"
+    assert len(again.recent_sessions) == 8
+
+
+def drop_on(window: MainWindow, *paths: Path) -> bool:
+    """Drag files over the window and drop them there; return whether they were taken."""
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
+    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    entering = QDragEnterEvent(QPoint(5, 5), Qt.DropAction.CopyAction, data, left, none)
+    entering.setAccepted(False)
+    QApplication.sendEvent(window, entering)
+    if entering.isAccepted():
+        dropping = QDropEvent(QPointF(5, 5), Qt.DropAction.CopyAction, data, left, none)
+        QApplication.sendEvent(window, dropping)
+    return entering.isAccepted()
+
+
+def test_a_dropped_session_is_calibrated(window: MainWindow, session: Path) -> None:
+    assert drop_on(window, session)
+    assert window.page_name == "calibrate"
+    assert window.page("calibrate").opened == [session]
+    assert window.context.settings.recent_sessions == (session,)
+
+
+def test_its_description_stands_for_the_session(window: MainWindow, session: Path) -> None:
+    assert drop_on(window, session / "session.toml")
+    assert window.page("calibrate").opened == [session]
+
+
+def test_dropped_calibrations_go_to_the_library(window: MainWindow, tmp_path: Path) -> None:
+    files = [tmp_path / "a.gplcal", tmp_path / "b.GPLCAL"]
+    for file in files:
+        file.touch()
+    assert drop_on(window, *files)
+    assert window.page_name == "sensors"
+    assert window.page("sensors").opened == files
+
+
+def test_other_files_are_not_taken(window: MainWindow, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").touch()
+    assert not drop_on(window, tmp_path / "notes.txt")
+    assert not drop_on(window, tmp_path)
+
+
+def test_a_folder_that_is_no_session_is_refused_in_a_sentence(
+    window: MainWindow, tmp_path: Path
+) -> None:
+    window.open_session(tmp_path)
+    assert "session.toml" in window.context.toasts.shown()[0].text
+    assert window.page_name == "sensors"
+    assert window.context.settings.recent_sessions == ()
+
+
+def test_what_a_page_refuses_is_told(window: MainWindow) -> None:
+    window.open_path_in("calibrate", "/nowhere/bad")
+    assert "it is bad" in window.context.toasts.shown()[0].text
+
+
+def test_recent_sessions_can_be_opened_and_forgotten(window: MainWindow, session: Path) -> None:
+    window.open_session(session)
+    menu = window.menus._recent
+    menu.aboutToShow.emit()
+    menu.actions()[0].trigger()
+    assert window.page("calibrate").opened == [session, session]
+    next(a for a in menu.actions() if a.text() == "Forget these").trigger()
+    assert window.context.settings.recent_sessions == ()
+
+
+def dialog_of(window: MainWindow, kind: type) -> QWidget:
+    (dialog,) = [w for w in window.findChildren(kind) if w.isVisible()]
+    return dialog
+
+
+def test_the_shortcut_sheet_lists_every_shortcut_once(window: MainWindow, qtbot: QtBot) -> None:
+    qtbot.keyClick(window, Qt.Key.Key_F1)
+    sheet = dialog_of(window, ShortcutSheet)
+    shown = sheet.findChild(QLabel, "shortcuts.table").text()
+    assert all(keys in shown for keys in ("Ctrl+1", "Ctrl+2", "Ctrl+O", "Ctrl+L", "F1"))
+    assert len(sheet.shortcuts) == len(set(sheet.shortcuts))
+    sheet.close()
+
+
+def test_no_two_actions_share_a_shortcut(context: AppContext, qtbot: QtBot) -> None:
+    """Qt runs neither of two actions with the same keys."""
+    window = MainWindow(context=context)
+    qtbot.addWidget(window)
+    for name in window.entries:
+        window.page(name)
+    keys: dict[str, str] = {}
+    for action in window.findChildren(QAction):
+        if action.shortcutContext() != Qt.ShortcutContext.WindowShortcut:
+            continue
+        for sequence in action.shortcuts():
+            other = keys.setdefault(sequence.toString(), action.objectName())
+            assert other == action.objectName()
+    assert shortcuts_of(window)
+
+
+def test_the_log_window_follows_the_log_and_filters(window: MainWindow, qtbot: QtBot) -> None:
+    window.context.toasts.show("a note")
+    window.context.toasts.show("a problem", "fail")
+    window.show_log()
+    log = dialog_of(window, LogWindow)
+    assert "a note" in log._text.toPlainText()
+    log._levels.setCurrentIndex(3)
+    assert "a note" not in log._text.toPlainText()
+    window.context.toasts.show("another problem", "fail")
+    qtbot.waitUntil(lambda: "another problem" in log._text.toPlainText(), timeout=2000)
+    log.copy()
+    assert "another problem" in QApplication.clipboard().text()
+
+
+def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> None:
+    window.show_preferences()
+    dialog = dialog_of(window, PreferencesDialog)
+    asked = []
+    window.context.requests.library_changed.connect(lambda: asked.append(1))
+    dialog._limits["age_days"].setValue(7)
+    assert window.context.settings.limits.age_days == 7.0
+    dialog._folder.setText(str(tmp_path / "elsewhere"))
+    dialog._folder.editingFinished.emit()
+    assert window.context.workspace.folder == tmp_path / "elsewhere"
+    assert len(asked) == 2
+    dialog._folder.setText("not/absolute")
+    dialog._folder.editingFinished.emit()
+    assert dialog._folder.text() == str(tmp_path / "elsewhere")
+    dialog.close()
+
+
+def test_about_names_the_parts(window: MainWindow) -> None:
+    window.show_about()
+    dialog = dialog_of(window, AboutDialog)
+    dialog.copy()
+    assert {"Python", "Qt", "numpy"} <= {name for name, _ in versions()}
+    assert "PySide6" in QApplication.clipboard().text()
+    dialog.close()
+
+
+def test_everything_that_takes_the_focus_has_a_name(context: AppContext, qtbot: QtBot) -> None:
+    window = MainWindow(context=context)
+    qtbot.addWidget(window)
+    window.show_page("sensors")
+    window.show()
+    for widget in window.findChildren(QWidget):
+        inner = widget.objectName().startswith("qt_") or type(widget) is QWidget
+        if widget.focusPolicy() & Qt.FocusPolicy.TabFocus and widget.isVisible() and not inner:
+            assert widget.objectName(), widget
+            assert widget.accessibleName(), widget
+
+
+def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
+    assert status_texts(Status())["camera"] == "No camera"
+    window.context.status.update(
+        camera="Virtual sensor",
+        rate_hz=29.97,
+        processing_ms=10.66,
+        dropped=3,
+        calibration="A-001-123456789abc",
+        calibration_note="not validated",
+    )
+    bar = window.statusBar()
+    said = {label.objectName(): label.text() for label in bar.findChildren(QLabel)}
+    assert said["main.status.rate"] == "30.0 fps"
+    assert said["main.status.processing"] == "10.7 ms"
+    assert said["main.status.dropped"] == "3 dropped"
+    assert "not validated" in said["main.status.calibration"]
+    with pytest.raises(TypeError):
+        window.context.status.update(speed=1)

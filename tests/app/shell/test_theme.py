@@ -1,0 +1,94 @@
+"""Texts can be read in both themes, and icons follow the theme."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
+
+from app.shell import theme
+from app.shell.icons import FOLDER, icon
+
+READABLE = 4.5  # WCAG 2, level AA, for texts of ordinary size
+MARK = 3.0  # the same for what is no text: frames of focus, icons
+THEMES = pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+TEXTS = ("text", "muted", "accent", "pass", "warn", "fail", "stale")
+GROUNDS = ("window", "base", "alternate")
+
+
+def pair(one: str, other: str, dark: bool) -> float:
+    return theme.contrast(QColor(theme.COLOURS[one][dark]), QColor(theme.COLOURS[other][dark]))
+
+
+@THEMES
+@pytest.mark.parametrize(("text", "ground"), list(product(TEXTS, GROUNDS)))
+def test_every_text_can_be_read_on_every_ground(text: str, ground: str, dark: bool) -> None:
+    assert pair(text, ground, dark) >= READABLE
+
+
+@THEMES
+def test_buttons_selections_and_tips_can_be_read(dark: bool) -> None:
+    assert pair("text", "button", dark) >= READABLE
+    assert pair("highlighted", "highlight", dark) >= READABLE
+    assert pair("text", "tip", dark) >= READABLE
+
+
+@THEMES
+@pytest.mark.parametrize("ground", [*GROUNDS, "button"])
+def test_the_focus_frame_stands_out(ground: str, dark: bool) -> None:
+    assert pair("accent", ground, dark) >= MARK
+
+
+def test_contrast_is_that_of_the_guideline() -> None:
+    """Black on white is 21:1; mid grey #777777 on white is the known near miss, 4.48:1."""
+    assert theme.contrast(QColor("black"), QColor("white")) == pytest.approx(21.0)
+    assert theme.contrast(QColor("#777777"), QColor("white")) == pytest.approx(4.48, abs=0.005)
+
+
+@pytest.fixture
+def light_again(qapp: QApplication):
+    yield
+    theme.apply(qapp, "light")
+
+
+def test_colours_with_a_meaning_follow_the_theme(qapp: QApplication, light_again: None) -> None:
+    theme.apply(qapp, "dark")
+    assert theme.is_dark()
+    assert theme.colour("pass") == QColor(theme.COLOURS["pass"][True])
+    theme.apply(qapp, "light")
+    assert not theme.is_dark()
+    assert theme.colour("pass") == QColor(theme.COLOURS["pass"][False])
+
+
+def test_an_icon_made_before_follows_the_theme(qapp: QApplication, light_again: None) -> None:
+    drawn = icon("pass", "pass")
+
+    def darkest() -> int:
+        image = drawn.pixmap(32, 32).toImage()
+        inked = [image.pixelColor(x, y) for x in range(32) for y in range(32)]
+        return min(c.lightness() for c in inked if c.alpha() > 200)
+
+    light = darkest()
+    theme.apply(qapp, "dark")
+    assert darkest() > light + 50
+
+
+@pytest.mark.parametrize("name", sorted(p.stem for p in FOLDER.glob("*.svg")))
+def test_every_icon_draws_something(name: str, qapp: QApplication) -> None:
+    image = icon(name).pixmap(24, 24).toImage()
+    assert any(image.pixelColor(x, y).alpha() for x in range(24) for y in range(24))
+
+
+def test_an_icon_that_does_not_exist_is_told_at_once(qapp: QApplication) -> None:
+    with pytest.raises(FileNotFoundError):
+        icon("no-such-icon")
+
+
+def test_disabled_text_differs_from_enabled(qapp: QApplication) -> None:
+    for dark in (False, True):
+        palette = theme.palette_for(dark)
+        assert palette.color(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Text) != (
+            palette.color(QPalette.ColorGroup.Active, QPalette.ColorRole.Text)
+        )

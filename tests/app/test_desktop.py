@@ -1,0 +1,99 @@
+"""Starting the desktop program, as a person does."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from app import desktop
+from app.command_line.main import MENDABLE, main
+from gelpolight_core.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[2]
+# What a technician waits for without wondering; measured: 0.5 s on two cores.
+START_S = 2.0
+
+STARTED = """
+import sys, time
+began = time.monotonic()
+from PySide6.QtCore import QTimer
+from app import desktop
+from app.shell.main_window import MainWindow
+
+def look():
+    heavy = {"scipy", "numba", "cv2", "matplotlib"} & set(sys.modules)
+    print(time.monotonic() - began, sorted(heavy))
+    sys.stdout.flush()
+    if "--stay" not in sys.argv:
+        from PySide6.QtWidgets import QApplication
+        [w.close() for w in QApplication.topLevelWidgets()]
+
+shown = MainWindow.showEvent
+MainWindow.showEvent = lambda self, event: (shown(self, event), QTimer.singleShot(0, look))
+sys.exit(desktop.run([]))
+"""
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", STARTED, *arguments],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_the_window_is_up_before_the_numerical_libraries() -> None:
+    process = start()
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    seconds, heavy = out.split(maxsplit=1)
+    assert heavy.strip() == "[]"
+    # Generous: other work may share this machine; the libraries' absence is the sharper check.
+    assert float(seconds) < 5 * START_S
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
+def test_a_request_to_end_closes_the_window_and_keeps_its_settings(
+    number: signal.Signals, tmp_path: Path
+) -> None:
+    process = start("--stay")
+    assert process.stdout is not None
+    assert process.stdout.readline()
+    time.sleep(0.2)
+    process.send_signal(number)
+    assert process.wait(timeout=10) == 0
+    process.communicate()
+    settings = list(Path(os.environ["XDG_CONFIG_HOME"]).rglob("desktop.ini"))
+    assert len(settings) == 1
+    assert "geometry" in settings[0].read_text()
+
+
+@pytest.mark.parametrize(("given", "demo"), [([], []), (["--demo"], ["--demo"])])
+def test_without_a_command_the_window_opens(
+    given: list[str], demo: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    monkeypatch.setattr(desktop, "run", lambda arguments: asked.append(arguments) or 0)
+    assert main(given) == 0
+    assert asked == [demo]
+
+
+@pytest.mark.parametrize("display", ["", ":987"], ids=["none", "dead"])
+def test_without_a_screen_one_sentence_says_what_to_do(
+    display: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
+    with pytest.raises(InputError):
+        desktop.refuse_without_screen()
+    assert main([]) == MENDABLE
+    assert "no screen" in capsys.readouterr().err

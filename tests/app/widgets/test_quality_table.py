@@ -1,0 +1,145 @@
+"""The quality table: verdict in words and signs, advice where it is needed, no jumping."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.shell import theme
+from app.widgets.quality_table import QualityTableWidget, limit_text, value_text
+from gelpolight_core.quality import Figure, QualityTable, judge
+
+RMS = {"unit": "px", "warn": 0.3, "fail": 1.0, "advice": "Focus the camera"}
+VIEWS = {"warn": 8, "fail": 4, "advice": "Capture more views", "higher_is_better": True}
+
+
+def table(rms: float, views: float) -> QualityTable:
+    return QualityTable(
+        (
+            judge("rms", "Reprojection error", rms, **RMS),
+            judge("views", "Views used", views, **VIEWS),
+        )
+    )
+
+
+@pytest.fixture
+def widget(qtbot: QtBot) -> QualityTableWidget:
+    made = QualityTableWidget("test.quality", "Quality of the lens")
+    qtbot.addWidget(made)
+    made.resize(500, 200)
+    made.show()
+    return made
+
+
+def test_what_passes_needs_no_advice(widget: QualityTableWidget) -> None:
+    widget.set_table(table(0.0182, 16))
+    assert widget.texts() == [
+        ["Pass", "Reprojection error", "0.0182 px", "≤ 0.3 px"],
+        ["Pass", "Views used", "16", "≥ 8"],
+    ]
+
+
+def test_what_does_not_pass_says_what_to_do(widget: QualityTableWidget) -> None:
+    widget.set_table(table(0.5, 2))
+    assert [row[:2] for row in widget.texts()] == [
+        ["Warning", "Reprojection error"],
+        ["", "Focus the camera."],
+        ["Fail", "Views used"],
+        ["", "Capture more views."],
+    ]
+
+
+def test_verdicts_have_a_sign_beside_the_word(widget: QualityTableWidget) -> None:
+    widget.set_table(table(0.5, 2))
+    assert not widget._grid.item(0, 0).icon().isNull()
+    assert widget._grid.item(0, 0).foreground().color() == theme.colour("warn")
+
+
+def test_new_values_leave_selection_and_items_where_they_are(widget: QualityTableWidget) -> None:
+    widget.set_table(table(0.2, 16))
+    widget._grid.selectRow(1)
+    item, height = widget._grid.item(0, 2), widget._grid.height()
+    widget.set_table(table(0.1, 15))
+    assert widget._grid.item(0, 2) is item
+    assert item.text() == "0.1 px"
+    assert widget._grid.height() == height
+    assert {index.row() for index in widget._grid.selectedIndexes()} == {1}
+
+
+def test_a_table_shrinks_and_grows(widget: QualityTableWidget) -> None:
+    widget.set_table(table(0.5, 2))
+    tall = widget._grid.height()
+    widget.set_table(table(0.1, 16))
+    assert widget._grid.height() < tall
+    widget.set_table(QualityTable())
+    assert widget.texts() == []
+    widget.set_table(table(0.5, 2))
+    assert widget._grid.height() == tall
+    assert len(widget.texts()) == 4
+
+
+def test_all_rows_are_visible_without_scrolling(widget: QualityTableWidget) -> None:
+    widget.set_table(table(0.5, 2))
+    grid = widget._grid
+    last = grid.visualItemRect(grid.item(grid.rowCount() - 1, 1))
+    assert last.bottom() <= grid.viewport().height()
+
+
+def test_rows_can_be_copied_by_the_keyboard(widget: QualityTableWidget, qtbot: QtBot) -> None:
+    widget.set_table(table(0.2, 16))
+    widget.copy()
+    assert QApplication.clipboard().text().splitlines() == [
+        "Pass\tReprojection error\t0.2 px\t≤ 0.3 px",
+        "Pass\tViews used\t16\t≥ 8",
+    ]
+    widget.activateWindow()
+    qtbot.waitActive(widget)
+    widget._grid.setFocus()
+    widget._grid.selectRow(1)
+    qtbot.keyClick(widget._grid, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    assert QApplication.clipboard().text() == "Pass\tViews used\t16\t≥ 8"
+
+
+def test_colours_follow_the_theme(widget: QualityTableWidget, qapp: QApplication) -> None:
+    widget.set_table(table(0.2, 16))
+    theme.apply(qapp, "dark")
+    dark = widget._grid.item(0, 0).foreground().color()
+    theme.apply(qapp, "light")
+    assert dark != widget._grid.item(0, 0).foreground().color() == theme.colour("pass")
+
+
+def figure(value: float, **limits: object) -> Figure:
+    return judge("key", "Label", value, **limits)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("shown", "said"),
+    [
+        (figure(math.nan), "unknown"),
+        (figure(16.0), "16"),
+        (figure(1.41e-16, unit="deg"), "0 deg"),
+        (figure(12345.6, unit="px"), "12346 px"),
+        (figure(0.00483, unit="%"), "0.00483 %"),
+    ],
+)
+def test_values_read_as_a_person_writes_them(shown: Figure, said: str) -> None:
+    assert value_text(shown) == said
+
+
+@pytest.mark.parametrize(
+    ("shown", "said"),
+    [
+        (figure(1.0), ""),
+        (figure(1.0, unit="mm", fail=2.0), "≤ 2 mm"),
+        (figure(3.0, warn=2.0), "≤ 2"),
+        (figure(3.0, warn=2.0, higher_is_better=True), "≥ 2"),
+        (figure(1.0, warn=2.0, higher_is_better=True), "≥ 2"),
+        (figure(2.0, warn=2.0), "≤ 2"),
+    ],
+)
+def test_limits_say_on_which_side_is_good(shown: Figure, said: str) -> None:
+    assert limit_text(shown) == said

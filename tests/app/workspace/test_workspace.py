@@ -1,0 +1,274 @@
+"""The workspace: nothing is lost, nothing broken is hidden, nothing untried counts as validated."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+import scene
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.workspace.library import parse_time, read_entry
+from app.workspace.validation import (
+    Comparison,
+    Validation,
+    read_validation,
+    validation_path,
+    write_validation,
+)
+from app.workspace.workspace import Workspace, folder_name
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.errors import InputError
+
+GOOD = Comparison("height", 1.02, 1.0, 8.0)
+BAD = Comparison("diameter", 5.6, 5.0, 5.0)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a calibration file somewhere else."""
+    path = tmp_path_factory.mktemp("elsewhere") / "made here.gplcal"
+    write_calibration(scene.calibration(), path)
+    return path
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return Workspace(tmp_path / "workspace")
+
+
+def trial(path: Path, *comparisons: Comparison) -> Validation:
+    return Validation(
+        read_summary(path).identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", comparisons
+    )
+
+
+def test_an_imported_calibration_is_kept_with_its_sensor(
+    workspace: Workspace, source: Path
+) -> None:
+    place = workspace.import_calibration(source)
+    assert place.parent == workspace.sensor_folder(read_summary(source).serial)
+    assert place.read_bytes() == source.read_bytes()
+    (entry,) = workspace.entries()
+    assert entry.path == place
+    assert not entry.broken
+    assert not entry.validated
+
+
+def test_the_same_calibration_is_kept_once(workspace: Workspace, source: Path) -> None:
+    assert workspace.import_calibration(source) == workspace.import_calibration(source)
+    assert len(workspace.entries()) == 1
+
+
+def test_another_of_the_same_name_takes_no_place(
+    workspace: Workspace, source: Path, tmp_path: Path
+) -> None:
+    first = workspace.import_calibration(source)
+    old = scene.calibration()
+    other = replace(old, provenance=replace(old.provenance, created="2020-01-01T00:00:00+00:00"))
+    write_calibration(other, tmp_path / source.name)
+    second = workspace.import_calibration(tmp_path / source.name)
+    assert second != first
+    assert [e.path for e in workspace.entries()] == [first, second]  # newest first
+
+
+def test_a_broken_file_is_listed_with_its_reason(workspace: Workspace, source: Path) -> None:
+    place = workspace.import_calibration(source)
+    place.with_name("half.gplcal").write_bytes(source.read_bytes()[:500])
+    place.with_name("folder.gplcal").mkdir()
+    entries = {entry.path.name: entry for entry in workspace.entries()}
+    assert set(entries) == {place.name, "half.gplcal", "folder.gplcal"}
+    assert "damaged" in entries["half.gplcal"].broken
+    assert entries["half.gplcal"].serial == place.parent.name
+    assert not entries["half.gplcal"].validated
+
+
+def test_a_broken_file_is_not_imported(workspace: Workspace, source: Path, tmp_path: Path) -> None:
+    (tmp_path / "half.gplcal").write_bytes(source.read_bytes()[:500])
+    with pytest.raises(InputError):
+        workspace.import_calibration(tmp_path / "half.gplcal")
+    assert workspace.entries() == ()
+
+
+def test_a_removed_calibration_can_be_had_back(workspace: Workspace, source: Path) -> None:
+    place = workspace.import_calibration(source)
+    write_validation(trial(place, GOOD), place)
+    workspace.use(place)
+    before = workspace.entries()
+    removal = workspace.remove(place)
+    assert workspace.entries() == ()
+    assert workspace.in_use is None
+    workspace.restore(removal)
+    assert workspace.entries() == before
+    assert workspace.in_use == place
+    assert not list((workspace.folder / "trash").iterdir())
+
+
+def test_a_place_that_was_taken_meanwhile_is_not_overwritten(
+    workspace: Workspace, source: Path
+) -> None:
+    place = workspace.import_calibration(source)
+    removal = workspace.remove(place)
+    place.write_text("something new")
+    with pytest.raises(InputError, match="taken its place"):
+        workspace.restore(removal)
+    assert place.read_text() == "something new"
+
+
+def test_only_files_of_the_library_are_used_or_removed(workspace: Workspace, source: Path) -> None:
+    workspace.import_calibration(source)
+    for action in (workspace.use, workspace.remove):
+        with pytest.raises(InputError, match="not in the library"):
+            action(source)
+    assert source.is_file()
+
+
+def test_the_choice_is_forgotten_with_its_file(workspace: Workspace, source: Path) -> None:
+    place = workspace.import_calibration(source)
+    workspace.use(place)
+    assert [entry.in_use for entry in workspace.entries()] == [True]
+    assert Workspace(workspace.folder).in_use == place
+    place.unlink()
+    assert workspace.in_use is None
+
+
+@pytest.mark.parametrize("text", ["", "nonsense", "[]", '{"in_use": 7}', '{"in_use": null}'])
+def test_a_damaged_choice_is_no_choice(workspace: Workspace, text: str) -> None:
+    workspace.folder.mkdir()
+    (workspace.folder / "workspace.json").write_text(text)
+    assert workspace.in_use is None
+
+
+def test_the_folder_can_be_moved(workspace: Workspace, source: Path, tmp_path: Path) -> None:
+    place = workspace.import_calibration(source)
+    workspace.use(place)
+    moved = Workspace(tmp_path / "moved")
+    shutil.move(workspace.folder, moved.folder)
+    assert moved.in_use == moved.folder / place.relative_to(workspace.folder)
+
+
+def test_an_absent_workspace_is_empty(workspace: Workspace) -> None:
+    assert workspace.entries() == ()
+    assert not workspace.folder.exists()
+
+
+@given(st.text(max_size=200))
+def test_every_serial_has_a_folder_of_its_own_inside(serial: str) -> None:
+    name = folder_name(serial)
+    assert name not in ("", ".", "..")
+    assert "/" not in name
+    assert Path("a") / name != Path("a")
+
+
+def test_a_new_calibration_takes_a_free_place(workspace: Workspace) -> None:
+    first = workspace.calibration_path("A/001", "calibrated today")
+    assert first.parent.is_dir()
+    first.touch()
+    assert workspace.calibration_path("A/001", "calibrated today") not in (first, first.parent)
+
+
+def test_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
+    place = workspace.import_calibration(source)
+    write_validation(trial(place, GOOD), place)
+    assert read_validation(place) == trial(place, GOOD)
+    assert read_entry(place).validated
+
+
+def test_a_trial_comes_along_on_import(workspace: Workspace, source: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.gplcal"
+    shutil.copy(source, copy)
+    write_validation(trial(copy, GOOD), copy)
+    assert read_entry(workspace.import_calibration(copy)).validated
+
+
+@pytest.mark.parametrize("comparisons", [(BAD,), (GOOD, BAD), ()], ids=["bad", "one bad", "none"])
+def test_a_failed_or_empty_trial_does_not_validate(
+    workspace: Workspace, source: Path, comparisons: tuple[Comparison, ...]
+) -> None:
+    place = workspace.import_calibration(source)
+    write_validation(trial(place, *comparisons), place)
+    entry = read_entry(place)
+    assert entry.validation is not None
+    assert not entry.validated
+
+
+def test_a_trial_of_another_calibration_does_not_validate(
+    workspace: Workspace, source: Path
+) -> None:
+    place = workspace.import_calibration(source)
+    write_validation(replace(trial(place, GOOD), identity="another"), place)
+    entry = read_entry(place)
+    assert not entry.validated
+    assert "another calibration" in entry.validation_note
+
+
+def forge_passed(path: Path) -> None:
+    content = json.loads(path.read_text())
+    content["passed"] = True
+    path.write_text(json.dumps(content))
+
+
+def test_a_verdict_that_its_lengths_do_not_bear_out_is_refused(
+    workspace: Workspace, source: Path
+) -> None:
+    place = workspace.import_calibration(source)
+    write_validation(trial(place, BAD), place)
+    forge_passed(validation_path(place))
+    with pytest.raises(InputError, match="does not agree"):
+        read_validation(place)
+    entry = read_entry(place)
+    assert not entry.validated
+    assert not entry.broken
+    assert "does not agree" in entry.validation_note
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"version": 2},
+        {"version": "1"},
+        {"format": "x"},
+        {"identity": 3},
+        {"comparisons": [{"quantity": "height"}]},
+        {"comparisons": [{"quantity": "h", "measured_mm": 1, "true_mm": 0, "limit_percent": 5}]},
+        {"comparisons": 5},
+    ],
+    ids=str,
+)
+def test_a_damaged_trial_is_refused(
+    workspace: Workspace, source: Path, change: dict[str, object]
+) -> None:
+    place = workspace.import_calibration(source)
+    path = write_validation(trial(place, GOOD), place)
+    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
+    with pytest.raises(InputError):
+        read_validation(place)
+
+
+@given(st.binary(max_size=60))
+def test_a_trial_of_any_bytes_is_refused_or_absent(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    calibration = tmp_path_factory.mktemp("bytes") / "c.gplcal"
+    validation_path(calibration).write_bytes(content)
+    with pytest.raises(InputError):
+        read_validation(calibration)
+
+
+def test_age_is_counted_in_days(workspace: Workspace, source: Path) -> None:
+    entry = read_entry(workspace.import_calibration(source))
+    made = entry.created
+    assert made is not None
+    assert entry.age_days(made + timedelta(days=12)) == pytest.approx(12.0)
+    assert entry.age_days(made - timedelta(days=1)) == 0.0
+
+
+def test_times_without_a_zone_are_utc_and_nonsense_is_unknown() -> None:
+    assert parse_time("2026-01-02T03:04:05") == datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+    assert parse_time("yesterday") is None
