@@ -31,7 +31,6 @@ from app.sources.source import Frame
 from app.sources.stream import Stream, StreamFigures
 from app.sources.virtual import VirtualSource
 
-WARM_UP_S = 10.0
 TICK_MS = 10
 DRAG_MS = 33
 ROUND_S = 8.0  # half of it the object is dragged, then it lies still
@@ -230,6 +229,8 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--minutes", type=float, default=1.0)
+    # The first depth map of a machine compiles the kernels, which can take a minute.
+    parser.add_argument("--warm-up", type=float, default=10.0, help="seconds not measured")
     parser.add_argument("--calibration", type=Path, help="make depth maps with it")
     parser.add_argument("--still", action="store_true", help="nothing is dragged")
     parser.add_argument("--picture", type=Path, help="file for a picture of the window at the end")
@@ -239,8 +240,8 @@ def main() -> None:
     theme.apply(application, "light")
     measurement = Measurement(options.calibration, drag=not options.still)
     measurement.start()
-    QTimer.singleShot(int(1e3 * WARM_UP_S), measurement.begin)
-    QTimer.singleShot(int(1e3 * (WARM_UP_S + 60.0 * options.minutes)), application.quit)
+    QTimer.singleShot(int(1e3 * options.warm_up), measurement.begin)
+    QTimer.singleShot(int(1e3 * (options.warm_up + 60.0 * options.minutes)), application.quit)
     application.exec()
     measurement.tell()
     if options.picture is not None:

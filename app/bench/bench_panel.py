@@ -13,10 +13,10 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QSizePolicy,
     QSlider,
     QSpinBox,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -142,14 +142,13 @@ class BenchPanel(QWidget):
     def _make_pose_row(self) -> QWidget:
         self._pose = named(QSpinBox(), "bench.pose", tr("Pose of the checkerboard"))
         self._pose.valueChanged.connect(lambda number: self._show_pose(number - 1))
-        back = named(
-            QPushButton(tr("Back")), "bench.previous_pose", tr("Previous pose of the checkerboard")
-        )
-        on = named(QPushButton(tr("Next")), "bench.next_pose", tr("Next pose of the checkerboard"))
+        back, on = QToolButton(), QToolButton()
+        back.setText(tr("Back"))
+        on.setText(tr("Next"))
+        named(back, "bench.previous_pose", tr("Previous pose of the checkerboard"))
+        named(on, "bench.next_pose", tr("Next pose of the checkerboard"))
         back.clicked.connect(lambda: self._step_pose(-1))
         on.clicked.connect(lambda: self._step_pose(1))
-        for button in (back, on):
-            button.setMaximumWidth(60)  # a narrow dock
         return _row([self._pose, back, on])
 
     def _number(self, key: str, accessible: str, unit: str, step: float) -> QDoubleSpinBox:

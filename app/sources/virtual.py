@@ -66,6 +66,7 @@ class VirtualSource:
         self._developed: _Developed | None = None
         self._closed = threading.Event()
         self._next_number, self._due_s = 0, math.nan
+        self._noise_seed = 0
 
     def open(self) -> None:
         """Begin to render; the first frame comes when the first picture is there."""
@@ -73,6 +74,8 @@ class VirtualSource:
         if self._renderer is None:
             self._closed.clear()
             self._renderer = Renderer(self.bench)
+            # As with a camera, no two captures are alike, however often it is opened.
+            self._noise_seed = time.monotonic_ns()
             self._next_number, self._due_s = 0, math.nan
 
     def frame(self, timeout_s: float) -> Frame | None:
@@ -87,12 +90,13 @@ class VirtualSource:
         rendering = renderer.newest(timeout_s)
         if rendering is None or not self._wait_until_due(limit_s):
             return None
+        # Before the bench is looked at: what is changed later, this frame does not show.
+        now = time.monotonic()
         conditions, wanted = self.bench.conditions, self.bench.seen
         self._refuse_if_stopped(conditions)
         rendering = renderer.newest(0.0) or rendering
         number = self._advance(_period_s(conditions))
         developed = self._develop(rendering, conditions)
-        now = time.monotonic()
         settled = rendering.exact and rendering.scene == wanted
         return Frame(developed.make(number), number, now, settled)
 
@@ -157,7 +161,7 @@ class VirtualSource:
         return self._developed
 
     def _maker(self, signal: NDArray[np.float64], conditions: Conditions) -> Callable[[int], Rgb]:
-        camera, seed = self.bench.design.camera, self.bench.seed
+        camera, seed = self.bench.design.camera, self._noise_seed
         depth = camera.bit_depth
         full = 2.0**depth - 1.0
         if conditions.noise == 0.0:
@@ -169,7 +173,7 @@ class VirtualSource:
             camera, gain=_amplification(conditions), scale=conditions.noise
         )
         level = np.maximum(full * signal, 0.0).astype(np.float32)
-        return lambda number: noisy(level, noise, seed=(seed << 40) + number, bit_depth=depth)
+        return lambda number: noisy(level, noise, seed=seed + number, bit_depth=depth)
 
 
 def _amplification(conditions: Conditions) -> float:

@@ -14,9 +14,9 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
-    QPushButton,
     QSlider,
     QSpinBox,
+    QToolButton,
     QWidget,
 )
 from shiboken6 import isValid
@@ -101,10 +101,10 @@ def test_poses_are_stepped_through_and_come_round(
     choose(panel, "checkerboard")
     pose = find(panel, QSpinBox, "pose")
     assert (pose.value(), pose.text()) == (1, "1 of 16")
-    qtbot.mouseClick(find(panel, QPushButton, "next_pose"), Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(find(panel, QToolButton, "next_pose"), Qt.MouseButton.LeftButton)
     assert (bench.scene.pose, pose.value()) == (1, 2)
     for _ in range(2):
-        qtbot.mouseClick(find(panel, QPushButton, "previous_pose"), Qt.MouseButton.LeftButton)
+        qtbot.mouseClick(find(panel, QToolButton, "previous_pose"), Qt.MouseButton.LeftButton)
     assert (bench.scene.pose, pose.value()) == (15, 16)
 
 
