@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
+from gelpolight_core.calibration.ball_pixels import gather_ball_pixels
 from gelpolight_core.calibration.calibration import (
     MODELS,
     Calibration,
@@ -18,7 +19,7 @@ from gelpolight_core.calibration.calibration import (
     Provenance,
     sensor_stack,
 )
-from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
+from gelpolight_core.calibration.joint import refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -197,6 +198,9 @@ def _full_model(
         joint.misfit,
         joint.held_out,
         joint.kept,
+        joint.membrane_sd,
+        joint.membrane_held_out,
+        joint.membrane_kept,
     )
 
 

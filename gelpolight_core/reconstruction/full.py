@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 
+from gelpolight_core.calibration.ball_pixels import neighbourhood
 from gelpolight_core.calibration.calibration import Calibration, FullModel
-from gelpolight_core.calibration.joint import neighbourhood
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.reconstruction.denoise import quiet_even_parts
 from gelpolight_core.reconstruction.heightmap import Flag

@@ -31,6 +31,13 @@ UNSOLVED_WEIGHT = 0.01
 # What the model does not explain of press over background; it, not noise, limits a good picture.
 MODEL_ERROR = 0.03
 
+# Gauss-Newton steps of a node, the first of which is the start.
+STEPS = 8
+
+_FAST = {"nsz", "arcp", "contract"}
+_compiled = numba.njit(cache=True, nogil=True, fastmath=_FAST)
+# Called once each, with the node's scratch arrays: as calls they would take half as long again.
+_part = numba.njit(cache=True, nogil=True, fastmath=_FAST, inline="always")
 _OUTSIDE = int(Flag.OUTSIDE)
 _SATURATED = int(Flag.SATURATED)
 _DARK = int(Flag.DARK)
@@ -125,6 +132,8 @@ def solve_near_light(
     shape_of = np.array(
         [membrane.exponent, membrane.gloss, membrane.roughness, membrane.bounce], np.float64
     )
+    curves = membrane.curves if membrane.diffuse else None
+    dark = np.ascontiguousarray(_dark_brightness(membrane))
     depth = np.ascontiguousarray(depth_mm, np.float32)
     leds = np.ascontiguousarray(led_positions_mm, np.float64)
 
@@ -144,6 +153,8 @@ def solve_near_light(
             depth,
             leds,
             shape_of,
+            curves,
+            dark,
             slope_x,
             slope_y,
             normals,
@@ -159,14 +170,28 @@ def solve_near_light(
     return RaySlopes(slope_x, slope_y, normals, weight, slope_sd, flags)
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
-def _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _dark_brightness(membrane: Membrane) -> NDArray[np.float64]:
+    """Return the brightness (3,) below which a channel counts as dark whatever its noise."""
+    if not membrane.diffuse:
+        return np.full(3, DARK_COSINE * (1.0 - membrane.gloss) / pi)
+    share = membrane.diffuse_share(np.full(3, DARK_COSINE))
+    return np.asarray((1.0 - membrane.gloss) * share / pi)
+
+
+@_compiled
+def _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape, curves, k):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return the membrane's brightness under one light; as Membrane.response."""
     facing = lx * nx + ly * ny + lz * nz
     if facing <= 0.0:
         return 0.0
     cosine = max(facing, 1e-3)
-    value = (1.0 - shape[1]) * cosine ** shape[0] / pi
+    if curves is None:
+        diffuse = cosine ** shape[0]
+    else:
+        place = min(cosine, 1.0) * (curves.shape[1] - 1)
+        below = min(int(place), curves.shape[1] - 2)
+        diffuse = curves[k, below] + (place - below) * (curves[k, below + 1] - curves[k, below])
+    value = (1.0 - shape[1]) * diffuse / pi
     if shape[1] > 0.0:
         hx, hy, hz = lx + vx, ly + vy, lz + vz
         tilt = max((hx * nx + hy * ny + hz * nz) / sqrt(hx * hx + hy * hy + hz * hz), 0.0)
@@ -179,7 +204,7 @@ def _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape):  # type: ignore[no-unt
     return value
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
+@_compiled
 def _limit(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return the normal at unit length and not steeper than can be seen."""
     size = sqrt(nx * nx + ny * ny + nz * nz)
@@ -191,7 +216,7 @@ def _limit(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover
     return nx, ny, nz
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
+@_compiled
 def _start(light, value, known, missing):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return a first normal from equivalent cosines: three lights, or two and |n| = 1.
 
@@ -226,7 +251,181 @@ def _start(light, value, known, missing):  # type: ignore[no-untyped-def]  # pra
     return bx + step * ex, by + step * ey, bz + step * ez
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
+@_part
+def _lights_at(x, y, d, drift, view, leds, shape, curves, light, scale):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Set the lights' directions at the present depth, and the response that a ratio of 1 means."""
+    wx, wy = drift
+    vx, vy, vz = view
+    for k in range(3):
+        ax, ay = leds[k, 0] - x - d * wx, leds[k, 1] - y - d * wy
+        az = leds[k, 2] + d
+        r = sqrt(ax * ax + ay * ay + az * az)
+        fx, fy, fz = leds[k, 0] - x, leds[k, 1] - y, leds[k, 2]
+        r0 = sqrt(fx * fx + fy * fy + fz * fz)
+        light[k, 0], light[k, 1], light[k, 2] = ax / r, ay / r, az / r
+        flat = _response(fx / r0, fy / r0, fz / r0, 0.0, 0.0, -1.0, vx, vy, vz, shape, curves, k)
+        # Near light: lobe and inverse square at the present depth (PHYSICS, shading).
+        scale[k] = flat / ((az / r) / (fz / r0) * (r0 / r) ** 2)
+
+
+@_part
+def _seen_channels(
+    i, j, ratio, sigma, around, saturated, nz, bounce, dark, scale, direct, spread, out
+):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Set each channel's direct light, its deviation, and whether it is missing.
+
+    `out` is -1 for a dark channel, 1 for a saturated one, 0 for one that counts. Returned are the
+    number of missing channels, the last of them, and its `out`.
+    """
+    count, missing, side = 0, -1, 0
+    for k in range(3):
+        direct[k] = (ratio[i, j, k] - bounce * around[i, j, k] * 0.5 * (1.0 + nz)) * scale[k]
+        spread[k] = sqrt(sigma[i, j, k] ** 2 + MODEL_ERROR**2) * scale[k]
+        out[k] = 0
+        if saturated[i, j, k]:
+            out[k], missing, side = 1, k, 1
+        elif not (direct[k] >= max(dark[k], DARK_SIGMAS * sigma[i, j, k] * scale[k])):
+            out[k], missing, side = -1, k, -1
+        if out[k] != 0:
+            count += 1
+    return count, missing, side
+
+
+@_part
+def _tangents(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Return two unit directions across a normal."""
+    if abs(nx) < 0.7:
+        tx, ty, tz = 0.0, nz, -ny
+    else:
+        tx, ty, tz = -nz, 0.0, nx
+    size = sqrt(tx * tx + ty * ty + tz * tz)
+    tx, ty, tz = tx / size, ty / size, tz / size
+    return tx, ty, tz, ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+
+
+@_part
+def _step(i, j, nx, ny, nz, view, light, scale, direct, spread, out, around, shape, curves):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Return a Gauss-Newton step's normal, its length, and the squared slopes that it rests on."""
+    vx, vy, vz = view
+    tx, ty, tz, sx, sy, sz = _tangents(nx, ny, nz)
+    c11, c12, c22, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0
+    e = 1e-4
+    for k in range(3):
+        if out[k] != 0:
+            continue
+        lx, ly, lz = light[k, 0], light[k, 1], light[k, 2]
+        f = _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape, curves, k)
+        f1 = _response(
+            lx, ly, lz, nx + e * tx, ny + e * ty, nz + e * tz, vx, vy, vz, shape, curves, k
+        )
+        f2 = _response(
+            lx, ly, lz, nx + e * sx, ny + e * sy, nz + e * sz, vx, vy, vz, shape, curves, k
+        )
+        bend = 0.5 * shape[3] * around[i, j, k] * scale[k]
+        d1, d2 = (f1 - f) / e + bend * tz, (f2 - f) / e + bend * sz
+        w = 1.0 / (spread[k] * spread[k])
+        error = direct[k] - f
+        c11 += w * d1 * d1
+        c12 += w * d1 * d2
+        c22 += w * d2 * d2
+        g1 += w * d1 * error
+        g2 += w * d2 * error
+    damp = 1e-6 * (c11 + c22) + 1e-12
+    det = (c11 + damp) * (c22 + damp) - c12 * c12
+    m1 = ((c22 + damp) * g1 - c12 * g2) / det
+    m2 = ((c11 + damp) * g2 - c12 * g1) / det
+    move = sqrt(m1 * m1 + m2 * m2)
+    if move > 0.3:
+        m1, m2 = m1 * 0.3 / move, m2 * 0.3 / move
+    nx, ny, nz = _limit(nx + m1 * tx + m2 * sx, ny + m1 * ty + m2 * sy, nz + m1 * tz + m2 * sz)
+    return nx, ny, nz, move, c11, c12, c22
+
+
+@_part
+def _solve_normal(  # type: ignore[no-untyped-def]  # pragma: no cover
+    i,
+    j,
+    ratio,
+    sigma,
+    around,
+    saturated,
+    view,
+    light,
+    shape,
+    curves,
+    dark,
+    scale,
+    direct,
+    value,
+    spread,
+    out,
+):
+    """Return one node's normal, the squared slopes, and how many channels were missing."""
+    vx, vy, vz = view
+    nx, ny, nz = 0.0, 0.0, -1.0
+    c11, c12, c22 = 1.0, 0.0, 1.0
+    count = 0
+    for step in range(STEPS):
+        count, missing, side = _seen_channels(
+            i, j, ratio, sigma, around, saturated, nz, shape[3], dark, scale, direct, spread, out
+        )
+        if count >= 2:
+            break
+        if step == 0:
+            for k in range(3):
+                lx, ly, lz = light[k, 0], light[k, 1], light[k, 2]
+                lit = lx * nx + ly * ny + lz * nz
+                flat = _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape, curves, k)
+                value[k] = min(lit * max(direct[k], 0.0) / max(flat, 1e-6), 1.0)
+            px, py, pz = _start(light, value, side, missing)
+            nx, ny, nz = _limit(px, py, pz)
+            continue
+        nx, ny, nz, move, c11, c12, c22 = _step(
+            i, j, nx, ny, nz, view, light, scale, direct, spread, out, around, shape, curves
+        )
+        if move < 5e-4:  # the next step's move would be its square
+            break
+    if count >= 2:
+        nx, ny, nz = 0.0, 0.0, -1.0
+        c11, c12, c22 = 1.0, 0.0, 1.0
+    return nx, ny, nz, c11, c12, c22, count
+
+
+@_part
+def _ray_slopes(i, j, nx, ny, d, along, drift, x_mm, y_mm):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Return d_u = - n . (P0_u + d w_u) / (n . w): the surface point moves along its own ray."""
+    rows, columns = drift.shape[:2]
+    j0, j1, i0, i1 = max(j - 1, 0), min(j + 1, columns - 1), max(i - 1, 0), min(i + 1, rows - 1)
+    px, py = x_mm[j1] - x_mm[j0], y_mm[i1] - y_mm[i0]
+    wxx = (drift[i, j1, 0] - drift[i, j0, 0]) / px
+    wyx = (drift[i, j1, 1] - drift[i, j0, 1]) / px
+    wxy = (drift[i1, j, 0] - drift[i0, j, 0]) / py
+    wyy = (drift[i1, j, 1] - drift[i0, j, 1]) / py
+    slope_x = -(nx * (1.0 + d * wxx) + ny * d * wyx) / along
+    slope_y = -(nx * d * wxy + ny * (1.0 + d * wyy)) / along
+    return slope_x, slope_y
+
+
+@_part
+def _trust(nz, along, out, count):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Return a node's weight and flags."""
+    flag = 0
+    for k in range(3):
+        if out[k] < 0:
+            flag |= _DARK
+        elif out[k] > 0:
+            flag |= _SATURATED
+    trust = 1.0
+    if count == 1:
+        trust = ONE_DARK_WEIGHT
+    elif count >= 2:
+        trust = UNSOLVED_WEIGHT
+    if nz > -STEEPEST_NZ - 1e-6 or along < LEAST_ALONG_RAY:
+        return UNSOLVED_WEIGHT, flag | _NOT_OBSERVABLE
+    return trust, flag
+
+
+@_compiled
 def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     first,
     last,
@@ -242,6 +441,8 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     depth,
     leds,
     shape,
+    curves,
+    dark,
     slope_x,
     slope_y,
     normals,
@@ -249,139 +450,43 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     slope_sd,
     flags,
 ):
-    rows, columns = depth.shape
-    light = np.empty((3, 3))
-    scale, direct, value, spread = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    light, scale = np.empty((3, 3)), np.empty(3)
     out = np.zeros(3, np.int64)
+    direct, value, spread = np.empty(3), np.empty(3), np.empty(3)
     for i in range(first, last):
-        for j in range(columns):
+        for j in range(depth.shape[1]):
             normals[i, j, 2] = -1.0
             if not usable[i, j]:
                 flags[i, j] = _OUTSIDE
                 weight[i, j] = UNSOLVED_WEIGHT if inside[i, j] else 1.0
                 continue
-            x, y, d = x_mm[j], y_mm[i], depth[i, j]
-            wx, wy = drift[i, j, 0], drift[i, j, 1]
+            d, wx, wy = depth[i, j], drift[i, j, 0], drift[i, j, 1]
             back = sqrt(wx * wx + wy * wy + 1.0)
-            vx, vy, vz = wx / back, wy / back, -1.0 / back
-            for k in range(3):
-                ax, ay = leds[k, 0] - x - d * wx, leds[k, 1] - y - d * wy
-                az = leds[k, 2] + d
-                r = sqrt(ax * ax + ay * ay + az * az)
-                fx, fy, fz = leds[k, 0] - x, leds[k, 1] - y, leds[k, 2]
-                r0 = sqrt(fx * fx + fy * fy + fz * fz)
-                light[k, 0], light[k, 1], light[k, 2] = ax / r, ay / r, az / r
-                flat = _response(fx / r0, fy / r0, fz / r0, 0.0, 0.0, -1.0, vx, vy, vz, shape)
-                # Near light: lobe and inverse square at the present depth (PHYSICS, shading).
-                scale[k] = flat / ((az / r) / (fz / r0) * (r0 / r) ** 2)
-            nx, ny, nz = 0.0, 0.0, -1.0
-            missing_count = 0
-            flag = 0
-            c11, c12, c22 = 1.0, 0.0, 1.0
-            for step in range(8):
-                missing_count, missing, side = 0, -1, 0
-                for k in range(3):
-                    bounce = shape[3] * around[i, j, k] * 0.5 * (1.0 + nz)
-                    direct[k] = (ratio[i, j, k] - bounce) * scale[k]
-                    spread[k] = sqrt(sigma[i, j, k] ** 2 + MODEL_ERROR**2) * scale[k]
-                    dark = DARK_COSINE * (1.0 - shape[1]) / pi
-                    dark = max(dark, DARK_SIGMAS * sigma[i, j, k] * scale[k])
-                    out[k] = 0
-                    if saturated[i, j, k]:
-                        out[k], missing, side = 1, k, 1
-                    elif not (direct[k] >= dark):
-                        out[k], missing, side = -1, k, -1
-                    if out[k] != 0:
-                        missing_count += 1
-                if missing_count >= 2:
-                    break
-                if step == 0:
-                    for k in range(3):
-                        lit = light[k, 0] * nx + light[k, 1] * ny + light[k, 2] * nz
-                        lx, ly, lz = light[k, 0], light[k, 1], light[k, 2]
-                        flat = _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape)
-                        value[k] = min(lit * max(direct[k], 0.0) / max(flat, 1e-6), 1.0)
-                    nx, ny, nz = _start(light, value, side, missing)
-                    nx, ny, nz = _limit(nx, ny, nz)
-                    continue
-                # Two tangent directions at n; residuals and slopes along them.
-                if abs(nx) < 0.7:
-                    tx, ty, tz = 0.0, nz, -ny
-                else:
-                    tx, ty, tz = -nz, 0.0, nx
-                size = sqrt(tx * tx + ty * ty + tz * tz)
-                tx, ty, tz = tx / size, ty / size, tz / size
-                sx, sy, sz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-                c11, c12, c22, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0
-                e = 1e-4
-                for k in range(3):
-                    if out[k] != 0:
-                        continue
-                    lx, ly, lz = light[k, 0], light[k, 1], light[k, 2]
-                    f = _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape)
-                    f1 = _response(
-                        lx, ly, lz, nx + e * tx, ny + e * ty, nz + e * tz, vx, vy, vz, shape
-                    )
-                    f2 = _response(
-                        lx, ly, lz, nx + e * sx, ny + e * sy, nz + e * sz, vx, vy, vz, shape
-                    )
-                    bend = 0.5 * shape[3] * around[i, j, k] * scale[k]
-                    d1, d2 = (f1 - f) / e + bend * tz, (f2 - f) / e + bend * sz
-                    w = 1.0 / (spread[k] * spread[k])
-                    error = direct[k] - f
-                    c11 += w * d1 * d1
-                    c12 += w * d1 * d2
-                    c22 += w * d2 * d2
-                    g1 += w * d1 * error
-                    g2 += w * d2 * error
-                damp = 1e-6 * (c11 + c22) + 1e-12
-                det = (c11 + damp) * (c22 + damp) - c12 * c12
-                m1 = ((c22 + damp) * g1 - c12 * g2) / det
-                m2 = ((c11 + damp) * g2 - c12 * g1) / det
-                move = sqrt(m1 * m1 + m2 * m2)
-                if move > 0.3:
-                    m1, m2 = m1 * 0.3 / move, m2 * 0.3 / move
-                nx, ny, nz = _limit(
-                    nx + m1 * tx + m2 * sx, ny + m1 * ty + m2 * sy, nz + m1 * tz + m2 * sz
-                )
-                if move < 5e-4:  # the next step's move would be its square
-                    break
-            for k in range(3):
-                if out[k] < 0:
-                    flag |= _DARK
-                elif out[k] > 0:
-                    flag |= _SATURATED
-            trust = 1.0
-            if missing_count == 1:
-                trust = ONE_DARK_WEIGHT
-            elif missing_count >= 2:
-                trust = UNSOLVED_WEIGHT
-                nx, ny, nz = 0.0, 0.0, -1.0
-                c11, c12, c22 = 1.0, 0.0, 1.0
-            if nz > -STEEPEST_NZ - 1e-6:
-                trust = UNSOLVED_WEIGHT
-                flag |= _NOT_OBSERVABLE
-            along = nx * wx + ny * wy - nz
-            if along < LEAST_ALONG_RAY:
-                along = LEAST_ALONG_RAY
-                trust = UNSOLVED_WEIGHT
-                flag |= _NOT_OBSERVABLE
-            normals[i, j, 0], normals[i, j, 1], normals[i, j, 2] = nx, ny, nz
-            # d_u = - n . (P0_u + d w_u) / (n . w): the surface point moves along its own ray.
-            j0, j1, i0, i1 = (
-                max(j - 1, 0),
-                min(j + 1, columns - 1),
-                max(i - 1, 0),
-                min(i + 1, rows - 1),
+            view = (wx / back, wy / back, -1.0 / back)
+            _lights_at(x_mm[j], y_mm[i], d, (wx, wy), view, leds, shape, curves, light, scale)
+            nx, ny, nz, c11, c12, c22, count = _solve_normal(
+                i,
+                j,
+                ratio,
+                sigma,
+                around,
+                saturated,
+                view,
+                light,
+                shape,
+                curves,
+                dark,
+                scale,
+                direct,
+                value,
+                spread,
+                out,
             )
-            px, py = x_mm[j1] - x_mm[j0], y_mm[i1] - y_mm[i0]
-            wxx = (drift[i, j1, 0] - drift[i, j0, 0]) / px
-            wyx = (drift[i, j1, 1] - drift[i, j0, 1]) / px
-            wxy = (drift[i1, j, 0] - drift[i0, j, 0]) / py
-            wyy = (drift[i1, j, 1] - drift[i0, j, 1]) / py
-            slope_x[i, j] = -(nx * (1.0 + d * wxx) + ny * d * wyx) / along
-            slope_y[i, j] = -(nx * d * wxy + ny * (1.0 + d * wyy)) / along
-            weight[i, j] = trust
+            normals[i, j, 0], normals[i, j, 1], normals[i, j, 2] = nx, ny, nz
+            along = nx * wx + ny * wy - nz
+            weight[i, j], flags[i, j] = _trust(nz, along, out, count)
+            slope_x[i, j], slope_y[i, j] = _ray_slopes(
+                i, j, nx, ny, d, max(along, LEAST_ALONG_RAY), drift, x_mm, y_mm
+            )
             det = max(c11 * c22 - c12 * c12, 1e-12)
             slope_sd[i, j] = sqrt(0.5 * (c11 + c22) / det) / (nz * nz)
-            flags[i, j] = flag
