@@ -92,7 +92,8 @@ class Problem:
         flat_light, flat_distance = light_directions(leds, flat)
         gain = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
         facing = np.einsum("nkc,nc->nk", light, normals)
-        cosine, flat_cosine = np.clip(facing, LEAST_COSINE, 1.0), -flat_light[..., 2]
+        cosine = np.clip(facing, LEAST_COSINE, 1.0)
+        flat_cosine = np.clip(-flat_light[..., 2], LEAST_COSINE, 1.0)
         if x.size > self.balls_end:
             rise = curve_terms(cosine) - curve_terms(flat_cosine)
             heights = x[self.balls_end :].reshape(3, -1)
@@ -101,7 +102,8 @@ class Problem:
             up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
             membrane = Membrane(float(x[9]), float(x[10]), float(x[11]))
             direct = membrane.response(light, normals, pixels.view)
-            direct /= membrane.response(flat_light, up, pixels.view)
+            # A step of the solver may bring an LED above the membrane, where it gives no light.
+            direct /= np.maximum(membrane.response(flat_light, up, pixels.view), LEAST_COSINE)
         share = np.where(on_ball, x[12], x[13]) * bounce_weight(normals)
         # What lies in shadow, or near it, depends on shadows that are not modelled here.
         lit = np.clip((facing - DARK_COSINE) / DARK_COSINE, 0.0, 1.0)

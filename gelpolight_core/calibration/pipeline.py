@@ -38,6 +38,7 @@ from gelpolight_core.session.session import (
     Session,
     file_hash,
     read_picture,
+    refuse_copies,
     require_colour,
 )
 from gelpolight_core.translation import tr
@@ -77,11 +78,11 @@ def calibrate_session(
     Raises
     ------
     InputError
-        If a stage is missing or cannot be used; the message names the file.
+        If a stage is missing, holds a copy of another picture, or cannot be used; the message names
+        the file.
     """
     tell = progress or (lambda _stage, _share: None)
-    for stage in STAGES:
-        session.files(stage)
+    refuse_copies(path for stage in STAGES for path in session.files(stage))
     tell(tr("lens"), 0.0)
     lens = calibrate_lens(session.pictures("checkerboard"), session.checkerboard)
     tell(tr("top surface"), 0.3)
