@@ -19,7 +19,7 @@ from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import STAGES, CalibrationRun, calibrate_session
 from gelpolight_core.export.atomic import refuse_unwritable
-from gelpolight_core.session.session import read_session, refuse_copies
+from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 
@@ -41,7 +41,6 @@ def run(options: argparse.Namespace) -> int:
     refuse_overwriting(outputs, [session.folder / "session.toml", *used])
     for path in outputs:
         refuse_unwritable(path)
-    refuse_copies(used)
     with StageProgress() as tell:
         result = calibrate_session(session, model=options.model, progress=tell)
     write_calibration(result.calibration, options.output)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
+from gelpolight_core.calibration.ball_pixels import gather_ball_pixels
 from gelpolight_core.calibration.calibration import (
     MODELS,
     Calibration,
@@ -18,7 +19,7 @@ from gelpolight_core.calibration.calibration import (
     Provenance,
     sensor_stack,
 )
-from gelpolight_core.calibration.joint import JointResult, gather_ball_pixels, refine_jointly
+from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -37,6 +38,7 @@ from gelpolight_core.session.session import (
     Session,
     file_hash,
     read_picture,
+    refuse_copies,
     require_colour,
 )
 from gelpolight_core.translation import tr
@@ -80,11 +82,11 @@ def calibrate_session(
     Raises
     ------
     InputError
-        If a stage is missing or cannot be used; the message names the file.
+        If a stage is missing, holds a copy of another picture, or cannot be used; the message names
+        the file.
     """
     tell = progress or (lambda _stage, _share: None)
-    for stage in STAGES:
-        session.files(stage)
+    refuse_copies(path for stage in STAGES for path in session.files(stage))
     tell(tr("lens"), 0.0)
     lens = calibrate_lens(session.pictures("checkerboard"), session.checkerboard)
     tell(tr("top surface"), 0.3)
@@ -201,6 +203,9 @@ def _full_model(
         joint.misfit,
         joint.held_out,
         joint.kept,
+        joint.membrane_sd,
+        joint.membrane_held_out,
+        joint.membrane_kept,
     )
     return full, joint
 
