@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -92,6 +92,8 @@ class LutEditor(QWidget):
         self.plot = named(CurvePlot(scatter), "lut.plot", tr("Reflectance curve"))
         self.plot.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.live = None if effect is None else LivePanel(start, scatter.names, effect)
+        self._repaint = QTimer(self, interval=0, singleShot=True)
+        self._repaint.timeout.connect(self._follow_theme)
         self._notice = named(QLabel(), "lut.notice", tr("What was done"))
         self._hint = named(QLabel(), "lut.hint", tr("How to edit"))
         for label in (self._notice, self._hint):
@@ -134,8 +136,8 @@ class LutEditor(QWidget):
         """Follow the theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_actions"):
-            self._apply_theme()
-            self._refresh()
+            # Not at once: Qt walks over all widgets, and none may be made or lost meanwhile.
+            self._repaint.start()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Nudge the chosen node, or go to its neighbour."""
@@ -255,6 +257,10 @@ class LutEditor(QWidget):
             self._actions[key].triggered.connect(lambda _on=False, handler=handler: handler())
         self._actions["lasso"].toggled.connect(self._on_lasso)
         self._actions["compare"].toggled.connect(lambda _on: self._refresh())
+
+    def _follow_theme(self) -> None:
+        self._apply_theme()
+        self._refresh()
 
     def _apply_theme(self) -> None:
         self.plot.apply_theme()

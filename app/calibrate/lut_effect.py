@@ -1,7 +1,7 @@
 """What an edited reflectance table does to a ball press: the depth along a line, and what is off.
 
-The paper's model is used, which the table belongs to. What a press needs is made ready once: an
-edit changes the table alone, so that an answer comes while the hand still moves.
+The paper's model is used, which the table belongs to. What a press needs is made ready once, so
+that an answer comes while the hand still moves.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.calibrate.lut_model import CurveEdit
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.reconstruction.normals import ShadingMaps, solve_slopes
 from gelpolight_core.reconstruction.reconstructor import LOOKUP_SIZE, Reconstructor
@@ -80,19 +82,22 @@ def ball_effect(
         return read_picture(session.folder / name).rgb
 
     def effect(edit: CurveEdit, name: str) -> Effect:
-        field = solve_slopes(frame(name), _maps(reconstructor.maps, edit), workers=workers)
+        maps = _maps(reconstructor.maps, run.calibration, edit)
+        field = solve_slopes(frame(name), maps, workers=workers)
         depth = reconstructor.solver.integrate(field.slope_x, field.slope_y).depth_mm
         return _compare(np.asarray(depth, np.float64), presses[name], run)
 
     return effect
 
 
-def _maps(maps: ShadingMaps, edit: CurveEdit) -> ShadingMaps:
-    table = edit.table()
-    lookup, scale = table.lookup(LOOKUP_SIZE)
-    return replace(
-        maps, lookup=lookup, lookup_scale=scale, coverage=table.coverage.astype(np.float32)
-    )
+def _maps(maps: ShadingMaps, calibration: Calibration, edit: CurveEdit) -> ShadingMaps:
+    """Return the maps with the edited table, and with the reflectance factors that follow it."""
+    curves = {k: (np.array(c.cosines), np.array(c.values)) for k, c in enumerate(edit.curves)}
+    changed = edited(calibration, curves, operator="", made="")
+    lookup, scale = changed.reflectance.lookup(LOOKUP_SIZE)
+    old, new = calibration.factors, changed.factors
+    gain = maps.gain * np.divide(old, new, out=np.zeros_like(old), where=new > 0.0)
+    return replace(maps, lookup=lookup, lookup_scale=scale, gain=gain)
 
 
 def _compare(depth: Array, press: BallPress, run: CalibrationRun) -> Effect:

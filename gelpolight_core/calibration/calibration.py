@@ -15,13 +15,35 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, build_stack
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.quality import QualityTable, Verdict
-from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import SensorData
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 MODELS = ("paper", "full")
+
+
+@dataclass(frozen=True, slots=True)
+class HandEdit:
+    """A part of a calibration that a person changed by hand.
+
+    Attributes
+    ----------
+    part : str
+        What was changed, such as ``reflectance``.
+    channels : tuple of str
+        Of ``red``, ``green``, ``blue``.
+    made : str
+        ISO 8601 time with zone.
+    operator : str
+        Who did it.
+    """
+
+    part: str
+    channels: tuple[str, ...]
+    made: str
+    operator: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +64,8 @@ class Provenance:
         SHA-256 of every file that it was made from, by stage and name.
     camera_settings : mapping
         Exposure and the like, where they are known.
+    edits : tuple of HandEdit
+        What was changed by hand since, in that order.
     """
 
     created: str
@@ -50,6 +74,7 @@ class Provenance:
     session: str
     sources: Mapping[str, str]
     camera_settings: Mapping[str, str] = field(default_factory=dict)
+    edits: tuple[HandEdit, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +97,13 @@ class FullModel:
         Mean robust loss on presses held out, with the mirror's LEDs and with the refined ones.
     kept : str
         ``refined`` or ``mirror``: which LEDs `led_positions_mm` holds.
+    membrane_sd : mapping
+        Standard deviations of what was refined with the LEDs: exponent, gloss, roughness,
+        cap_bounce, bounce, decay_mm; 0 for what was held. Empty in files of version 1.
+    membrane_held_out : tuple of 2 floats
+        The same loss with a two-lobe membrane, and with a one-dimensional one.
+    membrane_kept : str
+        ``two-lobe`` or ``one-dimensional``: which of them `membrane` is.
     """
 
     led_positions_mm: Array
@@ -82,6 +114,9 @@ class FullModel:
     misfit: float
     held_out: tuple[float, float]
     kept: str
+    membrane_sd: Mapping[str, float] = field(default_factory=dict)
+    membrane_held_out: tuple[float, float] = (0.0, 0.0)
+    membrane_kept: str = MEMBRANES[0]
 
 
 @dataclass(frozen=True)
@@ -148,22 +183,28 @@ class Calibration:
 
     @cached_property
     def identity(self) -> str:
-        """A short name that changes with any number of the calibration."""
+        """A short name that changes with any number that a reconstruction uses.
+
+        Who made the calibration and when is no part of it: the same pictures have the same name.
+        """
         digest = hashlib.sha256(repr((self.sensor, self.model, self.camera, self.plane)).encode())
-        digest.update(self.provenance.created.encode())
-        for array in (
+        arrays = [
             self.led_positions_mm,
+            self.led_covariance_mm2,
             self.crosstalk,
             self.radiance,
             self.factors,
+            self.noise,
             *self.reflectance.cosines,
             *self.reflectance.values,
-        ):
-            digest.update(np.ascontiguousarray(array).tobytes())
+            self.reflectance.coverage,
+        ]
         if self.full is not None:
-            digest.update(repr((self.full.membrane, self.full.kept)).encode())
-            digest.update(np.ascontiguousarray(self.full.led_positions_mm).tobytes())
-            digest.update(np.ascontiguousarray(self.full.background).tobytes())
+            full = self.full
+            digest.update(repr((full.membrane, full.kept, full.decay_mm, full.misfit)).encode())
+            arrays += [full.led_positions_mm, full.led_sd_mm, full.background]
+        for array in arrays:
+            digest.update(np.ascontiguousarray(array).tobytes())
         return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"
 
     @property

@@ -18,7 +18,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
+from gelpolight_core.calibration.calibration import MODELS, Calibration, HandEdit, Provenance
+from gelpolight_core.calibration.file_full import full_arrays, full_entry, read_full
 from gelpolight_core.calibration.manifest import (
     FORMAT,
     MANIFEST,
@@ -33,7 +34,6 @@ from gelpolight_core.calibration.manifest import (
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.session.session import MAX_PIXELS, SensorData
 
@@ -120,9 +120,7 @@ def _arrays_of(c: Calibration) -> dict[str, NDArray[Any]]:
         arrays[f"reflectance_cosines_{k}"] = c.reflectance.cosines[k]
         arrays[f"reflectance_values_{k}"] = c.reflectance.values[k]
     if c.full is not None:
-        arrays["full_led_positions_mm"] = c.full.led_positions_mm
-        arrays["full_led_sd_mm"] = c.full.led_sd_mm
-        arrays["full_background"] = c.full.background
+        arrays |= full_arrays(c.full)
     return arrays
 
 
@@ -141,13 +139,7 @@ def _manifest_of(c: Calibration) -> dict[str, Any]:
         "provenance": asdict(c.provenance),
     }
     if c.full is not None:
-        manifest["full"] = {
-            "membrane": asdict(c.full.membrane),
-            "decay_mm": c.full.decay_mm,
-            "misfit": c.full.misfit,
-            "held_out": list(c.full.held_out),
-            "kept": c.full.kept,
-        }
+        manifest["full"] = full_entry(c.full)
     return manifest
 
 
@@ -207,8 +199,8 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         reflectance=_read_reflectance(arrays),
         noise=arrays["noise"],
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
-        provenance=Provenance(**manifest["provenance"]),
-        full=_read_full(manifest["full"], arrays) if "full" in manifest else None,
+        provenance=_read_provenance(manifest["provenance"]),
+        full=read_full(manifest["full"], arrays) if "full" in manifest else None,
     )
     _check(calibration)
     stated, made = manifest["grid"], _grid_of(calibration)
@@ -232,31 +224,12 @@ def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
     )
 
 
-def _read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullModel:
-    membrane = Membrane(**{name: float(value) for name, value in entry["membrane"].items()})
-    numbers = np.array([*asdict(membrane).values(), entry["decay_mm"], entry["misfit"]], float)
-    if not np.isfinite(numbers).all() or not 0.0 <= membrane.gloss < 1.0:
-        raise ValueError("the membrane is not possible")
-    if membrane.exponent <= 0.0 or not 0.0 < membrane.roughness <= 1.0:
-        raise ValueError("the membrane is not possible")
-    if membrane.bounce < 0.0 or membrane.bounce_reach_mm <= 0.0:
-        raise ValueError("the membrane is not possible")
-    before, after = (float(value) for value in entry["held_out"])
-    lengths = np.array([entry["decay_mm"], entry["misfit"], before, after], float)
-    if not np.isfinite(lengths).all() or lengths.min() < 0.0 or lengths[0] == 0.0:
-        raise ValueError("the joint refinement's figures are not possible")
-    if entry["kept"] not in ("refined", "mirror"):
-        raise ValueError(f"unknown LEDs {entry['kept']!r}")
-    return FullModel(
-        led_positions_mm=arrays["full_led_positions_mm"],
-        led_sd_mm=arrays["full_led_sd_mm"],
-        membrane=membrane,
-        background=arrays["full_background"],
-        decay_mm=float(entry["decay_mm"]),
-        misfit=float(entry["misfit"]),
-        held_out=(before, after),
-        kept=str(entry["kept"]),
+def _read_provenance(entry: dict[str, Any]) -> Provenance:
+    edits = tuple(
+        HandEdit(**{**edit, "channels": tuple(str(name) for name in edit["channels"])})
+        for edit in entry.get("edits", ())
     )
+    return Provenance(**{**entry, "edits": edits})
 
 
 def _check(calibration: Calibration) -> None:

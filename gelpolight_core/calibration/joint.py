@@ -4,6 +4,10 @@ Press over background cancels light intensity and reflectance factor, so what is
 geometry and on the membrane's response alone. Both the balls and the drape around them are used:
 the drape is concave, as the walls of pressed objects are, and receives light from its surroundings
 that a ball's cap does not. The mirror's LED positions and the housing's Z1 are priors.
+
+Two membranes are tried: two lobes, whose brightness depends on the viewing side, and the paper's
+one-dimensional curve of the light's cosine for each channel (Eq. 6). Presses that were held out
+decide.
 """
 
 from __future__ import annotations
@@ -11,58 +15,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.calibration.ball_pixels import BOUNCE_REACH_MM, BallPixels, thinned
+from gelpolight_core.calibration.joint_problem import (
+    COMMON,
+    CORRELATION,
+    CURVE_SIZE,
+    Problem,
+    diffuse_curves,
+)
 from gelpolight_core.reflectance.ball import BallPose
-from gelpolight_core.reflectance.draped_ball import draped_ball
-from gelpolight_core.reflectance.membrane import Membrane, bounce_weight
-from gelpolight_core.reflectance.press import LEAST_VALUE, SATURATED, BallPress
+from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
+from gelpolight_core.reflectance.press import BallPress
 
 Array = NDArray[np.float64]
-Map = NDArray[np.float32]
-BOUNCE_REACH_MM = 1.0
-DRAPE_WIDTH_MM = 1.6
-EDGE_GAP_MM = 0.12
-PIXELS_PER_PART = 800
-# What a convex cap receives from its surroundings lies further off and is modelled less well.
-CAP_TRUST = 0.3
-DARK_COSINE = 0.08
-MODEL_ERROR = 0.01
-# Pixels of one ball err together (lens, centre, membrane), so that each counts for less than one.
-CORRELATION = 4.0
-LED_LATERAL_SD_MM = 0.05
-LED_HEIGHT_SD_MM = 0.2
-PRIOR_STRENGTH = 3.0
-_GLOBAL = 15
-_STEP = 1e-4
-
-
-@dataclass(frozen=True, slots=True)
-class BallPixels:
-    """Pixels of one press on the ball's cap and on the drape around it.
-
-    Attributes
-    ----------
-    points_mm, drift, view : (N, 2), (N, 2), (N, 3)
-        Rays, and unit directions back to the camera.
-    ratio, weight, around : (N, 3)
-        Press over background, 1 / its standard deviation, and its average in the neighbourhood.
-    radius_mm : float
-        Of the ball.
-    """
-
-    points_mm: Array
-    drift: Array
-    view: Array
-    ratio: Array
-    weight: Array
-    around: Array
-    radius_mm: float
+_SHAPE = slice(9, 12)  # exponent, gloss and roughness, which the one-dimensional membrane lacks
+_NAMES = ("exponent", "gloss", "roughness", "cap_bounce", "bounce", "decay_mm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +63,10 @@ class JointResult:
         ones.
     kept : str
         ``refined`` or ``mirror``: whose LEDs were the better on what was held out.
+    membrane_held_out : tuple of 2 floats
+        The same loss with the two-lobe membrane, and with the one-dimensional one.
+    membrane_kept : str
+        ``two-lobe`` or ``one-dimensional``: which of them `membrane` is.
     """
 
     led_positions_mm: Array
@@ -105,161 +80,17 @@ class JointResult:
     ball_misfits: Array
     held_out: tuple[float, float]
     kept: str
-
-
-def view_directions(drift: Array) -> Array:
-    """Return unit directions (..., 3) back along the rays, from their drift (..., 2)."""
-    view = np.concatenate([drift, -np.ones_like(drift[..., :1])], axis=-1)
-    return np.asarray(view / np.linalg.norm(view, axis=-1, keepdims=True))
-
-
-def neighbourhood(ratio: Map, valid: NDArray[np.bool_], pitch_mm: float, reach_mm: float) -> Map:
-    """Return press over background, averaged over a Gaussian; 1 where it is not known."""
-    known = np.clip(np.where(valid[..., None], ratio, 1.0), 0.0, 4.0).astype(np.float32)
-    factor = max(int(reach_mm / pitch_mm / 4.0), 1)
-    rows, columns = valid.shape
-    small = cv2.resize(known, (columns // factor, rows // factor), interpolation=cv2.INTER_AREA)
-    small = cv2.GaussianBlur(small, (0, 0), reach_mm / pitch_mm / factor)
-    return np.asarray(cv2.resize(small, (columns, rows), interpolation=cv2.INTER_LINEAR))
-
-
-def gather_ball_pixels(
-    press: BallPress,
-    picture: Map,
-    background: Map,
-    table: ResamplingTable,
-    usable: NDArray[np.bool_],
-    noise: Array,
-) -> BallPixels:
-    """Choose pixels on a ball's cap and on the drape around it.
-
-    Parameters
-    ----------
-    press : BallPress
-        The ball as found.
-    picture, background : (rows, columns, 3) float32
-        Resampled, crosstalk removed.
-    table : ResamplingTable
-        The grid and its rays.
-    usable : (rows, columns) bool
-        Nodes with light and membrane.
-    noise : (3,)
-        Standard deviation of press minus background.
-    """
-    grid = table.grid
-    base = np.maximum(background, LEAST_VALUE)
-    ratio = np.asarray(picture / base, np.float32)
-    around = neighbourhood(ratio, usable, grid.pitch_mm, BOUNCE_REACH_MM)
-    column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
-    centre = press.seen_centre_mm(table.drift[row, column].astype(np.float64))
-    away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
-    contact = press.contact_radius_mm
-    random = np.random.default_rng(0)
-    parts = (
-        (CAP_TRUST, 0.0, 0.9 * contact),
-        (1.0, contact + EDGE_GAP_MM, contact + DRAPE_WIDTH_MM),
-    )
-    chosen, trust = [], []
-    for part, low, high in parts:
-        places = np.flatnonzero((usable & (away >= low) & (away < high)).ravel())
-        chosen.append(random.permutation(places)[:PIXELS_PER_PART])
-        trust.append(np.full((chosen[-1].size, 1), part))
-    rows, columns = np.unravel_index(np.concatenate(chosen), away.shape)
-    value = picture[rows, columns].astype(np.float64)
-    below = base[rows, columns].astype(np.float64)
-    known = (value > LEAST_VALUE) & (value < SATURATED) & (background[rows, columns] > LEAST_VALUE)
-    sd = np.hypot(np.hypot(noise / np.sqrt(2.0), MODEL_ERROR * value) / below, MODEL_ERROR)
-    drift = table.drift[rows, columns].astype(np.float64)
-    return BallPixels(
-        np.stack([grid.x_mm[columns], grid.y_mm[rows]], axis=-1),
-        drift,
-        view_directions(drift),
-        value / below,
-        np.where(known, np.concatenate(trust) / sd, 0.0),
-        around[rows, columns].astype(np.float64),
-        press.pose.radius_mm,
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Problem:
-    """Residuals of all presses, with priors.
-
-    Parameters are the LEDs (9), exponent, gloss, roughness, cap's and drape's bounce, decay length,
-    and then x, y and depth of each ball; those before `first_free` are held.
-    """
-
-    presses: Sequence[BallPixels]
-    start: Array
-    first_free: int
-
-    def residuals(self, x: Array) -> list[Array]:
-        return [self._press(x, i) for i in range(len(self.presses))]
-
-    def _press(self, x: Array, index: int) -> Array:
-        pixels = self.presses[index]
-        leds = x[:9].reshape(3, 3)
-        membrane = Membrane(float(x[9]), float(x[10]), float(x[11]))
-        at = _GLOBAL + 3 * index
-        pose = BallPose((float(x[at]), float(x[at + 1])), pixels.radius_mm, float(x[at + 2]))
-        surface, normals, on_ball = draped_ball(
-            pixels.points_mm, pixels.drift, pose, decay_mm=float(x[14])
-        )
-        flat = np.concatenate([pixels.points_mm, np.zeros((len(surface), 1))], axis=1)
-        light, distance = light_directions(leds, surface)
-        flat_light, flat_distance = light_directions(leds, flat)
-        gain = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
-        up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
-        direct = membrane.response(light, normals, pixels.view)
-        direct /= membrane.response(flat_light, up, pixels.view)
-        share = np.where(on_ball, x[12], x[13]) * bounce_weight(normals)
-        facing = np.einsum("nkc,nc->nk", light, normals)
-        # What lies in shadow, or near it, depends on shadows that are not modelled here.
-        lit = np.clip((facing - DARK_COSINE) / DARK_COSINE, 0.0, 1.0)
-        model = gain * direct + share[:, None] * pixels.around
-        error = (model - pixels.ratio) * pixels.weight * lit / CORRELATION
-        return np.asarray(error.ravel())
-
-    def priors(self, x: Array) -> Array:
-        moved = (x[:9] - self.start[:9]).reshape(3, 3)
-        return np.concatenate(
-            [
-                PRIOR_STRENGTH * moved[:, :2].ravel() / LED_LATERAL_SD_MM,
-                PRIOR_STRENGTH * moved[:, 2] / LED_HEIGHT_SD_MM,
-                # Exponent and gloss trade off; a diffuse share that departs from Lambert's law has
-                # to be asked for by the data (the loss lets it go far), as has an unseen lobe.
-                [PRIOR_STRENGTH * (x[9] - 1.0) / 0.01, (x[12] - x[13]) / 0.2, (x[11] - 0.5) / 0.3],
-            ]
-        )
-
-    def all(self, x: Array) -> Array:
-        return np.concatenate([*self.residuals(x), self.priors(x)])
-
-    def jacobian(self, x: Array) -> Array:
-        """Finite differences; a ball's own parameters are moved for all balls at once."""
-        base = self.residuals(x)
-        ends = np.cumsum([r.size for r in base])
-        starts = ends - [r.size for r in base]
-        prior = self.priors(x)
-        result = np.zeros((ends[-1] + prior.size, x.size))
-        for j in range(self.first_free, _GLOBAL):
-            moved = x.copy()
-            moved[j] += _STEP
-            for i, r in enumerate(self.residuals(moved)):
-                result[starts[i] : ends[i], j] = (r - base[i]) / _STEP
-            result[ends[-1] :, j] = (self.priors(moved) - prior) / _STEP
-        for axis in range(3):
-            moved = x.copy()
-            moved[_GLOBAL + axis :: 3] += _STEP
-            for i, r in enumerate(self.residuals(moved)):
-                result[starts[i] : ends[i], _GLOBAL + 3 * i + axis] = (r - base[i]) / _STEP
-        return result
+    membrane_held_out: tuple[float, float]
+    membrane_kept: str
 
 
 def refine_jointly(
     presses: Sequence[BallPress], pixels: Sequence[BallPixels], led_positions_mm: Array
 ) -> JointResult:
-    """Refine LEDs, membrane and balls together; keep the mirror's LEDs where they do better.
+    """Refine LEDs, membrane and balls together.
+
+    The mirror's LEDs are kept where they do better on presses that are held out, and the membrane
+    is one-dimensional where two lobes do no better.
 
     Parameters
     ----------
@@ -268,39 +99,38 @@ def refine_jointly(
     led_positions_mm : (3, 3)
         From the mirror spots.
     """
-    held_out = _held_out(presses, pixels, led_positions_mm)
+    held_out, membranes = _held_out(presses, pixels, led_positions_mm)
     refine = held_out[1] <= held_out[0]
-    solved = _solve(presses, pixels, led_positions_mm, refine=refine)
+    curves = membranes[1] <= membranes[0]
+    solved = _solve(presses, pixels, led_positions_mm, refine=refine, curves=curves)
     x, sd = solved.x, solved.sd
-    names = ("exponent", "gloss", "roughness", "cap_bounce", "bounce", "decay_mm")
+    end = COMMON + 3 * len(pixels)
     return JointResult(
         x[:9].reshape(3, 3),
         sd[:9].reshape(3, 3),
-        Membrane(float(x[9]), float(x[10]), float(x[11]), float(x[13]), BOUNCE_REACH_MM),
-        dict(zip(names, sd[9:_GLOBAL].tolist(), strict=True)),
+        _membrane_of(x, end),
+        dict(zip(_NAMES, sd[9:COMMON].tolist(), strict=True)),
         float(x[12]),
         float(x[14]),
         tuple(
             BallPose((float(cx), float(cy)), p.radius_mm, float(depth))
-            for (cx, cy, depth), p in zip(x[_GLOBAL:].reshape(-1, 3), pixels, strict=True)
+            for (cx, cy, depth), p in zip(x[COMMON:end].reshape(-1, 3), pixels, strict=True)
         ),
         solved.misfit,
         solved.ball_misfits,
         held_out,
         "refined" if refine else "mirror",
+        membranes,
+        MEMBRANES[int(curves)],
     )
 
 
-def _thinned(pixels: BallPixels) -> BallPixels:
-    """Return every second pixel."""
-    return BallPixels(
-        pixels.points_mm[::2],
-        pixels.drift[::2],
-        pixels.view[::2],
-        pixels.ratio[::2],
-        pixels.weight[::2],
-        pixels.around[::2],
-        pixels.radius_mm,
+def _membrane_of(x: Array, balls_end: int) -> Membrane:
+    bounce = float(x[13])
+    if x.size == balls_end:
+        return Membrane(float(x[9]), float(x[10]), float(x[11]), bounce, BOUNCE_REACH_MM)
+    return Membrane(
+        bounce=bounce, bounce_reach_mm=BOUNCE_REACH_MM, diffuse=diffuse_curves(x[balls_end:])
     )
 
 
@@ -315,9 +145,11 @@ class _Solution:
     loss: float
 
 
-def _start(presses: Sequence[BallPress], leds: Array) -> Array:
+def _start(presses: Sequence[BallPress], leds: Array, *, curves: bool) -> Array:
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
-    return np.concatenate([leds.ravel(), [1.0, 0.05, 0.5, 0.1, 0.1, 0.7], np.ravel(balls)])
+    shape = [1.0, 0.0, 0.5] if curves else [1.0, 0.05, 0.5]
+    heights = np.zeros(CURVE_SIZE if curves else 0)
+    return np.concatenate([leds.ravel(), shape, [0.1, 0.1, 0.7], np.ravel(balls), heights])
 
 
 def _solve(
@@ -326,48 +158,64 @@ def _solve(
     leds: Array,
     *,
     refine: bool,
-    common: Array | None = None,
+    curves: bool = False,
+    judging: Array | None = None,
 ) -> _Solution:
-    """Solve for all parameters; with `common`, the first 15 are held and only the balls move."""
-    start = _start(presses, leds)
-    first_free = _GLOBAL if common is not None else (0 if refine else 9)
+    """Solve for all parameters, or, when judging a fit to other presses, for the balls alone."""
+    start = _start(presses, leds, curves=curves)
+    balls = slice(COMMON, COMMON + 3 * len(pixels))
+    free = np.ones(start.size, dtype=bool)
+    free[:9] = refine
+    if curves:
+        free[_SHAPE] = False
     low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
-    low[9:_GLOBAL] = [0.5, 0.0, 0.15, 0.0, 0.0, 0.15]
-    high[9:_GLOBAL] = [1.8, 0.9, 1.0, 1.5, 1.5, 3.0]
-    depth_at = slice(_GLOBAL + 2, None, 3)
+    low[9:COMMON] = [0.5, 0.0, 0.15, 0.0, 0.0, 0.15]
+    high[9:COMMON] = [1.8, 0.9, 1.0, 1.5, 1.5, 3.0]
+    depth_at = slice(COMMON + 2, balls.stop, 3)
     low[depth_at] = 0.02
     high[depth_at] = [0.95 * p.radius_mm for p in pixels]
     start[depth_at] = np.clip(start[depth_at], 0.03, 0.9 * high[depth_at])
-    if common is not None:
-        start[:_GLOBAL] = common
-    problem = _Problem(pixels, start, first_free)
-    scale = np.concatenate([np.full(14, 0.1), [0.05], np.tile([0.02, 0.02, 0.05], len(pixels))])
-    held = start[:first_free]
+    if judging is not None:
+        start[:COMMON] = judging[:COMMON]
+        start[balls.stop :] = judging[judging.size - (start.size - balls.stop) :]
+        free[:COMMON] = False
+        free[balls.stop :] = False
+    problem = Problem(pixels, start, free)
+    scale = np.full(start.size, 0.1)
+    scale[14] = 0.05
+    scale[balls] = np.tile([0.02, 0.02, 0.05], len(pixels))
 
-    def whole(free: Array) -> Array:
-        return np.concatenate([held, free])
+    def whole(part: Array) -> Array:
+        x = start.copy()
+        x[free] = part
+        return x
 
     fit = least_squares(
-        lambda free: problem.all(whole(free)),
-        start[first_free:],
-        jac=lambda free: problem.jacobian(whole(free))[:, first_free:],
-        bounds=(low[first_free:], high[first_free:]),
+        lambda part: problem.all(whole(part)),
+        start[free],
+        jac=lambda part: problem.jacobian(whole(part))[:, free],
+        bounds=(low[free], high[free]),
         loss="soft_l1",
-        x_scale=scale[first_free:],
+        x_scale=scale[free],
         ftol=1e-5,
         xtol=1e-5,
         max_nfev=40,
     )
-    x = whole(fit.x)
+    return _described(problem, whole(fit.x))
+
+
+def _described(problem: Problem, x: Array) -> _Solution:
+    """Return a solution with its standard deviations, misfits and loss."""
     residuals = problem.residuals(x)
-    weights = [p.weight.ravel() for p in pixels]
+    weights = [p.weight.ravel() for p in problem.presses]
     scaled = np.concatenate(residuals)
     loss = float(np.mean(np.sqrt(1.0 + scaled**2) - 1.0))
     misfit = _relative_misfit(scaled, np.concatenate(weights))
     of_balls = [_relative_misfit(r, w) for r, w in zip(residuals, weights, strict=True)]
-    curvature = problem.jacobian(x)[:, first_free:]
+    curvature = problem.jacobian(x)[:, problem.free]
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
-    sd = np.concatenate([np.zeros(first_free), np.sqrt(np.maximum(variance, 0.0))])
+    sd = np.zeros(x.size)
+    sd[problem.free] = np.sqrt(np.maximum(variance, 0.0))
     return _Solution(x, sd, misfit, np.array(of_balls), loss)
 
 
@@ -381,19 +229,25 @@ def _relative_misfit(scaled: Array, weight: Array) -> float:
 
 def _held_out(
     presses: Sequence[BallPress], pixels: Sequence[BallPixels], leds: Array
-) -> tuple[float, float]:
-    """Return the mean robust loss on every second press, from a fit to the others.
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return mean robust losses on every second press, from fits to the others.
 
-    First with the mirror's LEDs, then with refined ones.
+    First with the mirror's LEDs and with refined ones; then, with the better of these, with the
+    two-lobe membrane and with the one-dimensional one.
     """
     even, odd = slice(0, None, 2), slice(1, None, 2)
     if len(presses) < 4:
-        return 0.0, 1.0  # too few to hold any out: the mirror's LEDs stay
+        # Too few to hold any out: the mirror's LEDs stay, and the form that extrapolates.
+        return (0.0, 1.0), (0.0, 1.0)
     # Half of the pixels tell which of two fits is the better as well as all do.
-    pixels = [_thinned(p) for p in pixels]
-    result: list[float] = []
-    for refine in (False, True):
-        fitted = _solve(presses[even], pixels[even], leds, refine=refine)
-        judged = _solve(presses[odd], pixels[odd], leds, refine=refine, common=fitted.x[:_GLOBAL])
-        result.append(judged.loss)
-    return result[0], result[1]
+    pixels = [thinned(p) for p in pixels]
+
+    def loss(refine: bool, curves: bool) -> float:
+        fitted = _solve(presses[even], pixels[even], leds, refine=refine, curves=curves)
+        return _solve(
+            presses[odd], pixels[odd], leds, refine=refine, curves=curves, judging=fitted.x
+        ).loss
+
+    mirror, refined = loss(False, False), loss(True, False)
+    one_dimensional = loss(refined <= mirror, True)
+    return (mirror, refined), (min(mirror, refined), one_dimensional)

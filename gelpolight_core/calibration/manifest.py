@@ -20,7 +20,8 @@ from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-calibration"
-VERSION = 1
+# 1: without the membrane's curves, its deviations and edits by hand.
+VERSION = 2
 MANIFEST = "manifest.json"
 MANIFEST_LIMIT = 4_000_000
 # What a damaged zip, a damaged JSON text or values of a wrong kind raise while they are read.
@@ -151,7 +152,7 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
             where=str(path),
             advice=tr("Use a newer version of GelPoLight Studio"),
         )
-    if version != VERSION:
+    if type(version) is not int or version < 1:
         raise ValueError(f"version {version!r}")
     stated = read_member(archive, f"{MANIFEST}.sha256", 64)
     if hashlib.sha256(text).hexdigest().encode() != stated:

@@ -17,9 +17,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.calibration.ball_pixels import gather_ball_pixels
 from gelpolight_core.calibration.calibration import FullModel, sensor_stack
 from gelpolight_core.calibration.inputs import NEEDS, Stage, inputs_of
-from gelpolight_core.calibration.joint import JointResult, gather_ball_pixels, refine_jointly
+from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -311,6 +312,9 @@ def _run_joint(session: Session, results: StageResults, _tell: Progress) -> Stag
         joint.misfit,
         joint.held_out,
         joint.kept,
+        joint.membrane_sd,
+        joint.membrane_held_out,
+        joint.membrane_kept,
     )
     return replace(results, joint=joint, full=full)
 

@@ -6,7 +6,8 @@ Zhang's method as OpenCV solves it: pinhole, k1 k2 p1 p2, k3 = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import cv2
@@ -117,6 +118,20 @@ def _guess(size: tuple[int, int]) -> LensFit:
     return LensFit(values, np.zeros(9), (), (), np.zeros(0), math.inf)
 
 
+@contextmanager
+def _one_opencv_thread() -> Iterator[None]:
+    """Let OpenCV work on one thread: several add up in the order in which they come to an end.
+
+    The same pictures have to give the same lens to the last bit, wherever they are calibrated.
+    """
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(threads)
+
+
 def solve_lens(
     seen: Sequence[BoardView], size: tuple[int, int], *, start: LensFit | None, square_pixels: bool
 ) -> LensFit | None:
@@ -148,14 +163,15 @@ def solve_lens(
         matrix[0, 0] = matrix[1, 1] = 0.5 * (matrix[0, 0] + matrix[1, 1])
         flags |= cv2.CALIB_FIX_ASPECT_RATIO
     try:
-        rms, solved, bent, turns, shifts, sd, _, view_rms = cv2.calibrateCameraExtended(
-            [view.board.points_mm.astype(np.float32) for view in seen],
-            [view.corners_px.astype(np.float32) for view in seen],
-            size,
-            matrix,
-            distortion,
-            flags=flags,
-        )
+        with _one_opencv_thread():
+            rms, solved, bent, turns, shifts, sd, _, view_rms = cv2.calibrateCameraExtended(
+                [view.board.points_mm.astype(np.float32) for view in seen],
+                [view.corners_px.astype(np.float32) for view in seen],
+                size,
+                matrix,
+                distortion,
+                flags=flags,
+            )
     except cv2.error:
         return None
     values = np.array([solved[0, 0], solved[1, 1], solved[0, 2], solved[1, 2], *bent.ravel()[:5]])

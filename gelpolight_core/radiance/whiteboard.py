@@ -24,6 +24,9 @@ DUST_SIGMAS = 5.0
 LEAST_DUST = 0.01
 LEAST_LIGHT = 0.02
 TREND_POINTS = 20_000
+LEAST_PIXELS = 1000
+# Spread of the logarithm above which a channel is not lit as its LED says; lobes stay well below.
+UNEVEN = 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +74,8 @@ def calibrate_radiance(
     Raises
     ------
     InputError
-        If the picture is grey, too dark in a channel, or saturated over most of the field.
+        If the picture is grey, too dark in a channel, saturated over most of the field, or a
+        channel is lit from where another LED is.
     """
     where = f"whiteboard/{whiteboard.name}"
     require_colour(whiteboard, where=where)
@@ -86,6 +90,7 @@ def calibrate_radiance(
     _refuse_hopeless(image, saturated, table.valid, where)
     sigma_px = SMOOTHING_MM / table.grid.pitch_mm
     board = _board_area(image, table.valid)
+    _refuse_other_lights(image[board], (cosines * law)[board], where)
     radiance = np.zeros(image.shape, dtype=np.float32)
     dust = np.zeros(saturated.shape, dtype=bool)
     for k in range(3):
@@ -122,6 +127,31 @@ def _refuse_hopeless(
             where=where,
             advice=tr("Shorten the exposure until the brightest place is below 95 %"),
         )
+
+
+def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
+    """Refuse LEDs of which another explains a channel (N, 3) far better than its own does.
+
+    With its own LED the board's light over the law's is even but for the lobe; with one that stands
+    elsewhere it runs from side to side.
+    """
+    names = (tr("red"), tr("green"), tr("blue"))
+    for k, name in enumerate(names):
+        lit = light[:, k] > LEAST_LIGHT
+        if lit.sum() < LEAST_PIXELS:
+            continue
+        run = np.log(light[lit, k : k + 1] / np.maximum(expected[lit], 1e-12)).std(axis=0)
+        best = int(np.argmin(run))
+        if best != k and run[k] > UNEVEN and run[best] < 0.5 * run[k]:
+            raise InputError(
+                tr("the {name} channel is lit from where the mirror shows the {other} LED").format(
+                    name=name, other=names[best]
+                ),
+                where=where,
+                advice=tr(
+                    "Capture mirror and whiteboard again: the LEDs or colours were swapped between"
+                ),
+            )
 
 
 def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 
+from gelpolight_core.calibration.ball_pixels import neighbourhood
 from gelpolight_core.calibration.calibration import Calibration, FullModel
-from gelpolight_core.calibration.joint import neighbourhood
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.reconstruction.denoise import quiet_even_parts
 from gelpolight_core.reconstruction.heightmap import Flag
@@ -24,6 +24,12 @@ SATURATED = 0.995
 LEAST_BASE = 0.01
 COARSE = 4
 COARSE_ROUNDS = 3
+# A round may not move the surface by more than this share of the LEDs' height: light that is
+# frozen further off than that says next to nothing of the slopes there.
+LONGEST_STEP = 0.2
+# Rounds after a step was held back, and the share of such a step below which they have settled.
+HELD_ROUNDS = 10
+SETTLED = 0.05
 RIM_MM = 0.5
 RIM_CHANGE = 0.08
 RIM_REACH_MM = 2.5
@@ -49,8 +55,9 @@ class FullDepth:
     rim : str
         ``held`` at depth 0, or ``free`` where a contact crosses it.
     stopped : str
-        Why the rounds ended: ``done``, or ``grows`` when the last change was larger than the one
-        before and the round was taken back.
+        Why the rounds ended: ``done``; ``damped`` when steps were held back and the rounds settled
+        all the same; ``grows`` when the last change was larger than the one before and the round
+        was taken back; ``unsettled`` when damped rounds came to no end.
     """
 
     depth_mm: Map
@@ -81,7 +88,8 @@ def reconstruct_full(
     depth, (changes, stopped) = coarse_depth(field, full, pitch, workers)
     slopes, solved, rim = _round(field, depth, full, pitch, workers)
     last = float(np.abs(solved.depth_mm - depth).max())
-    return _placed(field, slopes, solved.depth_mm, (*changes, last), (rim, stopped))
+    depth = held_back(depth, solved.depth_mm, longest_step_mm(full))
+    return _placed(field, slopes, depth, (*changes, last), (rim, stopped))
 
 
 def coarse_depth(
@@ -99,17 +107,38 @@ def coarse_depth(
     coarse = coarsen(field)
     depth = np.zeros(coarse.usable.shape, np.float32)
     changes: list[float] = []
+    longest = longest_step_mm(full)
     stopped = "done"
-    for _ in range(COARSE_ROUNDS):
+    for _ in range(HELD_ROUNDS):
         _, solved, _ = _round(coarse, depth, full, pitch_mm * COARSE, workers)
         changes.append(float(np.abs(solved.depth_mm - depth).max()))
         if len(changes) > 2 and changes[-1] > changes[-2]:
             stopped = "grows"
             break
-        depth = solved.depth_mm
+        depth = held_back(depth, solved.depth_mm, longest)
+        held = max(changes) > longest
+        if len(changes) >= COARSE_ROUNDS and (not held or changes[-1] <= SETTLED * longest):
+            stopped = "damped" if held else "done"
+            break
+    else:
+        stopped = "unsettled"
     rows, columns = field.usable.shape
     whole = cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR)
     return np.asarray(whole), (tuple(changes), stopped)
+
+
+def longest_step_mm(full: FullModel) -> float:
+    """Return how far one round may move the surface."""
+    return LONGEST_STEP * float(np.abs(full.led_positions_mm[:, 2]).min())
+
+
+def held_back(depth_mm: Map, solved_mm: Map, longest_mm: float) -> Map:
+    """Return the solved depth, or as much of the way to it as its longest step may be."""
+    step = solved_mm - depth_mm
+    longest = float(np.abs(step).max())
+    if longest <= longest_mm:
+        return solved_mm
+    return np.asarray(depth_mm + np.float32(longest_mm / longest) * step)
 
 
 def as_linear(frame: NDArray[Any]) -> Map:

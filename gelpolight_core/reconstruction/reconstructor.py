@@ -115,6 +115,10 @@ class Reconstructor:
         notes = []
         if result.rim == "free":
             notes.append(tr("a contact crosses the rim: the rim was let go there"))
+        if result.stopped == "damped":
+            notes.append(tr("the press is deep for its lights: the near-light rounds were damped"))
+        if result.stopped == "unsettled":
+            notes.append(tr("the near-light rounds did not settle: damping did not help"))
         if result.stopped == "grows":
             notes.append(tr("the near-light rounds did not settle: the last was taken back"))
         shown = result.normals if normals else None

@@ -1,8 +1,9 @@
 """The membrane of the full model: a diffuse and a glossy share, and light from its neighbourhood.
 
 The glossy share is a microfacet lobe (GGX distribution, Smith's masking) about the half vector
-between light and view; the diffuse share is a power of the cosine. Both together form one curve of
-brightness that depends on the viewing side, as a real membrane's does.
+between light and view; the diffuse share is a power of the cosine, or a curve for each channel.
+Both together form one curve of brightness that depends on the viewing side, as a real membrane's
+does; curves without gloss are the paper's one-dimensional table (Eq. 6).
 """
 
 from __future__ import annotations
@@ -13,8 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+MEMBRANES = ("two-lobe", "one-dimensional")
 LEAST_COSINE = 1e-3
 LEAST_VIEW = 1e-2
+# Between so many even cosines a straight line is within 1e-5 of any curve a fit or a hand makes.
+CURVE_NODES = 257
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,9 @@ class Membrane:
         fully towards it receives.
     bounce_reach_mm : float
         Standard deviation of the Gaussian over which the neighbourhood is averaged.
+    diffuse : tuple of 3 tuples of `CURVE_NODES` floats
+        The diffuse share of each channel at even cosines from 0 to 1, in place of
+        ``cosine**exponent``; empty where the power stands.
     """
 
     exponent: float = 1.0
@@ -41,6 +48,21 @@ class Membrane:
     roughness: float = 0.5
     bounce: float = 0.0
     bounce_reach_mm: float = 0.8
+    diffuse: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def curves(self) -> Array:
+        """The diffuse curves, (3, `CURVE_NODES`); (3, 0) where the power of the cosine stands."""
+        return np.array(self.diffuse, np.float64).reshape(3, -1)
+
+    def diffuse_share(self, cosine: Array) -> Array:
+        """Return the diffuse brightness (..., 3) at each channel's cosine (..., 3), times pi."""
+        if not self.diffuse:
+            return np.asarray(cosine**self.exponent)
+        even = np.linspace(0.0, 1.0, CURVE_NODES)
+        return np.stack(
+            [np.interp(cosine[..., k], even, curve) for k, curve in enumerate(self.diffuse)], -1
+        )
 
     def response(self, light: Array, normals: Array, view: Array) -> Array:
         """Return the brightness under each light, per unit of light; 0 on the dark side.
@@ -58,7 +80,7 @@ class Membrane:
         """
         facing = np.einsum("nkc,nc->nk", light, normals)
         cosine = np.clip(facing, LEAST_COSINE, 1.0)
-        diffuse = (1.0 - self.gloss) * cosine**self.exponent / np.pi
+        diffuse = (1.0 - self.gloss) * self.diffuse_share(cosine) / np.pi
         glossy = self.gloss * _glossy_lobe(light, normals, view, cosine, self.roughness)
         return np.asarray(np.where(facing > 0.0, diffuse + glossy, 0.0))
 

@@ -124,7 +124,8 @@ def find_ball(
     Raises
     ------
     InputError
-        If no single round indentation is found, or its contact is larger than the ball.
+        If no single round indentation is found, its contact is larger than the ball, or none of
+        its pixels has light.
     """
     usable = table.valid if usable is None else usable & table.valid
     if placed is None:
@@ -151,6 +152,14 @@ def find_ball(
     start = BallPose((float(centre[0]), float(centre[1])), radius_mm, depth)
     inside = usable & _within(table, seen, INSIDE * contact)
     pixels = _shaded_pixels(picture, background, table, inside)
+    if not pixels.weight.any():
+        raise InputError(
+            tr("no lit pixel of the contact can be used"),
+            where=name,
+            advice=tr(
+                "Check that whiteboard, background and press are not dark or saturated there"
+            ),
+        )
     pose, misfit, sd = refine_centre(pixels, start, led_positions_mm)
     moved = float(np.hypot(*(np.array(pose.centre_mm) - centre)))
     return BallPress(

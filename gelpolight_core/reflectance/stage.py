@@ -72,6 +72,8 @@ def ball_scatter(
     for press, picture in zip(presses, pictures, strict=True):
         inside = contact_mask(press, table) & radiance.usable
         rows, columns = np.nonzero(inside)
+        if rows.size == 0:
+            continue  # its whole contact lies where the whiteboard gave no light
         points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
         centre = press.seen_centre_mm(table.drift[rows, columns].mean(axis=0).astype(np.float64))
         seen = BallPose(
@@ -94,7 +96,10 @@ def ball_scatter(
             )
             scatter[k].append((cosines[known, k], values[known, k] / strength[known, k]))
     return [
-        (np.concatenate([c for c, _ in channel]), np.concatenate([v for _, v in channel]))
+        (
+            np.concatenate([np.empty(0), *(c for c, _ in channel)]),
+            np.concatenate([np.empty(0), *(v for _, v in channel)]),
+        )
         for channel in scatter
     ]
 

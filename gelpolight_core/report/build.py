@@ -230,6 +230,14 @@ def _head_facts(c: Calibration) -> tuple[tuple[str, str], ...]:
         (tr("LED height Z1"), f"{s.led_height_mm:g} mm"),
         (tr("Working diameter"), f"{s.working_diameter_mm:g} mm"),
     ]
+    rows += [
+        (
+            tr("Changed by hand"),
+            f"{tr(edit.part)} ({', '.join(tr(c) for c in edit.channels)}), "
+            f"{edit.made}, {edit.operator}".rstrip(", "),
+        )
+        for edit in p.edits
+    ]
     rows += [(key, value) for key, value in sorted(p.camera_settings.items())]
     return tuple(rows)
 

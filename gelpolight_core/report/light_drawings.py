@@ -162,7 +162,7 @@ def _draw_side(axes: Axes, calibration: Calibration) -> None:
             markersize=5,
         )
     axes.axhline(0.0, color="0.3", linewidth=1.0)
-    axes.annotate(tr("top surface"), (0.02, 0.0), (0.02, 0.4), xycoords=("axes fraction", "data"))
+    axes.text(0.02, 0.4, tr("top surface"), va="top", transform=axes.get_yaxis_transform())
     top = 1.15 * float(np.max(-leds[:, 2] + sd[:, 2]))
     axes.set_ylim(top, -0.06 * top)
     axes.set_aspect("equal")

@@ -116,7 +116,7 @@ def _joint_facts(c: Calibration) -> Facts:
             ),
         ),
         (
-            tr("Membrane"),
+            tr("Membrane ({form})").format(form=tr(c.full.membrane_kept)),
             tr(
                 "gloss {gloss:.3f}, roughness {roughness:.3f}, light from around {bounce:.3f}"
             ).format(gloss=m.gloss, roughness=m.roughness, bounce=m.bounce),

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
@@ -126,6 +127,17 @@ def test_names_from_files_are_shown_and_never_obeyed() -> None:
     assert "script" not in {tag for tag, _ in page.tags}
     assert NASTY in page.seen
     assert report_pdf(report).startswith(b"%PDF")
+
+
+def test_what_was_changed_by_hand_is_said() -> None:
+    """A curve that a person drew is no measurement."""
+    c = small()
+    curve = (np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 11) ** 1.2)
+    changed = edited(c, {1: curve}, operator="A. Person", made="2026-03-04T05:06:07+00:00")
+    shown = " ".join(parsed(calibration_report(changed)).seen)
+    assert "Changed by hand" in shown
+    assert "green" in shown and "A. Person" in shown and "2026-03-04" in shown
+    assert "Changed by hand" not in " ".join(parsed(calibration_report(c)).seen)
 
 
 def test_a_figure_that_did_not_pass_comes_with_its_advice() -> None:

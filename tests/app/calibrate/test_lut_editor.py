@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from test_lut_model import scatter, start
@@ -18,6 +21,9 @@ from app.calibrate.lut_effect import Effect
 from app.calibrate.lut_live import effect_sentence
 from app.calibrate.lut_model import CurveEdit
 from app.shell import theme
+
+MOVE_MS = 12
+"""The plot passes moves over that follow each other faster than 100 in a second."""
 
 
 def effect(edit: CurveEdit, press: str) -> Effect:
@@ -36,6 +42,8 @@ def editor(qtbot: QtBot) -> Iterator[LutEditor]:
     widget.resize(1100, 700)
     with qtbot.waitExposed(widget):
         widget.show()
+    widget.activateWindow()
+    widget.plot.setFocus()
     qtbot.wait(50)
     yield widget
     assert widget.stop()
@@ -47,16 +55,41 @@ def pixel(editor: LutEditor, cosine: float, value: float) -> QPoint:
     return editor.plot.mapFromScene(place)
 
 
-def drag(qtbot: QtBot, editor: LutEditor, *points: tuple[float, float]) -> None:
+def send(editor: LutEditor, kind: QEvent.Type, place: QPoint, *, held: bool) -> None:
+    """Send a mouse event; the test library's own moves hold no button down."""
+    view, left, none = editor.plot.viewport(), Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
+    cause = none if kind == QEvent.Type.MouseMove else left
+    at = QPointF(place)
+    event = QMouseEvent(
+        kind,
+        at,
+        QPointF(view.mapToGlobal(place)),
+        cause,
+        left if held else none,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    QApplication.sendEvent(view, event)
+
+
+def drag(editor: LutEditor, *points: tuple[float, float]) -> None:
     """Drag the left button along points of the plot."""
-    view = editor.plot.viewport()
     places = [pixel(editor, *point) for point in points]
-    qtbot.mouseMove(view, places[0])
-    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=places[0])
-    for a, b in zip(places, places[1:], strict=False):
+    send(editor, QEvent.Type.MouseMove, places[0], held=False)
+    send(editor, QEvent.Type.MouseButtonPress, places[0], held=True)
+    for a, b in itertools.pairwise(places):
         for share in np.linspace(0.1, 1.0, 10):
-            qtbot.mouseMove(view, a + (b - a) * float(share))
-    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=places[-1])
+            QTest.qWait(MOVE_MS)
+            send(editor, QEvent.Type.MouseMove, a + (b - a) * float(share), held=True)
+    send(editor, QEvent.Type.MouseButtonRelease, places[-1], held=False)
+
+
+def click(editor: LutEditor, cosine: float, value: float, *, double: bool = False) -> None:
+    """Click or double-click a point of the plot."""
+    place = pixel(editor, cosine, value)
+    send(editor, QEvent.Type.MouseMove, place, held=False)
+    for kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick)[: 1 + double]:
+        send(editor, kind, place, held=True)
+        send(editor, QEvent.Type.MouseButtonRelease, place, held=False)
 
 
 def node(editor: LutEditor, index: int) -> tuple[float, float]:
@@ -65,14 +98,12 @@ def node(editor: LutEditor, index: int) -> tuple[float, float]:
     return curve.cosines[index], curve.values[index]
 
 
-def test_a_node_follows_the_mouse_and_one_undo_brings_it_back(
-    qtbot: QtBot, editor: LutEditor
-) -> None:
+def test_a_node_follows_the_mouse_and_one_undo_brings_it_back(editor: LutEditor) -> None:
     before = editor.state
     cosine, value = node(editor, 3)
     states: list[CurveEdit] = []
     editor.edited.connect(states.append)
-    drag(qtbot, editor, (cosine, value), (cosine, value - 0.03))
+    drag(editor, (cosine, value), (cosine, value - 0.03))
     assert node(editor, 3)[1] == pytest.approx(value - 0.03, abs=0.01)
     assert editor.chosen == 3
     assert states == [editor.state]  # once, when the drag has ended
@@ -82,17 +113,15 @@ def test_a_node_follows_the_mouse_and_one_undo_brings_it_back(
     assert editor.state == states[0]
 
 
-def test_a_drag_beside_every_node_moves_none(qtbot: QtBot, editor: LutEditor) -> None:
+def test_a_drag_beside_every_node_moves_none(editor: LutEditor) -> None:
     before = editor.state
-    drag(qtbot, editor, (0.2, 0.8), (0.3, 0.7))
+    drag(editor, (0.2, 0.8), (0.3, 0.7))
     assert editor.state == before
 
 
 def test_a_click_chooses_a_node_and_del_removes_it(qtbot: QtBot, editor: LutEditor) -> None:
     count = len(editor.state.curves[0].cosines)
-    place = pixel(editor, *node(editor, 2))
-    qtbot.mouseMove(editor.plot.viewport(), place)
-    qtbot.mouseClick(editor.plot.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    click(editor, *node(editor, 2))
     assert editor.chosen == 2
     gone = node(editor, 2)
     qtbot.keyClick(editor.plot, Qt.Key.Key_Delete)
@@ -125,21 +154,18 @@ def test_arrow_keys_nudge_the_chosen_node(
     assert node(editor, 3) == pytest.approx(expected)
 
 
-def test_a_double_click_on_the_curve_adds_a_node_there(qtbot: QtBot, editor: LutEditor) -> None:
+def test_a_double_click_on_the_curve_adds_a_node_there(editor: LutEditor) -> None:
     curve = editor.state.curves[0]
     cosine = 0.5 * (curve.cosines[3] + curve.cosines[4])
-    place = pixel(editor, cosine, float(curve.at(cosine)))
-    qtbot.mouseMove(editor.plot.viewport(), place)
-    qtbot.mouseClick(editor.plot.viewport(), Qt.MouseButton.LeftButton, pos=place)
-    qtbot.mouseDClick(editor.plot.viewport(), Qt.MouseButton.LeftButton, pos=place)
-    qtbot.waitUntil(lambda: len(editor.state.curves[0].cosines) == len(curve.cosines) + 1)
+    click(editor, cosine, float(curve.at(cosine)), double=True)
+    assert len(editor.state.curves[0].cosines) == len(curve.cosines) + 1
     assert node(editor, 4)[0] == pytest.approx(cosine, abs=0.01)
 
 
-def test_the_lasso_leaves_points_out_and_says_how_many(qtbot: QtBot, editor: LutEditor) -> None:
+def test_the_lasso_leaves_points_out_and_says_how_many(editor: LutEditor) -> None:
     editor.findChild(type(editor._actions["lasso"]), "lut.lasso").trigger()
     outline = [(0.48, 0.62), (0.62, 0.75), (0.62, 0.95), (0.48, 0.8)]
-    drag(qtbot, editor, *outline)
+    drag(editor, *outline)
     assert float(editor.state.curves[0].at(0.55)) == pytest.approx(0.05 + 0.9 * 0.55**1.3, abs=0.02)
     assert "points are left out" in editor._notice.text()
     editor.undo_stack.undo()

@@ -1,0 +1,140 @@
+"""The reflectance table, changed by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration, HandEdit
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.background import flat_cosines
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Curve = tuple[Array, Array]
+CHANNELS = ("red", "green", "blue")
+# Below this share of a curve's brightest value its relative change means nothing.
+LEAST_SHARE = 0.01
+
+
+def edited(
+    calibration: Calibration, curves: Mapping[int, Curve], *, operator: str, made: str
+) -> Calibration:
+    """Return the calibration with reflectance curves that a person drew.
+
+    The paper's model uses the curve as it is drawn. The full model's diffuse share is multiplied by
+    what was changed, new curve over old; its gloss stays. The reflectance factors (Eq. 9) follow,
+    so that the bare membrane stays flat, whatever the curve says of it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        To be changed; the result is another.
+    curves : mapping of int to (cosines, values)
+        By channel (0 red, 1 green, 2 blue), nodes (N,) of G: cosines from 0 to 1, processed values
+        I / (rho |L|). Channels that are left out, or not changed, stay.
+    operator : str
+        Who did it.
+    made : str
+        When: ISO 8601 time with zone.
+
+    Raises
+    ------
+    InputError
+        If a curve is not finite, does not reach from 0 to 1, or does not rise everywhere.
+    """
+    old = calibration.reflectance
+    cosines, values = list(old.cosines), list(old.values)
+    changed = []
+    for channel, curve in sorted(curves.items()):
+        nodes, shown = _checked(channel, curve)
+        same = np.array_equal(nodes, cosines[channel]) and np.array_equal(shown, values[channel])
+        if not same:
+            cosines[channel], values[channel] = nodes, shown
+            changed.append(channel)
+    if not changed:
+        return calibration
+    new = ReflectanceTable(
+        (cosines[0], cosines[1], cosines[2]), (values[0], values[1], values[2]), old.coverage
+    )
+    flat = flat_cosines(calibration.table, calibration.led_positions_mm)
+    factors = calibration.factors.copy()
+    for k in changed:
+        known = factors[..., k] > 0.0
+        there = flat[known, k]
+        factors[known, k] *= old.response(k, there) / new.response(k, there)
+    full = calibration.full
+    if full is not None:
+        middle = flat[flat.shape[0] // 2, flat.shape[1] // 2]
+        full = replace(full, membrane=edited_membrane(full.membrane, old, new, changed, middle))
+    edit = HandEdit("reflectance", tuple(CHANNELS[k] for k in changed), made, operator)
+    provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
+    return replace(calibration, reflectance=new, factors=factors, full=full, provenance=provenance)
+
+
+def edited_membrane(
+    membrane: Membrane,
+    old: ReflectanceTable,
+    new: ReflectanceTable,
+    channels: list[int],
+    flat_cosine: Array,
+) -> Membrane:
+    """Multiply a membrane's diffuse share by the change of a table.
+
+    Parameters
+    ----------
+    membrane : Membrane
+        Before.
+    old, new : ReflectanceTable
+        Before and after.
+    channels : list of int
+        Which were changed.
+    flat_cosine : (3,)
+        Of each light on the flat membrane: as the picture without contact is what a press is
+        compared with, a curve's height means nothing; the share keeps its brightness here.
+    """
+    even = np.linspace(0.0, 1.0, CURVE_NODES)
+    share = membrane.diffuse_share(np.repeat(even[:, None], 3, axis=1)).T
+    for k in channels:
+        before, after = old.response(k, even), new.response(k, even)
+        known = before > LEAST_SHARE * before[-1]
+        ratio = np.interp(even, even[known], after[known] / before[known])
+        ratio /= np.interp(flat_cosine[k], even, ratio)
+        curve = np.maximum.accumulate(share[k] * ratio)
+        ramp = LEAST_STEP * curve[-1] * np.arange(CURVE_NODES)
+        share[k] = np.maximum.accumulate(curve - ramp) + ramp
+    return replace(membrane, diffuse=tuple(tuple(curve) for curve in share.tolist()))
+
+
+def table_membrane(table: ReflectanceTable) -> Membrane:
+    """Return the paper's one-dimensional membrane: a table as it is, without gloss or bounce."""
+    even = np.linspace(0.0, 1.0, CURVE_NODES)
+    curves = [table.response(k, even) / table.values[k][-1] for k in range(3)]
+    return Membrane(diffuse=tuple(tuple(curve.tolist()) for curve in curves))
+
+
+def _checked(channel: int, curve: Curve) -> Curve:
+    """Return a curve's nodes as float64, or say what is wrong with them."""
+    if channel not in range(3):
+        raise ValueError(f"channel {channel}")
+    nodes, shown = (np.array(part, np.float64) for part in curve)
+    if nodes.ndim != 1 or nodes.shape != shown.shape or nodes.size < 2:
+        found = tr("the curve has {n} cosines and {m} values").format(n=nodes.size, m=shown.size)
+    elif not (np.isfinite(nodes).all() and np.isfinite(shown).all()):
+        found = tr("the curve holds values that are no numbers")
+    elif nodes[0] != 0.0 or nodes[-1] != 1.0 or (np.diff(nodes) <= 0.0).any():
+        found = tr("the curve's cosines do not rise from 0 to 1")
+    elif shown[0] < 0.0 or (np.diff(shown) <= 0.0).any():
+        found = tr("the curve does not rise everywhere from 0 or above")
+    else:
+        return nodes, shown
+    raise InputError(
+        found,
+        where=tr("reflectance, {name} channel").format(name=tr(CHANNELS[channel])),
+        advice=tr("Move the nodes so that brightness grows with the cosine"),
+    )

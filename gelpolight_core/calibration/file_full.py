@@ -1,0 +1,101 @@
+"""The full model's part of the calibration file."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import FullModel
+from gelpolight_core.reflectance.membrane import CURVE_NODES, MEMBRANES, Membrane
+
+CURVES = "full_membrane_diffuse"
+
+
+def full_entry(full: FullModel) -> dict[str, Any]:
+    """Return what of a full model goes into the manifest."""
+    membrane = asdict(full.membrane)
+    del membrane["diffuse"]
+    return {
+        "membrane": membrane,
+        "membrane_sd": dict(full.membrane_sd),
+        "membrane_held_out": list(full.membrane_held_out),
+        "membrane_kept": full.membrane_kept,
+        "decay_mm": full.decay_mm,
+        "misfit": full.misfit,
+        "held_out": list(full.held_out),
+        "kept": full.kept,
+    }
+
+
+def full_arrays(full: FullModel) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a full model by their names in the file."""
+    arrays: dict[str, NDArray[Any]] = {
+        "full_led_positions_mm": full.led_positions_mm,
+        "full_led_sd_mm": full.led_sd_mm,
+        "full_background": full.background,
+    }
+    if full.membrane.diffuse:
+        arrays[CURVES] = full.membrane.curves
+    return arrays
+
+
+def read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullModel:
+    """Return the full model of a file, its plain values checked.
+
+    Raises
+    ------
+    ValueError
+        If a value is missing or is one that no full model has.
+    """
+    before, after = (float(value) for value in entry["held_out"])
+    lengths = np.array([entry["decay_mm"], entry["misfit"], before, after], float)
+    if not np.isfinite(lengths).all() or lengths.min() < 0.0 or lengths[0] == 0.0:
+        raise ValueError("the joint refinement's figures are not possible")
+    if entry["kept"] not in ("refined", "mirror"):
+        raise ValueError(f"unknown LEDs {entry['kept']!r}")
+    # Files of version 1 do not have what follows.
+    kept = entry.get("membrane_kept", MEMBRANES[0])
+    if kept not in MEMBRANES:
+        raise ValueError(f"unknown membrane {kept!r}")
+    two_lobe, one_dimensional = (float(v) for v in entry.get("membrane_held_out", (0.0, 0.0)))
+    sd = {str(name): float(value) for name, value in entry.get("membrane_sd", {}).items()}
+    figures = np.array([two_lobe, one_dimensional, *sd.values()], float)
+    if not np.isfinite(figures).all() or figures.min() < 0.0:
+        raise ValueError("the membrane's figures are not possible")
+    return FullModel(
+        led_positions_mm=arrays["full_led_positions_mm"],
+        led_sd_mm=arrays["full_led_sd_mm"],
+        membrane=_read_membrane(entry["membrane"], arrays.get(CURVES)),
+        background=arrays["full_background"],
+        decay_mm=float(entry["decay_mm"]),
+        misfit=float(entry["misfit"]),
+        held_out=(before, after),
+        kept=str(entry["kept"]),
+        membrane_sd=sd,
+        membrane_held_out=(two_lobe, one_dimensional),
+        membrane_kept=str(kept),
+    )
+
+
+def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membrane:
+    values = {name: float(value) for name, value in entry.items()}
+    diffuse: tuple[tuple[float, ...], ...] = ()
+    if curves is not None:
+        if curves.shape != (3, CURVE_NODES) or not np.isfinite(curves).all():
+            raise ValueError("the membrane's curves are not possible")
+        if curves.min() < 0.0 or (np.diff(curves, axis=1) < 0.0).any():
+            raise ValueError("the membrane's curves are not monotone")
+        if not (curves[:, -1] > 0.0).all():
+            raise ValueError("the membrane's curves are dark")
+        diffuse = tuple(tuple(curve) for curve in curves.astype(np.float64).tolist())
+    membrane = Membrane(**values, diffuse=diffuse)
+    if not np.isfinite(list(values.values())).all() or not 0.0 <= membrane.gloss < 1.0:
+        raise ValueError("the membrane is not possible")
+    if membrane.exponent <= 0.0 or not 0.0 < membrane.roughness <= 1.0:
+        raise ValueError("the membrane is not possible")
+    if membrane.bounce < 0.0 or membrane.bounce_reach_mm <= 0.0:
+        raise ValueError("the membrane is not possible")
+    return membrane
