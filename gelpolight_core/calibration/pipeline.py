@@ -28,8 +28,9 @@ from gelpolight_core.lights.positions import LightResult, locate_leds
 from gelpolight_core.optics.lens import LensResult, calibrate_lens
 from gelpolight_core.optics.pose import TopPoseResult, estimate_top_pose
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
-from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radiance
+from gelpolight_core.reflectance.membrane import MEMBRANES
 from gelpolight_core.reflectance.press import BallPress, find_ball
 from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
 from gelpolight_core.session.picture import Picture
@@ -230,11 +231,25 @@ def _judge_full(full: FullModel) -> QualityTable:
                 fail=1.0,
                 advice=tr("Press more balls, at more places"),
             ),
+            *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
             judge("bounce", tr("Light from the membrane around"), full.membrane.bounce, warn=1.2),
             judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
         )
     )
+
+
+def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
+    """Return which membrane was kept, and by how much; nothing where no press was held out."""
+    two_lobe, one_dimensional = full.membrane_held_out
+    if two_lobe <= 0.0:
+        return ()
+    label = {
+        MEMBRANES[0]: tr("Held-out error, one-dimensional over two-lobe (two-lobe kept)"),
+        MEMBRANES[1]: tr("Held-out error, one-dimensional over two-lobe (one-dim. kept)"),
+    }
+    ratio = one_dimensional / two_lobe
+    return (judge("membrane_held_out_ratio", label[full.membrane_kept], ratio),)
 
 
 def _find_balls(
