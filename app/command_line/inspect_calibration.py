@@ -41,6 +41,32 @@ def run(options: argparse.Namespace) -> int:
     ]
     for name, led in zip(("red", "green", "blue"), c.led_positions_mm, strict=True):
         rows.append((f"{tr(name)} LED", "({:.3f}, {:.3f}, {:.3f}) mm".format(*led)))
+    if c.full is not None:
+        m = c.full.membrane
+        shown = tr("{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, bounce {bounce:.2f}")
+        kept = {"two-lobe": tr("two-lobe"), "one-dimensional": tr("one-dimensional")}
+        rows.append(
+            (
+                tr("membrane"),
+                shown.format(
+                    kept=kept[c.full.membrane_kept],
+                    gloss=m.gloss,
+                    roughness=m.roughness,
+                    bounce=m.bounce,
+                ),
+            )
+        )
+    for edit in c.provenance.edits:
+        channels = ", ".join(tr(name) for name in edit.channels)
+        text = tr("{part} ({channels}) {made} {operator}")
+        rows.append(
+            (
+                tr("edited by hand"),
+                text.format(
+                    part=tr(edit.part), channels=channels, made=edit.made, operator=edit.operator
+                ).strip(),
+            )
+        )
     print("\n".join(f"{label:<18} {value}" for label, value in rows))
     print("\n".join(quality_lines(c.quality)))
     return 0

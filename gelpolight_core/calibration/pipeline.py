@@ -11,6 +11,7 @@ import numpy as np
 
 from gelpolight_core import __version__
 from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
+from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.calibration.stages import (
@@ -25,8 +26,9 @@ from gelpolight_core.lights.crosstalk import crosstalk_from_spots
 from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
-from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reflectance.membrane import MEMBRANES
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
 from gelpolight_core.session.session import Session, file_hash, refuse_copies
@@ -99,6 +101,16 @@ def calibrate_session(
     return assemble(session, results, model=model)
 
 
+def _with_edits(calibration: Calibration, session: Session) -> Calibration:
+    """Apply the reflectance curves that a person has drawn."""
+    curves = {
+        channel: (np.array([c for c, _ in nodes]), np.array([v for _, v in nodes]))
+        for channel, nodes in session.decisions.curves.items()
+    }
+    made = calibration.provenance
+    return edited(calibration, curves, operator=made.operator, made=made.created)
+
+
 def stages_of(model: str) -> tuple[Stage, ...]:
     """Return the stages of a model's calibration, in order."""
     return tuple(stage for stage in Stage if model == "full" or stage is not Stage.JOINT)
@@ -163,6 +175,7 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
         provenance=_provenance(session),
         full=full,
     )
+    calibration = _with_edits(calibration, session)
     joint = results.joint if model == "full" else None
     return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors, joint)
 
@@ -189,11 +202,25 @@ def judge_joint(full: FullModel) -> QualityTable:
                 fail=1.0,
                 advice=tr("Press more balls, at more places"),
             ),
+            *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
             judge("bounce", tr("Light from the membrane around"), full.membrane.bounce, warn=1.2),
             judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
         )
     )
+
+
+def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
+    """Return which membrane was kept, and by how much; nothing where no press was held out."""
+    two_lobe, one_dimensional = full.membrane_held_out
+    if two_lobe <= 0.0:
+        return ()
+    label = {
+        MEMBRANES[0]: tr("Held-out error, one-dimensional over two-lobe (two-lobe kept)"),
+        MEMBRANES[1]: tr("Held-out error, one-dimensional over two-lobe (one-dim. kept)"),
+    }
+    ratio = one_dimensional / two_lobe
+    return (judge("membrane_held_out_ratio", label[full.membrane_kept], ratio),)
 
 
 def _provenance(session: Session) -> Provenance:

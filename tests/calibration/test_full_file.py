@@ -18,7 +18,9 @@ import scene
 from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.calibration.file import MANIFEST, read_calibration, write_calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+
+CURVES = tuple(tuple((np.linspace(0.0, 1.0, CURVE_NODES) ** n).tolist()) for n in (1.0, 1.1, 0.9))
 
 
 def full_calibration() -> Calibration:
@@ -27,12 +29,15 @@ def full_calibration() -> Calibration:
     full = FullModel(
         led_positions_mm=plain.led_positions_mm + np.array([0.1, -0.03, -0.2]),
         led_sd_mm=np.array([[0.01, 0.02, 0.05], [0.015, 0.01, 0.04], [0.01, 0.01, 0.06]]),
-        membrane=Membrane(1.03, 0.21, 0.47, 0.31, 0.9),
+        membrane=Membrane(1.03, 0.21, 0.47, 0.31, 0.9, CURVES),
         background=(0.9 * plain.radiance).astype(np.float32),
         decay_mm=0.68,
         misfit=0.0123,
         held_out=(0.031, 0.0134),
         kept="refined",
+        membrane_sd={"exponent": 0.0, "gloss": 0.012},
+        membrane_held_out=(0.0134, 0.0129),
+        membrane_kept="one-dimensional",
     )
     return replace(plain, model="full", full=full)
 
@@ -79,7 +84,15 @@ def test_the_full_model_comes_back(whole: Path) -> None:
     assert after.model == "full"
     assert after.identity == before.identity
     assert after.full.membrane == before.full.membrane
-    for name in ("decay_mm", "misfit", "held_out", "kept"):
+    for name in (
+        "decay_mm",
+        "misfit",
+        "held_out",
+        "kept",
+        "membrane_sd",
+        "membrane_held_out",
+        "membrane_kept",
+    ):
         assert getattr(after.full, name) == getattr(before.full, name)
     for name in ("led_positions_mm", "led_sd_mm", "background"):
         np.testing.assert_array_equal(getattr(after.full, name), getattr(before.full, name))
@@ -89,6 +102,46 @@ def test_the_full_model_comes_back(whole: Path) -> None:
 def test_the_same_full_calibration_is_the_same_file(whole: Path, tmp_path: Path) -> None:
     write_calibration(read_calibration(whole), tmp_path / "again.gplcal")
     assert (tmp_path / "again.gplcal").read_bytes() == whole.read_bytes()
+
+
+def test_a_full_model_of_version_1_is_read(whole: Path, tmp_path: Path) -> None:
+    """It had no curves, no deviations of the membrane and no choice between membranes."""
+
+    def older(manifest: dict[str, Any]) -> None:
+        manifest["version"] = 1
+        del manifest["provenance"]["edits"]
+        for key in ("membrane_sd", "membrane_held_out", "membrane_kept"):
+            del manifest["full"][key]
+        del manifest["arrays"]["full_membrane_diffuse"]
+
+    read = read_calibration(forged(whole, tmp_path / "old.gplcal", older))
+    assert read.full is not None
+    assert read.full.membrane == Membrane(1.03, 0.21, 0.47, 0.31, 0.9)
+    assert read.full.membrane_kept == "two-lobe"
+    assert read.provenance.edits == ()
+
+
+@pytest.mark.parametrize("spoil", ["falling", "nan", "dark", "short", "negative"])
+def test_curves_that_no_membrane_has_are_refused(whole: Path, tmp_path: Path, spoil: str) -> None:
+    curves = np.array(CURVES)
+    if spoil == "falling":
+        curves[1, 100] = curves[1, 90]
+    elif spoil == "nan":
+        curves[0, 3] = np.nan
+    elif spoil == "dark":
+        curves[2] = 0.0
+    elif spoil == "short":
+        curves = curves[:, ::2].copy()
+    else:
+        curves -= 0.1
+    with pytest.raises(InputError, match="curves"):
+        read_calibration(forged(whole, tmp_path / "f.gplcal", full_membrane_diffuse=curves))
+
+
+def test_the_same_pictures_have_the_same_name_whoever_calibrates_and_when() -> None:
+    one = full_calibration()
+    later = replace(one.provenance, created="2031-01-01T00:00:00+00:00", operator="another")
+    assert replace(one, provenance=later).identity == one.identity
 
 
 def test_every_part_of_the_full_model_changes_the_identity() -> None:
@@ -211,6 +264,9 @@ def test_arrays_that_are_not_finite_are_refused(
         {"held_out": [float("nan"), 1.0]},
         {"membrane": {"bounce": -1.0}},
         {"membrane": {"bounce_reach_mm": 0.0}},
+        {"membrane_kept": "velvet"},
+        {"membrane_sd": {"gloss": -0.1}},
+        {"membrane_held_out": [0.1]},
     ],
     ids=str,
 )

@@ -12,13 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.joint import (
-    BallPixels,
-    JointResult,
-    neighbourhood,
-    refine_jointly,
-    view_directions,
-)
+from gelpolight_core.calibration.ball_pixels import BallPixels, neighbourhood, view_directions
+from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.press import BallPress
@@ -54,6 +49,7 @@ class Truth:
     roughness: float = 0.5
     bounce: float = 0.0
     decay_mm: float = 0.7
+    grazing: float = 0.0  # so much brighter than Lambert's law under grazing light
 
 
 def truth(**changes: float) -> Truth:
@@ -86,7 +82,9 @@ def shaded(truth: Truth, place: Array, normals: Array, view: Array) -> Array:
         for cosine in (lit, seen):
             masks = masks * 2.0 / (1.0 + np.sqrt(1.0 + a2 * (1.0 / cosine**2 - 1.0)))
         lobe = truth.gloss * spread * masks / (4.0 * seen)
-        both = (1.0 - truth.gloss) * lit**truth.exponent / np.pi + lobe
+        both = (1.0 - truth.gloss) * lit**truth.exponent / np.pi * (
+            1.0 + truth.grazing * (1.0 - lit)
+        ) + lobe
         columns.append(both * -light[:, 2] / r2[:, 0])
     return np.stack(columns, axis=-1)
 
@@ -191,6 +189,37 @@ def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share() -> None
     assert result.cap_bounce == pytest.approx(0.3, abs=0.15)
     assert result.decay_mm == pytest.approx(0.8, abs=0.02)
     assert result.membrane.exponent == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_glossy_membrane_keeps_its_two_lobes(glossy: tuple[Truth, JointResult]) -> None:
+    """No one curve of the light's cosine explains brightness that depends on the view."""
+    _, result = glossy
+    assert result.membrane_kept == "two-lobe"
+    assert not result.membrane.diffuse
+    two_lobe, one_dimensional = result.membrane_held_out
+    assert one_dimensional > 1.2 * two_lobe
+
+
+def test_a_matt_membrane_that_is_not_lamberts_is_a_curve() -> None:
+    known = truth(grazing=0.35)
+    result = refined(known, noise=0.003, seed=2)
+    assert result.membrane_kept == "one-dimensional"
+    two_lobe, one_dimensional = result.membrane_held_out
+    assert one_dimensional < 0.9 * two_lobe
+    assert result.membrane.gloss == 0.0
+    # Over the cosines that the balls show, but for its height, which nothing tells.
+    cosine = np.linspace(0.4, 0.95, 30)
+    expected = cosine * (1.0 + known.grazing * (1.0 - cosine))
+    share = result.membrane.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
+    ratio = share / expected[:, None]
+    assert (np.ptp(ratio, axis=0) / ratio.mean(axis=0) < 0.04).all()
+
+
+def test_what_was_not_refined_has_no_deviation(glossy: tuple[Truth, JointResult]) -> None:
+    assert glossy[1].membrane_sd["gloss"] > 0.0
+    flat = refined(truth(grazing=0.35), noise=0.003, seed=2).membrane_sd
+    assert flat["gloss"] == flat["exponent"] == flat["roughness"] == 0.0
+    assert flat["decay_mm"] > 0.0
 
 
 def test_the_misfit_is_the_noise_of_the_pixels(glossy: tuple[Truth, JointResult]) -> None:

@@ -90,3 +90,10 @@ def test_a_board_smaller_than_the_circle_ends_where_it_ends() -> None:
 def test_a_whiteboard_that_cannot_be_used_is_refused(rgb: np.ndarray, what: str) -> None:
     with pytest.raises(InputError, match=what):
         calibrate_radiance(Picture("whiteboard.png", rgb), scene.table(), scene.LEDS)
+
+
+@pytest.mark.parametrize("order", [[1, 0, 2], [2, 1, 0], [1, 2, 0]])
+def test_leds_that_the_mirror_shows_in_each_others_places_are_refused(order: list[int]) -> None:
+    picture = Picture("whiteboard.png", whiteboard())
+    with pytest.raises(InputError, match="is lit from where the mirror shows the"):
+        calibrate_radiance(picture, scene.table(), scene.LEDS[order])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
-from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 
 Array = NDArray[np.float64]
 PITCH = 0.08
@@ -21,6 +21,9 @@ DRIFT = np.stack([-(POINTS[..., 0] - 0.3) / 36.0, -(POINTS[..., 1] + 0.5) / 36.0
 LEDS = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.9], [10.1, -6.3, -13.5]])
 MATT = Membrane()
 GLOSSY = Membrane(1.05, 0.25, 0.45)
+_EVEN = np.linspace(0.0, 1.0, CURVE_NODES)
+BENT = tuple(tuple((_EVEN * (1.0 + g * (1.0 - _EVEN))).tolist()) for g in (0.2, 0.35, 0.5))
+CURVED = Membrane(diffuse=BENT)
 SIGMA = 0.002
 
 
@@ -37,7 +40,7 @@ def brightness(place: Array, normals: Array, view: Array, membrane: Membrane) ->
     Written from PHYSICS' shading and the GGX lobe of Walter et al. 2007, by angles.
     """
     shown = []
-    for led in LEDS:
+    for k, led in enumerate(LEDS):
         away = led - place
         r = np.sqrt((away**2).sum(-1))
         light = away / r[..., None]
@@ -53,6 +56,9 @@ def brightness(place: Array, normals: Array, view: Array, membrane: Membrane) ->
             masks.append(2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * (1.0 / cosine**2 - 1.0))))
         lobe = facets * masks[0] * masks[1] / (4.0 * seen)
         diffuse = np.clip(lit, 0.0, None) ** membrane.exponent / np.pi
+        if membrane.diffuse:
+            grazing = (0.2, 0.35, 0.5)[k]
+            diffuse = np.clip(lit, 0.0, None) * (1.0 + grazing * (1.0 - lit)) / np.pi
         both = (1.0 - membrane.gloss) * diffuse + membrane.gloss * lobe
         strength = -light[..., 2] / r**2  # the LED's own cosine lobe, inverse square
         shown.append(np.where(lit > 0.0, both * strength, 0.0))
@@ -102,8 +108,15 @@ def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
 
 @pytest.mark.parametrize(
     "membrane",
-    [MATT, Membrane(1.2), GLOSSY, replace(GLOSSY, bounce=0.4)],
-    ids=["matt", "exponent", "glossy", "light from around"],
+    [
+        MATT,
+        Membrane(1.2),
+        GLOSSY,
+        replace(GLOSSY, bounce=0.4),
+        CURVED,
+        replace(GLOSSY, diffuse=BENT),
+    ],
+    ids=["matt", "exponent", "glossy", "light from around", "curves", "glossy curves"],
 )
 def test_known_normals_are_found(membrane: Membrane) -> None:
     field, depth, normals = scene_of(membrane)
@@ -114,6 +127,15 @@ def test_known_normals_are_found(membrane: Membrane) -> None:
     assert not found.flags.any()
     assert (found.weight == 1.0).all()
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-5)
+
+
+def test_curves_equal_to_the_power_of_the_cosine_give_its_normals() -> None:
+    field, depth, _ = scene_of(GLOSSY)
+    curve = tuple((_EVEN**GLOSSY.exponent).tolist())
+    by_power = solved(field, depth, GLOSSY)
+    by_curve = solved(field, depth, replace(GLOSSY, diffuse=(curve,) * 3))
+    # Straight lines between 257 nodes.
+    np.testing.assert_allclose(by_curve.normals, by_power.normals, atol=1e-4)
 
 
 def test_light_frozen_at_the_flat_membrane_would_be_wrong() -> None:

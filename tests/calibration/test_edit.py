@@ -1,0 +1,188 @@
+"""A reflectance curve drawn by hand: what it changes, and what it must not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scene
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.calibration.edit import edited, table_membrane
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.background import flat_cosines
+from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.table import ReflectanceTable
+
+Array = NDArray[np.float64]
+NODES = np.linspace(0.0, 1.0, 9)
+BENT = 1.2 * NODES**1.3 + 0.02
+WHEN = "2026-05-06T07:08:09+00:00"
+
+
+def full_calibration(membrane: Membrane | None = None) -> Calibration:
+    plain = scene.calibration()
+    full = FullModel(
+        led_positions_mm=plain.led_positions_mm,
+        led_sd_mm=np.full((3, 3), 0.01),
+        membrane=membrane or Membrane(1.02, 0.2, 0.5, 0.3, 1.0),
+        background=plain.radiance,
+        decay_mm=0.7,
+        misfit=0.01,
+        held_out=(0.03, 0.02),
+        kept="refined",
+    )
+    return replace(plain, model="full", full=full)
+
+
+def drawn(calibration: Calibration, **more: str) -> Calibration:
+    """Return the calibration with the green curve bent."""
+    return edited(calibration, {1: (NODES, BENT)}, operator="a technician", made=WHEN, **more)
+
+
+def membrane_of(calibration: Calibration) -> Membrane:
+    assert calibration.full is not None
+    return calibration.full.membrane
+
+
+def test_the_papers_model_uses_the_curve_as_it_is_drawn() -> None:
+    plain, after = scene.calibration(), drawn(full_calibration())
+    np.testing.assert_array_equal(after.reflectance.values[1], BENT)
+    np.testing.assert_array_equal(after.reflectance.cosines[1], NODES)
+    for k in (0, 2):
+        np.testing.assert_array_equal(after.reflectance.values[k], plain.reflectance.values[k])
+
+
+def test_the_bare_membrane_stays_flat() -> None:
+    """What the background shows still means the flat membrane's cosine."""
+    before = full_calibration()
+    after = drawn(before)
+    flat = flat_cosines(before.table, before.led_positions_mm)[..., 1]
+    lit = before.factors[..., 1] > 0.0
+    shown = before.factors[lit, 1] * before.reflectance.response(1, flat[lit])
+    # G and R are splines of their own, inverse to each other at the nodes.
+    np.testing.assert_allclose(
+        after.reflectance.cosine(1, shown / after.factors[lit, 1]), flat[lit], atol=1e-4
+    )
+
+
+def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
+    before = membrane_of(full_calibration())
+    after = membrane_of(drawn(full_calibration()))
+    cosine = np.linspace(0.05, 1.0, 50)
+    share = after.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
+    old = before.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
+    change = ReflectanceTable((NODES,) * 3, (BENT,) * 3, np.zeros((3, 2))).response(1, cosine)
+    ratio = share[:, 1] / old[:, 1] / (change / cosine)
+    # But for its height, which the comparison with the bare membrane takes out.
+    assert np.ptp(ratio) / ratio.mean() < 2e-3
+    for k in (0, 2):
+        np.testing.assert_allclose(share[:, k], old[:, k], atol=2e-5)
+    assert (after.gloss, after.roughness, after.bounce) == (0.2, 0.5, 0.3)
+
+
+def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
+    before = full_calibration()
+    after = drawn(before)
+    assert after.identity != before.identity
+    (edit,) = after.provenance.edits
+    assert (edit.part, edit.channels) == ("reflectance", ("green",))
+    assert (edit.operator, edit.made) == ("a technician", WHEN)
+    write_calibration(after, tmp_path / "edited.gplcal")
+    read = read_calibration(tmp_path / "edited.gplcal")
+    assert read.provenance.edits == after.provenance.edits
+    assert membrane_of(read) == membrane_of(after)
+    assert read.identity == after.identity
+
+
+def test_who_edited_and_when_does_not_change_the_name_of_the_same_numbers() -> None:
+    before = full_calibration()
+    other = edited(before, {1: (NODES, BENT)}, operator="another", made="2027-01-01T00:00:00+00:00")
+    assert other.identity == drawn(before).identity
+
+
+def test_a_curve_that_is_not_changed_changes_nothing() -> None:
+    before = full_calibration()
+    table = before.reflectance
+    same = {k: (table.cosines[k], table.values[k]) for k in range(3)}
+    assert edited(before, same, operator="x", made=WHEN) is before
+
+
+def test_an_edit_taken_back_is_nearly_the_old_membrane() -> None:
+    before = full_calibration()
+    table = before.reflectance
+    back = edited(drawn(before), {1: (table.cosines[1], table.values[1])}, operator="x", made=WHEN)
+    even = np.repeat(np.linspace(0.02, 1.0, 200)[:, None], 3, axis=1)
+    np.testing.assert_allclose(
+        membrane_of(back).diffuse_share(even), membrane_of(before).diffuse_share(even), atol=1e-4
+    )
+    np.testing.assert_allclose(back.factors, before.factors, rtol=1e-5)
+    assert len(back.provenance.edits) == 2
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(0.001, 1.0), min_size=3, max_size=12), st.floats(0.0, 0.2))
+def test_whatever_is_drawn_the_membrane_keeps_growing_brighter(
+    steps: list[float], floor: float
+) -> None:
+    values = floor + np.cumsum([0.0, *steps])
+    nodes = np.linspace(0.0, 1.0, values.size)
+    after = edited(full_calibration(), {0: (nodes, values)}, operator="x", made=WHEN)
+    curves = membrane_of(after).curves
+    assert (np.diff(curves, axis=1) > 0.0).all()
+    assert np.isfinite(curves).all()
+    assert (after.factors >= 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("nodes", "values"),
+    [
+        ([0.0, 0.5, 1.0], [0.0, 0.6, 0.6]),
+        ([0.0, 0.5, 1.0], [0.0, 0.6, 0.5]),
+        ([0.0, 0.5, 0.5, 1.0], [0.0, 0.2, 0.3, 1.0]),
+        ([0.1, 1.0], [0.0, 1.0]),
+        ([0.0, 0.9], [0.0, 1.0]),
+        ([0.0, 1.0], [-0.1, 1.0]),
+        ([0.0, 1.0], [0.0, np.nan]),
+        ([0.0, 1.0], [0.0, 0.5, 1.0]),
+        ([0.0], [1.0]),
+    ],
+)
+def test_a_curve_that_cannot_be_inverted_is_refused(
+    nodes: list[float], values: list[float]
+) -> None:
+    curve = (np.array(nodes), np.array(values))
+    with pytest.raises(InputError, match="green"):
+        edited(full_calibration(), {1: curve}, operator="x", made=WHEN)
+
+
+def test_a_papers_calibration_without_full_model_can_be_edited() -> None:
+    after = drawn(scene.calibration())
+    assert after.full is None
+    assert len(after.provenance.edits) == 1
+
+
+def test_the_papers_table_is_a_membrane_exactly() -> None:
+    """Without gloss and bounce, brightness is the table's, whatever the view."""
+    random = np.random.default_rng(1)
+    bins = np.sort(random.uniform(0.02, 0.98, 12))
+    nodes = np.concatenate([[0.0], bins, [1.0]])
+    values = tuple(0.03 + np.cumsum(random.uniform(0.02, 0.2, nodes.size)) for _ in range(3))
+    table = ReflectanceTable((nodes,) * 3, (values[0], values[1], values[2]), np.zeros((3, 2)))
+    membrane = table_membrane(table)
+    tilt = np.linspace(0.0, 1.5, 60)
+    normals = np.stack([np.sin(tilt), 0.0 * tilt, -np.cos(tilt)], -1)
+    light = np.tile([0.0, 0.0, -1.0], (60, 3, 1))
+    view = random.normal(size=(60, 3)) - [0.0, 0.0, 3.0]
+    view /= np.linalg.norm(view, axis=1, keepdims=True)
+    shown = np.pi * membrane.response(light, normals, view)
+    for k in range(3):
+        expected = table.response(k, np.cos(tilt)) / table.values[k][-1]
+        # Straight lines between 257 nodes: curvature times the step squared over 8.
+        np.testing.assert_allclose(shown[:, k], expected, atol=1e-3)

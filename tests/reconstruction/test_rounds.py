@@ -1,0 +1,108 @@
+"""The near-light rounds: they settle, are damped where they would leap, and say so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import FullModel
+from gelpolight_core.reconstruction import full as rounds
+from gelpolight_core.reconstruction.near_light import ShadedField
+from gelpolight_core.reflectance.membrane import Membrane
+
+Array = NDArray[np.float64]
+PITCH = 0.16
+X = -12.0 + PITCH * np.arange(152)
+Y = -11.0 + PITCH * np.arange(136)
+POINTS = np.stack(np.meshgrid(X, Y), axis=-1)
+DRIFT = -POINTS / 36.0
+
+
+def dent(
+    depth_mm: float, width_mm: float, led_height_mm: float
+) -> tuple[ShadedField, FullModel, Array]:
+    """Return a wide Gaussian dent as seen along the rays, its sensor, and its depth at each ray."""
+    leds = np.array([[0.5, 11.8, 0.0], [-10.4, -5.6, 0.0], [10.1, -6.3, 0.0]])
+    leds[:, 2] = -led_height_mm
+    depth = np.zeros(POINTS.shape[:2])
+    for _ in range(60):
+        place = POINTS + depth[..., None] * DRIFT
+        depth = depth_mm * np.exp(-(place**2).sum(-1) / (2.0 * width_mm**2))
+    slopes = -place / width_mm**2 * depth[..., None]
+    normals = np.concatenate([-slopes, -np.ones((*depth.shape, 1))], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    shown = []
+    for at, facing in (
+        (np.concatenate([place, -depth[..., None]], axis=-1), normals),
+        (np.concatenate([POINTS, 0.0 * depth[..., None]], axis=-1), np.array([0.0, 0.0, -1.0])),
+    ):
+        away = leds - at[..., None, :]
+        r = np.linalg.norm(away, axis=-1)
+        lit = np.clip((away * np.expand_dims(facing, -2)).sum(-1) / r, 0.0, None)
+        shown.append(lit * -away[..., 2] / r**3)
+    ratio = np.asarray(shown[0] / shown[1], np.float32)
+    whole = np.ones(depth.shape, bool)
+    field = ShadedField(
+        ratio,
+        np.full_like(ratio, 0.002),
+        np.ones_like(ratio),
+        np.zeros(ratio.shape, bool),
+        whole,
+        whole,
+        DRIFT.astype(np.float32),
+        X,
+        Y,
+    )
+    full = FullModel(leds, 0.0 * leds, Membrane(), ratio, 0.7, 0.01, (0.0, 0.0), "mirror")
+    return field, full, depth
+
+
+def solved(field: ShadedField, full: FullModel) -> tuple[Array, tuple[float, ...], str]:
+    depth, (changes, stopped) = rounds.coarse_depth(field, full, PITCH, 1)
+    return depth.astype(float), changes, stopped
+
+
+def rms(found: Array, expected: Array) -> float:
+    return float(np.sqrt(np.mean((found - expected) ** 2)))
+
+
+def test_an_ordinary_press_is_not_damped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not a bit of its depth changes, nor the number of rounds."""
+    field, full, depth = dent(1.5, 2.0, 13.7)
+    found, changes, stopped = solved(field, full)
+    assert (stopped, len(changes)) == ("done", 3)
+    monkeypatch.setattr(rounds, "LONGEST_STEP", np.inf)
+    np.testing.assert_array_equal(found, solved(field, full)[0])
+    # Quarter scale, brought back by straight lines: curvature 1.5 / 2^2 times 0.64^2 / 8.
+    assert np.abs(found - depth).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("depth_mm", "width_mm", "led_height_mm"), [(1.5, 3.5, 5.0), (2.5, 3.5, 7.0)]
+)
+def test_under_low_lights_damped_rounds_stay_near_where_others_leap_away(
+    depth_mm: float, width_mm: float, led_height_mm: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    field, full, depth = dent(depth_mm, width_mm, led_height_mm)
+    found, _, stopped = solved(field, full)
+    assert stopped != "done"
+    monkeypatch.setattr(rounds, "LONGEST_STEP", np.inf)
+    leapt, _, _ = solved(field, full)
+    assert rms(found, depth) < 0.5 * rms(leapt, depth)
+    assert found.max() < led_height_mm
+
+
+def test_a_deep_press_that_was_damped_and_settled_is_right_and_says_so() -> None:
+    field, full, depth = dent(3.0, 3.5, 13.7)
+    found, changes, stopped = solved(field, full)
+    assert stopped == "damped"
+    assert changes[-1] < changes[0]
+    assert np.abs(found - depth).max() < 0.15
+
+
+def test_a_step_is_held_back_as_a_whole() -> None:
+    before = np.zeros((3, 4), np.float32)
+    after = np.linspace(0.0, 4.0, 12, dtype=np.float32).reshape(3, 4)
+    assert rounds.held_back(before, after, 4.0) is after
+    np.testing.assert_allclose(rounds.held_back(before, after, 1.0), after / 4.0, rtol=1e-6)
