@@ -61,7 +61,7 @@ class AssemblyPicture(QWidget):
 
     def sizeHint(self) -> QSize:
         """Return the size that shows all of it."""
-        return BOX
+        return QSize(240, BOX.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the parts, those behind first."""

@@ -42,7 +42,7 @@ def panels_of(stage: Stage | None, results: StageResults) -> tuple[Panel, ...]:
             results.radiance.usable,
             tr("Light intensity {low:.2f} to {high:.2f} of full scale"),
         )
-    if stage is Stage.REFLECTANCE and results.factors is not None:
+    if stage is Stage.BACKGROUND and results.factors is not None:
         return _three_maps(
             results.factors.factors,
             results.factors.usable,

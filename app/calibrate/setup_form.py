@@ -7,7 +7,6 @@ from pathlib import Path
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
-    QComboBox,
     QDoubleSpinBox,
     QFormLayout,
     QGroupBox,
@@ -136,8 +135,6 @@ class SetupForm(QScrollArea):
         self.ball = _length("setup.ball", tr("Radius of the usual ball"), 0.05, 500.0)
         self.ball.setToolTip(tr("The radius, not the diameter; each press can state its own"))
         form.addRow(tr("Usual radius"), self.ball)
-        self.source = named(QComboBox(), "setup.source", tr("Camera"))
-        form.addRow(tr("Camera"), self.source)
         return box
 
     def show_session(self, session: Session, *, new: bool) -> None:

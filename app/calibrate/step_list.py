@@ -34,7 +34,7 @@ class StepList(QListWidget):
         self.setIconSize(QSize(18, 18))
         self.setSpacing(1)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        for number, step in enumerate(steps):
+        for number, step in enumerate(steps, start=1):
             item = QListWidgetItem(f"{number}  {step.title}")
             item.setSizeHint(QSize(WIDTH - 12, 34))
             self.addItem(item)

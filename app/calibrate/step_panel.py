@@ -68,6 +68,7 @@ class StepPanel(QScrollArea):
         self.setMinimumWidth(WIDTH)
         self.setMaximumWidth(WIDTH + 60)
         inside = QWidget()
+        inside.setMaximumWidth(WIDTH + 40)
         self.setWidget(inside)
         self._column = QVBoxLayout(inside)
         self._column.setContentsMargins(12, 10, 12, 10)
@@ -108,7 +109,10 @@ class StepPanel(QScrollArea):
         row.addWidget(QLabel(tr("Ball radius")))
         row.addWidget(self.radius, 1)
         self.capture = named(
-            QPushButton(tr("&Capture")), "calibrate.capture", tr("Capture"), tr("Space")
+            QPushButton(tr("&Capture")),
+            "calibrate.capture",
+            tr("Capture"),
+            tr("Take this picture (C)"),
         )
         self.capture.setMinimumHeight(38)
         self.capture.clicked.connect(self.capture_wanted)
@@ -119,7 +123,7 @@ class StepPanel(QScrollArea):
         )
         self.automatic.toggled.connect(self.automatic_changed)
         self.import_files = named(
-            QPushButton(tr("&Import files…")), "calibrate.import", tr("Import picture files")
+            QPushButton(tr("&Import…")), "calibrate.import", tr("Import picture files")
         )
         self.import_files.clicked.connect(self.import_wanted)
         buttons = QHBoxLayout()
@@ -155,7 +159,9 @@ class StepPanel(QScrollArea):
         row.addWidget(self._word, 1)
         row.addWidget(self.recompute)
         self.sentence = named(_wrapped(), "calibrate.sentence", tr("What to say of the step"))
-        self.quality = QualityTableWidget("calibrate.quality", tr("Quality figures of this step"))
+        self.quality = QualityTableWidget(
+            "calibrate.quality", tr("Quality figures of this step"), narrow=True
+        )
         self._column.addLayout(row)
         self._column.addWidget(self.sentence)
         self._column.addWidget(self.quality)

@@ -57,8 +57,8 @@ def all_steps() -> tuple[Step, ...]:
             tr("Set-up"),
             (),
             tr(
-                "State what you know of the sensor from its housing and parts, then choose the"
-                " camera. Every length here scales the result."
+                "State what you know of the sensor from its housing and parts. Every length here"
+                " scales the result."
             ),
             "complete",
         ),

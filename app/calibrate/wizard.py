@@ -30,6 +30,7 @@ from app.calibrate.maps import MapsView, Panel, panels_of, refraction_panels
 from app.calibrate.result_view import ResultView
 from app.calibrate.saving import Saving
 from app.calibrate.setup_form import SetupForm
+from app.calibrate.source_button import SourceButton
 from app.calibrate.states import RUNNING, is_done, step_state
 from app.calibrate.step_list import StepList
 from app.calibrate.step_panel import StepPanel
@@ -187,10 +188,10 @@ class Wizard(QMainWindow):
         self.bench_action.setVisible(False)
         bar.addAction(self.bench_action)
         bar.addSeparator()
+        self.camera = SourceButton(context=self.context)
+        bar.addWidget(self.camera)
         bar.addWidget(self.caption)
-        make_action(
-            self, "calibrate.capture_now", tr("Capture"), self._capture, keys=("Space", "F5")
-        )
+        make_action(self, "calibrate.capture_now", tr("Capture"), self._capture, keys=("C", "F5"))
         make_action(self, "calibrate.next_step", tr("Next step"), self._next, keys=("Alt+Right",))
         make_action(
             self, "calibrate.previous_step", tr("Previous step"), self._previous,

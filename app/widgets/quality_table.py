@@ -92,11 +92,16 @@ class QualityTableWidget(QWidget):
         Object name, a dotted path.
     accessible : str
         What a screen reader says, such as "Quality of the lens".
+    narrow : bool, optional
+        For a side panel: verdicts as signs without their word, long labels wrapped.
     """
 
-    def __init__(self, name: str, accessible: str, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, name: str, accessible: str, parent: QWidget | None = None, *, narrow: bool = False
+    ) -> None:
         super().__init__(parent)
         named(self, name, accessible)
+        self._narrow = narrow
         self._shown: tuple[tuple[str, bool], ...] = ()
         self._table = QualityTable()
         self._grid = named(_Grid(0, COLUMNS, self), f"{name}.table", accessible)
@@ -114,7 +119,7 @@ class QualityTableWidget(QWidget):
         header = self._grid.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(LABEL_COLUMN, QHeaderView.ResizeMode.Stretch)
-        header.setMinimumSectionSize(80)
+        header.setMinimumSectionSize(28 if narrow else 80)
         header.sectionResized.connect(self._fit)
         self._grid.verticalHeader().setMinimumSectionSize(1)
         make_action(self._grid, f"{name}.copy", tr("&Copy"), self.copy, icon_name="copy")
@@ -160,7 +165,10 @@ class QualityTableWidget(QWidget):
 
     def _show_figure(self, row: int, figure: Figure) -> None:
         verdict = self._item(row, VERDICT_COLUMN)
-        verdict.setText(verdict_word(figure.verdict))
+        word = verdict_word(figure.verdict)
+        verdict.setText("" if self._narrow else word)
+        verdict.setToolTip(word)
+        verdict.setData(Qt.ItemDataRole.AccessibleTextRole, word)
         verdict.setIcon(icon(figure.verdict.value, figure.verdict.value))
         verdict.setForeground(theme.colour(figure.verdict.value))
         label = self._item(row, LABEL_COLUMN)
@@ -191,16 +199,20 @@ class QualityTableWidget(QWidget):
     def _fit(self, *_: int) -> None:
         """Wrap the advice to the width, and be as high as all rows."""
         columns = range(LABEL_COLUMN, COLUMNS)
-        width = sum(self._grid.columnWidth(column) for column in columns) - 2 * MARGIN
+        whole = sum(self._grid.columnWidth(column) for column in columns) - 2 * MARGIN
         metrics = self._grid.fontMetrics()
         wrap = int(Qt.TextFlag.TextWordWrap)
         line = max(ROW_HEIGHT, metrics.height() + MARGIN)
         for row in range(self._grid.rowCount()):
             item = self._grid.item(row, LABEL_COLUMN)
             height = line
-            if item is not None and self._grid.columnSpan(row, LABEL_COLUMN) > 1:
+            spans = self._grid.columnSpan(row, LABEL_COLUMN) > 1
+            if item is not None and (spans or self._narrow):
+                label = self._grid.columnWidth(LABEL_COLUMN) - 2 * MARGIN
+                width = whole if spans else label
                 area = QRect(0, 0, max(width, 50), 10_000)
                 height = metrics.boundingRect(area, wrap, item.text()).height() + MARGIN
+                height = height if spans else max(line, height)
             self._grid.setRowHeight(row, height)
         self._grid.setFixedHeight(self._grid.verticalHeader().length())
 
@@ -212,7 +224,7 @@ class QualityTableWidget(QWidget):
 
     def minimumSizeHint(self) -> QSize:
         """Return a width at which the label can still be read."""
-        return QSize(360, super().minimumSizeHint().height())
+        return QSize(260 if self._narrow else 360, super().minimumSizeHint().height())
 
 
 def _has_advice(figure: Figure) -> bool:

@@ -1,0 +1,61 @@
+"""The button that says where pictures come from, and lets another source be chosen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog, QMenu, QToolButton, QWidget
+
+from app.shell.context import AppContext
+from app.sources.listing import picture_folders
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+
+class SourceButton(QToolButton):
+    """Shows the source in use; its menu offers the others.
+
+    Parameters
+    ----------
+    context : AppContext
+        With the choice that all pages share.
+    """
+
+    def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._context = context
+        named(self, "calibrate.source", tr("Camera"), tr("Where the live picture comes from"))
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self)
+        menu.setObjectName("calibrate.source.menu")
+        for name, text, choose in (
+            ("none", tr("No camera: import pictures"), lambda: context.source.choose(None)),
+            ("virtual", tr("Virtual sensor"), context.source.choose_virtual_sensor),
+            ("folder", tr("Folder of pictures…"), self.choose_folder),
+        ):
+            action = menu.addAction(text, choose)
+            action.setObjectName(f"calibrate.source.{name}")
+        self.setMenu(menu)
+        context.source.changed.connect(self._show)
+        self._show()
+
+    def choose_folder(self) -> None:
+        """Let the person choose a folder whose pictures play the camera."""
+        chosen = QFileDialog.getExistingDirectory(
+            self, tr("Folder of pictures"), str(self._context.settings.last_folder)
+        )
+        if chosen:
+            self.use_folder(Path(chosen))
+
+    def use_folder(self, folder: Path) -> None:
+        """Take the pictures of a folder as the camera's."""
+        self._context.settings.last_folder = folder
+        for info in picture_folders([folder])():
+            self._context.source.choose(info)
+
+    def _show(self) -> None:
+        info = self._context.source.info
+        name = tr("none") if info is None else info.name
+        self.setText(tr("Camera: {name}").format(name=name))
