@@ -7,7 +7,8 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from ctypes.util import find_library
 from pathlib import Path
 
@@ -52,8 +53,8 @@ def run(arguments: Sequence[str] = ()) -> int:
     InputError
         If there is no screen to show a window on.
     """
-    refuse_without_screen()
-    application = make_application()
+    with screen():
+        application = make_application()
     context = make_context()
     crash = context.log.start()
     faults = Faults(context.toasts)
@@ -83,38 +84,53 @@ def run(arguments: Sequence[str] = ()) -> int:
     return status
 
 
-def refuse_without_screen() -> None:
-    """Refuse in one sentence where Qt would abort: no display, or one that does not answer."""
-    if not sys.platform.startswith("linux") or os.environ.get("QT_QPA_PLATFORM"):
-        return
-    if os.environ.get("WAYLAND_DISPLAY"):
-        return
+@contextmanager
+def screen() -> Iterator[None]:
+    """Refuse in one sentence where Qt would abort: no display, or one that does not answer.
+
+    The display is held while Qt makes its own connection: a server without a desktop starts anew
+    when its last guest leaves, and takes nobody in meanwhile.
+
+    Raises
+    ------
+    InputError
+        If there is no screen to show a window on.
+    """
     display = os.environ.get("DISPLAY", "")
-    if not display or not _answers(display):
-        raise InputError(
-            tr("there is no screen to show a window on"),
-            where=f"DISPLAY={display}",
-            advice=tr(
-                "Start it on a desktop, use ssh -X, or use the commands, which need no screen "
-                "(gelpolight --help)"
-            ),
-        )
+    other = os.environ.get("QT_QPA_PLATFORM") or os.environ.get("WAYLAND_DISPLAY")
+    if other or not sys.platform.startswith("linux"):
+        yield
+        return
+    with _connection(display) as answers:
+        if not answers:
+            raise InputError(
+                tr("there is no screen to show a window on"),
+                where=f"DISPLAY={display}",
+                advice=tr(
+                    "Start it on a desktop, use ssh -X, or use the commands, which need no screen "
+                    "(gelpolight --help)"
+                ),
+            )
+        yield
 
 
-def _answers(display: str) -> bool:
-    """Whether an X server takes a connection; True where that cannot be asked."""
+@contextmanager
+def _connection(display: str) -> Iterator[bool]:
+    """Connect to an X server; whether it answers, True where that cannot be asked."""
     name = find_library("xcb")
-    if name is None:
-        return True
+    if not display or name is None:
+        yield bool(display)
+        return
     xcb = ctypes.CDLL(name)
     xcb.xcb_connect.restype = ctypes.c_void_p
     xcb.xcb_connect.argtypes = [ctypes.c_char_p, ctypes.c_void_p]
     xcb.xcb_connection_has_error.argtypes = [ctypes.c_void_p]
     xcb.xcb_disconnect.argtypes = [ctypes.c_void_p]
     connection = xcb.xcb_connect(display.encode(), None)
-    refused = bool(xcb.xcb_connection_has_error(connection))
-    xcb.xcb_disconnect(connection)
-    return not refused
+    try:
+        yield not xcb.xcb_connection_has_error(connection)
+    finally:
+        xcb.xcb_disconnect(connection)
 
 
 def make_application() -> QApplication:

@@ -93,7 +93,7 @@ def test_without_a_screen_one_sentence_says_what_to_do(
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.delenv("QT_QPA_PLATFORM", raising=False)
-    with pytest.raises(InputError):
-        desktop.refuse_without_screen()
+    with pytest.raises(InputError), desktop.screen():
+        pass
     assert main([]) == MENDABLE
     assert "no screen" in capsys.readouterr().err
