@@ -16,6 +16,7 @@ from app.calibrate.lut_model import CurveEdit
 from app.calibrate.lut_worker import NewestWins
 from app.shell import theme
 from app.widgets.naming import named
+from app.widgets.plots import without_menus
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -65,8 +66,8 @@ class LivePanel(QWidget):
         self._words.setTextFormat(Qt.TextFormat.PlainText)
         self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._words.setMinimumHeight(5 * self.fontMetrics().lineSpacing())
-        self._profile = named(pg.PlotWidget(), "lut.profile", tr("Depth through the ball's centre"))
-        self._residual = named(pg.PlotWidget(), "lut.residual", tr("Depth minus ball"))
+        self._profile = named(_bare_plot(), "lut.profile", tr("Depth through the ball's centre"))
+        self._residual = named(_bare_plot(), "lut.residual", tr("Depth minus ball"))
         self._lines = self._make_lines()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -135,7 +136,6 @@ class LivePanel(QWidget):
         for plot in (self._profile, self._residual):
             plot.setMouseEnabled(False, False)
             plot.hideButtons()
-            plot.setMenuEnabled(False)
             plot.getAxis("left").setWidth(56)
         return lines
 
@@ -202,3 +202,7 @@ def effect_sentence(before: Effect, after: Effect) -> str:
         d=UM * after.lowest_mm,
         moved=moved,
     )
+
+
+def _bare_plot() -> pg.PlotWidget:
+    return without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False)))

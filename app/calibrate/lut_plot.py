@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QGraphicsRectItem
 
 from app.calibrate.lut_model import Curve, CurveEdit, left_out_points
 from app.shell import theme
+from app.widgets.plots import without_menus
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.translation import tr
 
@@ -156,6 +157,7 @@ class CurvePlot(pg.PlotWidget):
     def __init__(self, scatter: ReflectanceScatter) -> None:
         self.box = LassoViewBox()
         super().__init__(viewBox=self.box)
+        without_menus(self)
         self._scatter = scatter
         self._density_of: tuple[object, ...] = ()
         self._image = pg.ImageItem()

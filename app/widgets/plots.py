@@ -1,0 +1,22 @@
+"""What every pyqtgraph plot of this program needs."""
+
+from __future__ import annotations
+
+import pyqtgraph as pg
+
+
+def without_menus(plot: pg.PlotWidget) -> pg.PlotWidget:
+    """Switch a plot's own context menus off, and let it own what is left of them.
+
+    pyqtgraph makes them without a parent: they would outlive the plot, as windows that nobody
+    closes.
+
+    Parameters
+    ----------
+    plot : PlotWidget
+        Made with a view box whose menu is off.
+    """
+    item = plot.getPlotItem()
+    item.setMenuEnabled(False)
+    item.ctrlMenu.setParent(plot)
+    return plot
