@@ -17,6 +17,7 @@ from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.response.curve import CameraResponse
 from gelpolight_core.session.session import SensorData
 
 Array = NDArray[np.float64]
@@ -101,7 +102,7 @@ class Calibration:
     led_covariance_mm2 : (3, 3, 3)
         Covariance of each.
     crosstalk : (3, 3)
-        ``I_raw = crosstalk @ I_true``, from the mirror spots.
+        ``I_raw = crosstalk @ I_true``.
     radiance, factors : (rows, columns, 3) float32
         |L| (Eq. 5) and rho (Eq. 9) on the membrane grid; 0 where they are unknown.
     reflectance : ReflectanceTable
@@ -114,6 +115,8 @@ class Calibration:
         When, who, from what.
     full : FullModel or None
         What the full model needs; None where the calibration was made for the paper's alone.
+    response : CameraResponse or None
+        Of the camera; None where it is linear.
     """
 
     sensor: SensorData
@@ -130,6 +133,7 @@ class Calibration:
     quality: Mapping[str, QualityTable]
     provenance: Provenance
     full: FullModel | None = None
+    response: CameraResponse | None = None
 
     @cached_property
     def stack(self) -> LayerStack:
@@ -164,6 +168,8 @@ class Calibration:
             digest.update(repr((self.full.membrane, self.full.kept)).encode())
             digest.update(np.ascontiguousarray(self.full.led_positions_mm).tobytes())
             digest.update(np.ascontiguousarray(self.full.background).tobytes())
+        if self.response is not None:
+            digest.update(self.response.curves.tobytes())
         return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"
 
     @property

@@ -27,11 +27,13 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.response.curve import CameraResponse
 from gelpolight_core.session.session import MAX_PIXELS, SensorData
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-calibration"
-VERSION = 1
+# 2: may hold the response of a camera that is not linear, which version 1 never is.
+VERSION = 2
 MANIFEST = "manifest.json"
 MANIFEST_LIMIT = 4_000_000
 NODES_LIMIT = 10_000
@@ -148,6 +150,8 @@ def _arrays_of(c: Calibration) -> dict[str, NDArray[Any]]:
         arrays["full_led_positions_mm"] = c.full.led_positions_mm
         arrays["full_led_sd_mm"] = c.full.led_sd_mm
         arrays["full_background"] = c.full.background
+    if c.response is not None:
+        arrays["camera_response"] = c.response.curves
     return arrays
 
 
@@ -202,7 +206,7 @@ def _read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
             where=str(path),
             advice=tr("Use a newer version of GelPoLight Studio"),
         )
-    if version != VERSION:
+    if type(version) is not int or version < 1:
         raise ValueError(f"version {version!r}")
     stated = _read_member(archive, f"{MANIFEST}.sha256", 64)
     if hashlib.sha256(text).hexdigest().encode() != stated:
@@ -268,6 +272,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         quality={stage: _read_quality(rows) for stage, rows in manifest["quality"].items()},
         provenance=Provenance(**manifest["provenance"]),
         full=_read_full(manifest["full"], arrays) if "full" in manifest else None,
+        response=_read_response(arrays.get("camera_response")),
     )
     _check(calibration)
     stated, made = manifest["grid"], _grid_of(calibration)
@@ -316,6 +321,10 @@ def _read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMo
         held_out=(before, after),
         kept=str(entry["kept"]),
     )
+
+
+def _read_response(curves: NDArray[Any] | None) -> CameraResponse | None:
+    return None if curves is None else CameraResponse(curves.astype(np.float64))
 
 
 def _read_quality(rows: list[dict[str, Any]]) -> QualityTable:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import getpass
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from gelpolight_core.calibration.calibration import (
 from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
-from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
+from gelpolight_core.lights.crosstalk import CrosstalkResult, find_crosstalk, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import LightResult, locate_leds
 from gelpolight_core.optics.lens import LensResult, calibrate_lens
@@ -31,12 +32,12 @@ from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radiance
 from gelpolight_core.reflectance.press import BallPress, find_ball
 from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
+from gelpolight_core.response.stage import ResponseResult, declare_response, measure_response
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.session import (
     ONE_IMAGE_STAGES,
     Session,
     file_hash,
-    read_picture,
     require_colour,
 )
 from gelpolight_core.translation import tr
@@ -51,9 +52,11 @@ class CalibrationRun:
     """A calibration with the results of every stage, as the pages and the report show them."""
 
     calibration: Calibration
+    response: ResponseResult
     lens: LensResult
     top_pose: TopPoseResult
     lights: LightResult
+    crosstalk: CrosstalkResult
     radiance: RadianceResult
     reflectance: ReflectanceResult
     factors: FactorResult
@@ -79,9 +82,11 @@ def calibrate_session(
         If a stage is missing or cannot be used; the message names the file.
     """
     tell = progress or (lambda _stage, _share: None)
-    for stage in STAGES:
-        session.files(stage)
-    tell(tr("lens"), 0.0)
+    source_files(session)
+    tell(tr("camera response"), 0.0)
+    response = _camera_response(session)
+    session = replace(session, response=response.response)
+    tell(tr("lens"), 0.05)
     lens = calibrate_lens(session.pictures("checkerboard"), session.checkerboard)
     tell(tr("top surface"), 0.3)
     pose_pictures = session.pictures("top_pose")
@@ -104,6 +109,7 @@ def calibrate_session(
         plane_distance_sd_mm=pose.distance_sd_mm,
         plane_normal_sd_rad=float(np.radians(pose.normal_sd_deg)),
     )
+    crosstalk = find_crosstalk(lights.spots, _single_led(session, lens))
     tell(tr("light intensity"), 0.45)
     radiance = calibrate_radiance(
         _stage_picture(session, "whiteboard", lens), table, lights.led_positions_mm
@@ -111,7 +117,9 @@ def calibrate_session(
     background = _stage_picture(session, "background", lens)
     _refuse_unlit(background)
     bare = table.apply(background.rgb)
-    presses, pictures = _find_balls(session, bare, table, lights, lens, radiance, tell)
+    presses, pictures = _find_balls(
+        session, bare, table, lights, lens, radiance, crosstalk.matrix, tell
+    )
     tell(tr("reflectance"), 0.8)
     reflectance, factors = _reflectance_and_factors(
         presses, pictures, bare, table, lights, radiance
@@ -119,7 +127,7 @@ def calibrate_session(
     full = None
     if model == "full":
         tell(tr("joint refinement"), 0.85)
-        full = _full_model(presses, pictures, bare, table, lights, factors)
+        full = _full_model(presses, pictures, bare, table, lights, factors, crosstalk.matrix)
     calibration = Calibration(
         sensor=session.sensor,
         model=model,
@@ -127,15 +135,17 @@ def calibrate_session(
         plane=pose.plane,
         led_positions_mm=lights.led_positions_mm,
         led_covariance_mm2=lights.led_covariance_mm2,
-        crosstalk=crosstalk_from_spots(lights.spots),
+        crosstalk=crosstalk.matrix,
         radiance=radiance.radiance,
         factors=factors.factors,
         reflectance=reflectance.table,
         noise=_press_noise(presses),
         quality={
+            **({"response": response.quality} if response.quality.figures else {}),
             "lens": lens.quality,
             "top_pose": pose.quality,
             "lights": lights.quality,
+            "crosstalk": crosstalk.quality,
             "radiance": radiance.quality,
             "reflectance": reflectance.quality,
             "factors": factors.quality,
@@ -143,9 +153,40 @@ def calibrate_session(
         },
         provenance=_provenance(session),
         full=full,
+        response=response.response,
     )
     tell(tr("done"), 1.0)
-    return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
+    return CalibrationRun(
+        calibration, response, lens, pose, lights, crosstalk, radiance, reflectance, factors
+    )
+
+
+def source_files(session: Session) -> tuple[Path, ...]:
+    """Return the pictures that a calibration is made from, stage by stage.
+
+    Raises
+    ------
+    InputError
+        If a stage has none.
+    """
+    stages = (*session.optional_stages, *STAGES)
+    return tuple(path for stage in stages for path in session.files(stage))
+
+
+def _camera_response(session: Session) -> ResponseResult:
+    if "response" not in session.optional_stages:
+        return declare_response(session.declared_response)
+    return measure_response(*session.series(), declared=session.declared_response)
+
+
+def _single_led(session: Session, lens: LensResult) -> tuple[Picture, ...]:
+    if "single_led" not in session.optional_stages:
+        return ()
+    pictures = session.single_led()
+    for picture in pictures:
+        require_colour(picture, where=f"single_led/{picture.name}")
+    _same_size(pictures[0], lens.camera.width, lens.camera.height, "single_led")
+    return pictures
 
 
 def _reflectance_and_factors(
@@ -176,9 +217,9 @@ def _full_model(
     table: ResamplingTable,
     lights: LightResult,
     factors: FactorResult,
+    crosstalk: NDArray[np.float64],
 ) -> FullModel:
     """Refine LEDs and membrane on the presses, and keep the background to compare with."""
-    crosstalk = crosstalk_from_spots(lights.spots)
     background = unmix(bare, crosstalk)
     noise = _press_noise(presses)
     pixels = [
@@ -239,15 +280,15 @@ def _find_balls(
     lights: LightResult,
     lens: LensResult,
     radiance: RadianceResult,
+    crosstalk: NDArray[np.float64],
     tell: Progress,
 ) -> tuple[tuple[BallPress, ...], tuple[Map, ...]]:
-    crosstalk = crosstalk_from_spots(lights.spots)
     clean = unmix(bare, crosstalk)
     presses, pictures = [], []
     files = session.files("balls")
     for index, path in enumerate(files):
         tell(tr("ball presses"), 0.5 + 0.3 * index / len(files))
-        picture = read_picture(path)
+        picture = session.picture(path)
         radius = session.ball_radius_mm(path.name)
         require_colour(picture, where=str(path))
         _same_size(picture, lens.camera.width, lens.camera.height, "balls")
@@ -303,9 +344,7 @@ def _refuse_unlit(picture: Picture) -> None:
 
 
 def _provenance(session: Session) -> Provenance:
-    sources = {
-        f"{stage}/{path.name}": file_hash(path) for stage in STAGES for path in session.files(stage)
-    }
+    sources = {f"{path.parent.name}/{path.name}": file_hash(path) for path in source_files(session)}
     sources["session.toml"] = file_hash(session.folder / "session.toml")
     try:
         operator = getpass.getuser()

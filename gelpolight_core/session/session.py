@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.response.curve import CameraResponse, declared_response
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.wholeness import is_whole_picture
 from gelpolight_core.translation import tr
@@ -25,6 +26,7 @@ MAX_PIXELS = 64_000_000
 # Diamond has 2.42; no clear elastomer or window has more.
 DENSEST_INDEX = 2.5
 ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
+SINGLE_LED_NAMES = ("red", "green", "blue")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,21 @@ class SensorData:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """A session folder whose description was read and checked; pictures are read on demand."""
+    """A session folder whose description was read and checked; pictures are read on demand.
+
+    Attributes
+    ----------
+    folder, sensor, checkerboard, top_pose
+        Where it is, and what ``session.toml`` says of sensor and boards.
+    ball_radii_mm, ball_default_radius_mm
+        Of ``[balls]``.
+    declared_response : str, float or None
+        Of ``[camera]``: ``linear``, ``srgb``, or a gamma; None where nothing is declared.
+    exposures_ms : mapping
+        Of ``[response]``: exposure time of each of its pictures.
+    response : CameraResponse or None
+        Undone as the stages' pictures are read; as declared until it is measured.
+    """
 
     folder: Path
     sensor: SensorData
@@ -50,6 +66,16 @@ class Session:
     top_pose: BoardSpec
     ball_radii_mm: Mapping[str, float] = field(default_factory=dict)
     ball_default_radius_mm: float | None = None
+    declared_response: str | float | None = None
+    exposures_ms: Mapping[str, float] = field(default_factory=dict)
+    response: CameraResponse | None = None
+
+    @property
+    def optional_stages(self) -> tuple[str, ...]:
+        """The stages that this session has, of those that a session may lack."""
+        has_series = bool(self.exposures_ms) or (self.folder / "response").is_dir()
+        has_single = (self.folder / "single_led").is_dir()
+        return ("response",) * has_series + ("single_led",) * has_single
 
     def files(self, stage: str) -> tuple[Path, ...]:
         """Return the picture files of a stage in the order of their names.
@@ -71,7 +97,7 @@ class Session:
 
     def pictures(self, stage: str) -> tuple[Picture, ...]:
         """Return the pictures of a stage; all must have one size."""
-        pictures = tuple(read_picture(path) for path in self.files(stage))
+        pictures = tuple(self.picture(path) for path in self.files(stage))
         for picture in pictures[1:]:
             if picture.size != pictures[0].size:
                 raise InputError(
@@ -84,6 +110,52 @@ class Session:
                     advice=tr("Capture all pictures of a session at one size"),
                 )
         return pictures
+
+    def picture(self, path: Path) -> Picture:
+        """Return one of the session's pictures as linear light."""
+        return read_picture(path, response=self.response)
+
+    def series(self) -> tuple[tuple[Picture, ...], tuple[float, ...]]:
+        """Return the pictures of ``response``, as the camera encoded them, and their times (ms).
+
+        Raises
+        ------
+        InputError
+            If a picture has no exposure time in ``[response]``, or a time has no picture.
+        """
+        pictures = replace(self, response=None).pictures("response")
+        names = {picture.name for picture in pictures}
+        for name in sorted(names ^ set(self.exposures_ms)):
+            found = tr("[response] states no exposure time for {name}")
+            if name not in names:
+                found = tr("[response] names {name}, which is not there")
+            raise InputError(
+                found.format(name=name),
+                where=str(self.folder / "session.toml"),
+                advice=tr('Write one line "{name}" = time in ms for each picture there').format(
+                    name=next(iter(sorted(names)))
+                ),
+            )
+        return pictures, tuple(self.exposures_ms[picture.name] for picture in pictures)
+
+    def single_led(self) -> tuple[Picture, ...]:
+        """Return the pictures of the whiteboard with the red, the green, the blue LED lit alone.
+
+        Raises
+        ------
+        InputError
+            If one of the three is missing, or there are others.
+        """
+        by_name = {Path(p.name).stem.casefold(): p for p in self.pictures("single_led")}
+        if set(by_name) != set(SINGLE_LED_NAMES) or len(by_name) != len(self.files("single_led")):
+            raise InputError(
+                tr("there are {found}, not red, green and blue").format(
+                    found=", ".join(path.name for path in self.files("single_led"))
+                ),
+                where=str(self.folder / "single_led"),
+                advice=tr("Give one picture for each LED lit alone: red.png, green.png, blue.png"),
+            )
+        return tuple(by_name[name] for name in SINGLE_LED_NAMES)
 
     def averaged(self, stage: str) -> Picture:
         """Return the average of a one-image stage's frames."""
@@ -134,8 +206,15 @@ def average(pictures: Sequence[Picture], *, name: str) -> Picture:
     )
 
 
-def read_picture(path: Path) -> Picture:
+def read_picture(path: Path, *, response: CameraResponse | None = None) -> Picture:
     """Read a PNG or TIFF picture, 8 or 16 bit, as linear light 0..1 in RGB order.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    response : CameraResponse, optional
+        Of the camera, to be undone; left out, the camera is linear.
 
     Raises
     ------
@@ -162,7 +241,10 @@ def read_picture(path: Path) -> Picture:
     depth = 8 if raw.dtype == np.uint8 else 16
     grey = raw.ndim == 2
     bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
-    rgb = np.ascontiguousarray(bgr[:, :, ::-1], dtype=np.float32) / np.float32(2**depth - 1)
+    if response is not None:
+        rgb = response.linearise(np.ascontiguousarray(bgr[:, :, ::-1]))
+    else:
+        rgb = np.ascontiguousarray(bgr[:, :, ::-1], dtype=np.float32) / np.float32(2**depth - 1)
     return Picture(path.name, rgb, bit_depth=depth, grey=grey)
 
 
@@ -262,6 +344,10 @@ def refuse_copies(files: Iterable[Path]) -> None:
 def read_session(folder: Path) -> Session:
     """Read and check ``session.toml`` of a session folder.
 
+    Beside what every session states it may have ``[camera]`` with either ``response = "linear"``
+    (as without it) or ``"srgb"``, or ``gamma = 2.2``; and ``[response]`` with the exposure time in
+    ms of each picture in the folder ``response``, such as ``"exp_01.png" = 2.0``.
+
     Raises
     ------
     InputError
@@ -312,9 +398,39 @@ def _parse(content: dict[str, Any], path: Path) -> Session:
     pose = _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard
     balls = top.table("balls")
     radii = {str(name): balls.number(str(name), 0.05, 500.0) for name in balls.content}
-    top.no_more("format", "version", "sensor", "checkerboard", "top_pose", "balls")
+    declared = _parse_camera(top.table("camera")) if "camera" in content else None
+    series = top.table("response") if "response" in content else _Table({}, "response", path)
+    times = {str(name): series.number(str(name), 1e-4, 1e6) for name in series.content}
+    top.no_more(
+        "format", "version", "sensor", "checkerboard", "top_pose", "balls", "camera", "response"
+    )
     default = radii.pop("default", None)
-    return Session(path.parent, sensor, checkerboard, pose, radii, default)
+    return Session(
+        path.parent,
+        sensor,
+        checkerboard,
+        pose,
+        radii,
+        default,
+        declared,
+        times,
+        declared_response(declared),
+    )
+
+
+def _parse_camera(table: _Table) -> str | float:
+    """Return the declared response: one of two names, or a gamma in the place of a name."""
+    table.no_more("response", "gamma")
+    if "gamma" not in table.content:
+        response = table.text("response")
+        if response not in ("linear", "srgb"):
+            raise table.wrong(
+                "response", tr('is neither "linear" nor "srgb"; or write gamma = 2.2')
+            )
+        return response
+    if "response" in table.content:
+        raise table.wrong("response", tr("stands beside a gamma, where only one of them can hold"))
+    return table.number("gamma", 0.2, 5.0)
 
 
 def _parse_sensor(table: _Table) -> SensorData:

@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,13 @@ AVERAGED = {
     "background": 8,
     "balls": 1,
     "presses": 1,
+    "response": 1,
+    "single_led": 8,
 }
 """How many frames each stage's picture is the average of."""
+
+EXPOSURE_MS = 8.0
+"""Exposure time of the whiteboard's picture; only the ratios to it matter."""
 
 TRUTH_PITCH_MM = 0.05
 
@@ -92,7 +98,8 @@ def simulate_session(
     """Write a session folder of the virtual sensor with ``truth.json`` and ``truth/*.npz``.
 
     The folder holds 16 checkerboard views, the board on the top surface, mirror, whiteboard,
-    background, and the balls and presses of the design.
+    background, the balls and presses of the design, and what its ``session`` asks for besides: the
+    whiteboard at several exposures, and with one LED lit.
 
     Parameters
     ----------
@@ -120,19 +127,30 @@ def simulate_session(
         )
     sensor = VirtualSensor(design.scaled(scale), seed)
     made = not out.exists()
-    for stage in (*AVERAGED, "truth"):
+    folders = (*session_stages(design), "truth")
+    for stage in folders:
         make_folder(out / stage)
     try:
         _write_session(out, sensor, progress)
     except BaseException:
         # A part of a session is of no use, and would stand in the way of the next try.
-        for stage in (*AVERAGED, "truth"):
+        for stage in folders:
             shutil.rmtree(out / stage, ignore_errors=True)
         for text in _TEXTS:
             (out / text).unlink(missing_ok=True)
         if made:
             out.rmdir()
         raise
+
+
+def session_stages(design: SensorDesign) -> tuple[str, ...]:
+    """Return the folders of pictures that a session of a design has."""
+    left_out = set()
+    if design.session.response_pictures == 0:
+        left_out.add("response")
+    if not design.session.single_led:
+        left_out.add("single_led")
+    return tuple(stage for stage in AVERAGED if stage not in left_out)
 
 
 def _write_session(out: Path, sensor: VirtualSensor, progress: Progress | None) -> None:
@@ -166,6 +184,18 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
     yield _Shot("mirror", "mirror.png", Mirror)
     yield _Shot("whiteboard", "whiteboard.png", Whiteboard)
     yield _Shot("background", "background.png", BareMembrane)
+    for name, exposure in exposure_series(design).items():
+        yield _Shot("response", name, partial(Whiteboard, exposure=exposure))
+    if design.session.single_led:
+        for led, name in enumerate(("red", "green", "blue")):
+            yield _Shot("single_led", f"{name}.png", partial(Whiteboard, led=led))
+
+
+def exposure_series(design: SensorDesign) -> dict[str, float]:
+    """Return the files of the stage ``response`` and their exposures over the whiteboard's own."""
+    count = design.session.response_pictures
+    exposures = np.geomspace(1.0 / 32.0, 2.0, count) if count > 1 else np.ones(count)
+    return {f"exp_{number:02d}.png": float(x) for number, x in enumerate(exposures)}
 
 
 def indenter_of(item: Press) -> Indenter:
@@ -320,7 +350,20 @@ square_mm = {_TOP_SQUARE_MM}
 
 [balls]
 {balls}
-"""
+{_response_tables(design)}"""
+
+
+def _response_tables(design: SensorDesign) -> str:
+    camera, text = design.camera, ""
+    if design.session.declares_response and camera.response != "linear":
+        gamma = camera.response == "gamma"
+        line = f"gamma = {camera.gamma!r}" if gamma else f'response = "{camera.response}"'
+        text += f"\n[camera]\n{line}\n"
+    series = exposure_series(design)
+    if series:
+        lines = (f'"{name}" = {EXPOSURE_MS * x!r}\n' for name, x in series.items())
+        text += f"\n[response]\n{''.join(lines)}"
+    return text
 
 
 def truth_table(sensor: VirtualSensor) -> dict[str, Any]:
@@ -377,13 +420,17 @@ def _photometry_table(sensor: VirtualSensor) -> dict[str, Any]:
     signal = 200.0 / 255.0
     sd = math.sqrt(camera.shot_variance * signal + camera.read_sd**2)
     return {
-        "response": f"linear (gamma 1); value = {full}*linear",
+        "response": {
+            "linear": f"linear (gamma 1); value = {full}*linear",
+            "srgb": f"sRGB (IEC 61966-2-1); value = {full}*encoded",
+            "gamma": f"gamma {camera.gamma:g}; value = {full}*linear^(1/{camera.gamma:g})",
+        }[camera.response],
         "exposure_membrane": sensor.exposure,
         "whiteboard_exposure_relative_to_membrane": 1.0,
         "psf_gaussian_sigma_px": camera.blur_sigma_px,
         "noise": {"shot_var_per_unit": camera.shot_variance, "read_sigma": camera.read_sd},
         "snr_db_at_200": 20.0 * math.log10(signal / sd) if sd > 0.0 else None,
-        "averaged_frames": dict(AVERAGED),
+        "averaged_frames": {s: AVERAGED[s] for s in session_stages(sensor.design)},
     }
 
 
