@@ -19,7 +19,8 @@ from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session, source_files
 from gelpolight_core.export.atomic import refuse_unwritable
-from gelpolight_core.session.session import read_session, refuse_copies
+from gelpolight_core.session.copies import refuse_copies
+from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
 
 

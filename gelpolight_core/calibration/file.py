@@ -28,7 +28,8 @@ from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.response.curve import CameraResponse
-from gelpolight_core.session.session import MAX_PIXELS, SensorData
+from gelpolight_core.session.session import SensorData
+from gelpolight_core.session.wholeness import MAX_PIXELS
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-calibration"

@@ -33,11 +33,11 @@ from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radian
 from gelpolight_core.reflectance.press import BallPress, find_ball
 from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
 from gelpolight_core.response.stage import ResponseResult, declare_response, measure_response
+from gelpolight_core.session.copies import file_hash
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.session import (
     ONE_IMAGE_STAGES,
     Session,
-    file_hash,
     require_colour,
 )
 from gelpolight_core.translation import tr

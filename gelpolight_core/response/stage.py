@@ -9,7 +9,7 @@ no other picture of a session tells a bent response from uneven light.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.response.curve import NODES, CameraResponse, declared_response
 from gelpolight_core.response.series import (
+    REPEATABILITY,
     Series,
     disagreement,
     fit_exponents,
@@ -175,18 +176,22 @@ def _fit_channel(series: Series) -> _Channel:
     exponents = fit_exponents(series)
     places = np.linspace(*series.covered, PLACES)
     straight = _departure(light_of(exponents, places), places)
-    held_out, spread = [], np.zeros(PLACES)
-    for picture in range(count):
-        fitted = fit_exponents(series.without(picture))
-        held_out.append(held_out_disagreement(series, fitted, picture))
-        spread += (_departure(light_of(fitted, places), places) - straight) ** 2
+    held_out = [
+        held_out_disagreement(series, fit_exponents(series.without(picture)), picture)
+        for picture in range(count)
+    ]
     known = [value for value in held_out if np.isfinite(value)]
+    # Exposures that are not quite what is stated bend the curve more than pixels' noise does.
+    doubt = max(REPEATABILITY, float(np.median(known))) if known else float("nan")
+    variance = np.zeros(PLACES)
+    for disturbance in doubt * np.eye(count):
+        fitted = fit_exponents(replace(series, log_time=series.log_time + disturbance))
+        variance += (_departure(light_of(fitted, places), places) - straight) ** 2
     return _Channel(
         series,
         _as_curve(exponents),
         straight,
-        # The jackknife knows of exposures that are not what is stated, which pixels cannot show.
-        np.sqrt(spread * (count - 1) / count),
+        np.sqrt(variance),
         disagreement(series, exponents),
         max(known, default=float("nan")),
     )
@@ -270,7 +275,7 @@ def _judge(
         ),
         judge(
             "response_residual_percent",
-            tr("Disagreement of the exposures about the light"),
+            tr("Disagreement of the exposures about the light, beyond noise"),
             100.0 * residual,
             "%",
             warn=100.0 * WARN_RESIDUAL,
@@ -279,7 +284,7 @@ def _judge(
         ),
         judge(
             "response_held_out_percent",
-            tr("Disagreement of an exposure held out, worst"),
+            tr("Disagreement of an exposure held out, worst, beyond noise"),
             100.0 * held_out,
             "%",
             warn=100.0 * WARN_RESIDUAL,

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.response.curve import CameraResponse, declared_response
 from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.wholeness import is_whole_picture
+from gelpolight_core.session.table import Table
+from gelpolight_core.session.wholeness import decode_picture, unreadable
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
 VERSION = 1
 SUFFIXES = (".png", ".tif", ".tiff")
-MAX_PIXELS = 64_000_000
 # Diamond has 2.42; no clear elastomer or window has more.
 DENSEST_INDEX = 2.5
 ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
@@ -225,7 +223,7 @@ def read_picture(path: Path, *, response: CameraResponse | None = None) -> Pictu
         raise InputError(
             tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
         )
-    raw = _decode(path)
+    raw = decode_picture(path)
     if raw is None:
         raise InputError(
             tr("the file is not a whole PNG or TIFF picture"),
@@ -246,41 +244,6 @@ def read_picture(path: Path, *, response: CameraResponse | None = None) -> Pictu
     else:
         rgb = np.ascontiguousarray(bgr[:, :, ::-1], dtype=np.float32) / np.float32(2**depth - 1)
     return Picture(path.name, rgb, bit_depth=depth, grey=grey)
-
-
-def _decode(path: Path) -> np.ndarray[Any, Any] | None:
-    try:
-        data = np.fromfile(path, dtype=np.uint8)
-    except OSError as error:
-        raise _unreadable(error, path) from error
-    _check_declared_size(path, data[:64].tobytes())
-    if not is_whole_picture(data.tobytes()):
-        return None
-    try:
-        return cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        return None
-
-
-def _unreadable(error: OSError, path: Path) -> InputError:
-    return InputError(
-        tr("the file cannot be read ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check its permissions and the disk, or copy it to a folder of your own"),
-    )
-
-
-def _check_declared_size(path: Path, head: bytes) -> None:
-    """Refuse a PNG that declares more pixels than any camera has, before memory is taken."""
-    if head[:8] != b"\x89PNG\r\n\x1a\n" or len(head) < 24:
-        return
-    width, height = int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
-    if width * height > MAX_PIXELS:
-        raise InputError(
-            tr("the picture declares {w} x {h} pixels").format(w=width, h=height),
-            where=str(path),
-            advice=tr("Use pictures of at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
-        )
 
 
 def require_colour(picture: Picture, *, where: str) -> None:
@@ -307,38 +270,6 @@ def require_colour(picture: Picture, *, where: str) -> None:
             where=where,
             advice=tr("Capture it in colour: each LED is told by its own channel"),
         )
-
-
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal text."""
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise _unreadable(error, path) from error
-
-
-def refuse_copies(files: Iterable[Path]) -> None:
-    """Refuse a picture that stands in a session twice: noise makes any two captures differ.
-
-    A copied picture is a stage that was not captured, such as the background in the place of the
-    whiteboard, which no later figure shows.
-
-    Raises
-    ------
-    InputError
-        If two of the files hold the same bytes.
-    """
-    seen: dict[str, Path] = {}
-    for path in files:
-        first = seen.setdefault(file_hash(path), path)
-        if first is not path:
-            raise InputError(
-                tr("the picture is a copy of {first}").format(
-                    first=f"{first.parent.name}/{first.name}"
-                ),
-                where=str(path),
-                advice=tr("Capture this picture itself, or remove the copy"),
-            )
 
 
 def read_session(folder: Path) -> Session:
@@ -370,7 +301,7 @@ def read_session(folder: Path) -> Session:
             advice=tr("Mend that line"),
         ) from error
     except OSError as error:
-        raise _unreadable(error, path) from error
+        raise unreadable(error, path) from error
     except RecursionError as error:
         raise InputError(
             tr("the file is nested too deeply"), where=str(path), advice=tr("Mend the file")
@@ -379,7 +310,7 @@ def read_session(folder: Path) -> Session:
 
 
 def _parse(content: dict[str, Any], path: Path) -> Session:
-    top = _Table(content, "", path)
+    top = Table(content, "", path)
     if top.text("format") != FORMAT:
         raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))
     version = top.whole("version")
@@ -399,7 +330,7 @@ def _parse(content: dict[str, Any], path: Path) -> Session:
     balls = top.table("balls")
     radii = {str(name): balls.number(str(name), 0.05, 500.0) for name in balls.content}
     declared = _parse_camera(top.table("camera")) if "camera" in content else None
-    series = top.table("response") if "response" in content else _Table({}, "response", path)
+    series = top.table("response") if "response" in content else Table({}, "response", path)
     times = {str(name): series.number(str(name), 1e-4, 1e6) for name in series.content}
     top.no_more(
         "format", "version", "sensor", "checkerboard", "top_pose", "balls", "camera", "response"
@@ -418,7 +349,7 @@ def _parse(content: dict[str, Any], path: Path) -> Session:
     )
 
 
-def _parse_camera(table: _Table) -> str | float:
+def _parse_camera(table: Table) -> str | float:
     """Return the declared response: one of two names, or a gamma in the place of a name."""
     table.no_more("response", "gamma")
     if "gamma" not in table.content:
@@ -433,7 +364,7 @@ def _parse_camera(table: _Table) -> str | float:
     return table.number("gamma", 0.2, 5.0)
 
 
-def _parse_sensor(table: _Table) -> SensorData:
+def _parse_sensor(table: Table) -> SensorData:
     sensor = SensorData(
         serial=table.text("serial"),
         led_height_mm=table.number("led_height_mm", 0.1, 500.0),
@@ -449,7 +380,7 @@ def _parse_sensor(table: _Table) -> SensorData:
     return sensor
 
 
-def _parse_board(table: _Table) -> BoardSpec:
+def _parse_board(table: Table) -> BoardSpec:
     corners = table.content.get("inner_corners")
     whole = isinstance(corners, list) and len(corners) == 2
     if not whole or not all(type(n) is int and 3 <= n <= 100 for n in corners or ()):
@@ -458,59 +389,3 @@ def _parse_board(table: _Table) -> BoardSpec:
     square = table.number("square_mm", 0.05, 500.0)
     table.no_more("inner_corners", "square_mm")
     return BoardSpec((corners[0], corners[1]), square)
-
-
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """A table of session.toml, with errors that name the key."""
-
-    content: dict[str, Any]
-    name: str
-    path: Path
-
-    def _key(self, key: str) -> str:
-        return f"[{self.name}] {key}" if self.name else key
-
-    def wrong(self, key: str, what: str) -> InputError:
-        if key not in self.content:
-            what = tr("is missing")
-        return InputError(
-            f"{self._key(key)} {what}",
-            where=str(self.path),
-            advice=tr("Mend the key {key}").format(key=self._key(key)),
-        )
-
-    def text(self, key: str) -> str:
-        value = self.content.get(key)
-        if not isinstance(value, str) or not value.strip():
-            raise self.wrong(key, tr("is not a text"))
-        return value
-
-    def whole(self, key: str) -> int:
-        value = self.content.get(key)
-        if type(value) is not int:
-            raise self.wrong(key, tr("is not a whole number"))
-        return value
-
-    def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
-        value = self.content.get(key, default)
-        good = isinstance(value, int | float) and not isinstance(value, bool)
-        if not good or not low <= value <= high:  # type: ignore[operator]
-            text = tr("is {value}, not a number from {low} to {high}")
-            raise self.wrong(key, text.format(value=str(value)[:40], low=low, high=high))
-        return float(value)  # type: ignore[arg-type]
-
-    def table(self, key: str) -> _Table:
-        value = self.content.get(key)
-        if not isinstance(value, dict):
-            raise self.wrong(key, tr("is not a table"))
-        return _Table(value, key, self.path)
-
-    def no_more(self, *known: str) -> None:
-        for key in self.content:
-            if key not in known:
-                raise InputError(
-                    tr("the key {key} is unknown").format(key=self._key(key)),
-                    where=str(self.path),
-                    advice=tr("Remove it, or correct its spelling"),
-                )

@@ -35,6 +35,13 @@ from gelpolight_core.simulation.indenters import (
     nut,
     press,
 )
+from gelpolight_core.simulation.plan import (
+    AVERAGED,
+    exposure_series,
+    press_names,
+    response_tables,
+    session_stages,
+)
 from gelpolight_core.simulation.rays import camera_points
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import (
@@ -50,22 +57,6 @@ from gelpolight_core.simulation.virtual_sensor import (
 from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
-
-AVERAGED = {
-    "checkerboard": 8,
-    "top_pose": 8,
-    "mirror": 8,
-    "whiteboard": 8,
-    "background": 8,
-    "balls": 1,
-    "presses": 1,
-    "response": 1,
-    "single_led": 8,
-}
-"""How many frames each stage's picture is the average of."""
-
-EXPOSURE_MS = 8.0
-"""Exposure time of the whiteboard's picture; only the ratios to it matter."""
 
 TRUTH_PITCH_MM = 0.05
 
@@ -143,16 +134,6 @@ def simulate_session(
         raise
 
 
-def session_stages(design: SensorDesign) -> tuple[str, ...]:
-    """Return the folders of pictures that a session of a design has."""
-    left_out = set()
-    if design.session.response_pictures == 0:
-        left_out.add("response")
-    if not design.session.single_led:
-        left_out.add("single_led")
-    return tuple(stage for stage in AVERAGED if stage not in left_out)
-
-
 def _write_session(out: Path, sensor: VirtualSensor, progress: Progress | None) -> None:
     _write_texts(out, sensor)
     shots = tuple(_shots(sensor))
@@ -191,13 +172,6 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
             yield _Shot("single_led", f"{name}.png", partial(Whiteboard, led=led))
 
 
-def exposure_series(design: SensorDesign) -> dict[str, float]:
-    """Return the files of the stage ``response`` and their exposures over the whiteboard's own."""
-    count = design.session.response_pictures
-    exposures = np.geomspace(1.0 / 32.0, 2.0, count) if count > 1 else np.ones(count)
-    return {f"exp_{number:02d}.png": float(x) for number, x in enumerate(exposures)}
-
-
 def indenter_of(item: Press) -> Indenter:
     """Return the shape that a design's press asks for."""
     if item.shape == "cylinder":
@@ -205,19 +179,6 @@ def indenter_of(item: Press) -> Indenter:
     if item.shape == "cuboid":
         return Cuboid(item.size_mm, item.depth_mm, item.edge_radius_mm)
     return (coin if item.shape == "coin" else nut)(item.size_mm, item.depth_mm)
-
-
-def press_names(presses: tuple[Press, ...]) -> tuple[str, ...]:
-    """Return a file name without suffix for each press; a repeated one gets a number."""
-    names: list[str] = []
-    for item in presses:
-        if item.shape in ("cylinder", "cuboid"):
-            name = f"{item.shape}_s{item.size_mm:g}_d{round(100 * item.depth_mm):03d}"
-        else:
-            name = f"object_{item.shape}"
-        repeat = sum(n == name or n.startswith(f"{name}_r") for n in names)
-        names.append(f"{name}_r{repeat + 1}" if repeat else name)
-    return tuple(names)
 
 
 def _press_maker(design: SensorDesign, item: Press) -> Callable[[], State]:
@@ -350,20 +311,7 @@ square_mm = {_TOP_SQUARE_MM}
 
 [balls]
 {balls}
-{_response_tables(design)}"""
-
-
-def _response_tables(design: SensorDesign) -> str:
-    camera, text = design.camera, ""
-    if design.session.declares_response and camera.response != "linear":
-        gamma = camera.response == "gamma"
-        line = f"gamma = {camera.gamma!r}" if gamma else f'response = "{camera.response}"'
-        text += f"\n[camera]\n{line}\n"
-    series = exposure_series(design)
-    if series:
-        lines = (f'"{name}" = {EXPOSURE_MS * x!r}\n' for name, x in series.items())
-        text += f"\n[response]\n{''.join(lines)}"
-    return text
+{response_tables(design)}"""
 
 
 def truth_table(sensor: VirtualSensor) -> dict[str, Any]:
