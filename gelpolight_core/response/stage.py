@@ -125,8 +125,8 @@ def measure_response(
     ------
     InputError
         If there are fewer than three different exposures or they span less than a factor of four
-        (counting only pictures that are neither dark nor saturated), or if the scene moved or its
-        light changed.
+        (counting only pictures that are neither dark nor saturated), if none of them can be checked
+        by the others, or if the scene moved or its light changed.
     """
     times = np.asarray(exposures_ms, np.float64)
     _refuse_narrow(times, tr("there are {n} different exposures, over a factor of {r:.3g}"))
@@ -181,8 +181,14 @@ def _fit_channel(series: Series) -> _Channel:
         for picture in range(count)
     ]
     known = [value for value in held_out if np.isfinite(value)]
+    if not known:
+        raise InputError(
+            tr("no exposure can be checked by the others: no place is well exposed in three"),
+            where="response",
+            advice=tr("Add exposures in between"),
+        )
     # Exposures that are not quite what is stated bend the curve more than pixels' noise does.
-    doubt = max(REPEATABILITY, float(np.median(known))) if known else float("nan")
+    doubt = max(REPEATABILITY, float(np.median(known)))
     variance = np.zeros(PLACES)
     for disturbance in doubt * np.eye(count):
         fitted = fit_exponents(replace(series, log_time=series.log_time + disturbance))
@@ -193,7 +199,7 @@ def _fit_channel(series: Series) -> _Channel:
         straight,
         np.sqrt(variance),
         disagreement(series, exponents),
-        max(known, default=float("nan")),
+        max(known),
     )
 
 
@@ -241,7 +247,7 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
 
 
 def _refuse_unsteady(residual: float) -> None:
-    if not residual <= LARGEST_RESIDUAL:
+    if residual > LARGEST_RESIDUAL:
         raise InputError(
             tr("the pictures disagree by {x:.1%} of their light").format(x=residual),
             where="response",
