@@ -48,8 +48,9 @@ class CameraResponse:
 
     @property
     def departure(self) -> float:
-        """Largest distance from the straight line, as a share of the scale."""
-        return float(np.abs(self.curves - np.linspace(0.0, 1.0, self.curves.shape[1])).max())
+        """Largest distance from the straight line at the best gain, as a share of the scale."""
+        straight = np.linspace(0.0, 1.0, self.curves.shape[1])
+        return max(float(np.abs(distance(curve, straight)).max()) for curve in self.curves)
 
     @cached_property
     def _of_8_bit(self) -> Map:
@@ -73,6 +74,12 @@ class CameraResponse:
         for k in range(3):
             light[..., k] = self._of_16_bit[frame[..., k], k]
         return light
+
+
+def distance(light: Array, other: Array) -> Array:
+    """Return how far light is from another measure of it at the best common gain."""
+    gain = float((light * other).sum() / (other**2).sum())
+    return np.asarray(light / gain - other)
 
 
 def gamma_response(gamma: float) -> CameraResponse | None:

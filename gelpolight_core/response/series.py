@@ -21,9 +21,11 @@ Mask = NDArray[np.bool_]
 # Dense where numbers are small, as the eye's and most cameras' curves bend there.
 CORNERS = (np.arange(1, 13) / 12.0) ** 2
 LEAST_EXPONENT, LARGEST_EXPONENT = 0.05, 20.0
-# From corner to corner sRGB's exponent changes by up to 0.4; where the pictures say nothing, the
-# exponent is expected to change no more than this.
+# From corner to corner sRGB's exponent changes by 0.1 on average and 0.4 at most; where nothing is
+# seen, the exponent is expected to change by this.
 EXPONENT_STEP = 0.2
+# About 1, far wider than any camera's, so that pictures that say nothing leave it there.
+EXPONENT_SD = 10.0
 # Shutters and lamps repeat to about this share of the light.
 REPEATABILITY = 0.003
 BLOCKS = 1200
@@ -119,6 +121,7 @@ def fit_exponents(series: Series) -> Array:
     outlier = np.ones_like(place)
     exponents, clean = np.ones(len(CORNERS)), place
     steps = np.diff(np.eye(len(CORNERS)), axis=0) / EXPONENT_STEP
+    expected = np.eye(len(CORNERS)) / EXPONENT_SD**2
     for _ in range(ROUNDS):
         slope = np.interp(clean, np.log(CORNERS), exponents)
         weight = outlier * _weight(series, slope)
@@ -126,10 +129,10 @@ def fit_exponents(series: Series) -> Array:
         wanted = log_time - (slope * (place - clean))[..., None]
         right = _centred(wanted, weight)
         flat = (left * weight[..., None]).reshape(-1, len(CORNERS))
-        normal = flat.T @ left.reshape(-1, len(CORNERS)) + steps.T @ steps
+        normal = flat.T @ left.reshape(-1, len(CORNERS)) + steps.T @ steps + expected
         root = np.linalg.cholesky(normal).T
         bounds = (LEAST_EXPONENT, LARGEST_EXPONENT)
-        goal = np.linalg.solve(root.T, flat.T @ right.ravel())
+        goal = np.linalg.solve(root.T, flat.T @ right.ravel() + expected.sum(axis=1))
         exponents = np.asarray(lsq_linear(root, goal, bounds=bounds).x)
         clean = _led_to(series, exponents, outlier)
         slope = np.interp(clean, np.log(CORNERS), exponents)
@@ -169,24 +172,16 @@ def disagreement(series: Series, exponents: Array) -> float:
     return _excess(error, noise * np.sqrt(left), weight)
 
 
-def held_out_disagreement(series: Series, exponents: Array, picture: int) -> float:
+def held_out_disagreement(series: Series, picture: int) -> float:
     """Return by what share of the light a picture differs from what the others say.
 
-    The root mean square, less what the pixels' noise explains.
-
-    Parameters
-    ----------
-    series : Series
-        Whole.
-    exponents : (corners,)
-        Fitted without the picture.
-    picture : int
-        Which; it is judged where its values lie within the others'. NaN where none do.
+    The root mean square, less what the pixels' noise explains, over the values that lie within the
+    others'; NaN where none do.
     """
     others = series.without(picture)
     if not others.usable.any():
         return float("nan")
-    low, high = others.covered
+    exponents, (low, high) = fit_exponents(others), others.covered
     value, (noise, weight) = series.value[picture], _light_noise(series, exponents)
     own = np.where((value >= low) & (value <= high), weight[picture], 0.0)
     weight[picture] = 0.0

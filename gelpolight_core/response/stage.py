@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.quality import Figure, QualityTable, judge
-from gelpolight_core.response.curve import NODES, CameraResponse, declared_response
+from gelpolight_core.response.curve import NODES, CameraResponse, declared_response, distance
 from gelpolight_core.response.series import (
     REPEATABILITY,
     Series,
@@ -175,11 +175,8 @@ def _fit_channel(series: Series) -> _Channel:
     count = len(series.log_time)
     exponents = fit_exponents(series)
     places = np.linspace(*series.covered, PLACES)
-    straight = _departure(light_of(exponents, places), places)
-    held_out = [
-        held_out_disagreement(series, fit_exponents(series.without(picture)), picture)
-        for picture in range(count)
-    ]
+    straight = distance(light_of(exponents, places), places)
+    held_out = [held_out_disagreement(series, picture) for picture in range(count)]
     known = [value for value in held_out if np.isfinite(value)]
     if not known:
         raise InputError(
@@ -192,7 +189,7 @@ def _fit_channel(series: Series) -> _Channel:
     variance = np.zeros(PLACES)
     for disturbance in doubt * np.eye(count):
         fitted = fit_exponents(replace(series, log_time=series.log_time + disturbance))
-        variance += (_departure(light_of(fitted, places), places) - straight) ** 2
+        variance += (distance(light_of(fitted, places), places) - straight) ** 2
     return _Channel(
         series,
         _as_curve(exponents),
@@ -208,12 +205,6 @@ def _as_curve(exponents: Array) -> Array:
     curve = np.concatenate([[0.0], light_of(exponents, nodes[1:])])
     curve[-1] = 1.0
     return curve
-
-
-def _departure(light: Array, straight: Array) -> Array:
-    """Return how far light is from another measure of it at the best common gain."""
-    gain = float((light * straight).sum() / (straight**2).sum())
-    return np.asarray(light / gain - straight)
 
 
 def _lit_pictures(series: Series) -> Series:
@@ -331,7 +322,7 @@ def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Fig
     difference = 0.0
     for channel, curve in zip(channels, stated, strict=True):
         light, said = (np.interp(channel.places, nodes, c) for c in (channel.curve, curve))
-        difference = max(difference, float(np.abs(_departure(light, said)).max()))
+        difference = max(difference, float(np.abs(distance(light, said)).max()))
     return judge(
         "response_declared_difference_percent",
         tr("Declared response less the measured one (which is used)"),
