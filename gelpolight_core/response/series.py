@@ -34,7 +34,9 @@ BLOCKS = 1200
 LARGEST_SPREAD = 0.05
 # Noise of 0.28 steps, 0.4 with the rounding itself, leaves a mean wrong by up to 0.07 steps.
 DITHER = 0.4
-ROUNDS = 6
+ROUNDS = 10
+# Before the curve has found its shape, whole pictures would look like outliers.
+ROUNDS_OF_ALL = 4
 TUKEY = 4.7
 
 
@@ -119,10 +121,12 @@ def fit_exponents(series: Series) -> Array:
     """
     log_time, place = series.log_time[:, None, None], np.log(series.value)
     outlier = np.ones_like(place)
-    exponents, clean = np.ones(len(CORNERS)), place
     steps = np.diff(np.eye(len(CORNERS)), axis=0) / EXPONENT_STEP
     expected = np.eye(len(CORNERS)) / EXPONENT_SD**2
-    for _ in range(ROUNDS):
+    # In an even scene noise is all that tells one place from the next: it must not be the start.
+    exponents = np.full(len(CORNERS), _single_exponent(series))
+    clean = _led_to(series, exponents, outlier)
+    for number in range(ROUNDS):
         slope = np.interp(clean, np.log(CORNERS), exponents)
         weight = outlier * _weight(series, slope)
         left = _centred(_terms(clean), weight)
@@ -136,10 +140,21 @@ def fit_exponents(series: Series) -> Array:
         exponents = np.asarray(lsq_linear(root, goal, bounds=bounds).x)
         clean = _led_to(series, exponents, outlier)
         slope = np.interp(clean, np.log(CORNERS), exponents)
+        if number < ROUNDS_OF_ALL:
+            continue
         error = slope * (place - clean) * np.sqrt(_weight(series, slope))
         scale = max(1.4826 * float(np.median(np.abs(error[series.usable]))), 1.0)
         outlier = np.clip(1.0 - (error / (TUKEY * scale)) ** 2, 0.0, None) ** 2
     return exponents
+
+
+def _single_exponent(series: Series) -> float:
+    """Return the exponent of the power law that explains a series best."""
+    weight = _weight(series, np.ones_like(series.value))[..., None]
+    value = _centred(np.log(series.value)[..., None], weight[..., 0])
+    time = _centred(np.broadcast_to(series.log_time[:, None, None], value.shape), weight[..., 0])
+    exponent = (weight * value * time).sum() / max(float((weight * value**2).sum()), 1e-300)
+    return float(np.clip(exponent, LEAST_EXPONENT, LARGEST_EXPONENT))
 
 
 def _led_to(series: Series, exponents: Array, outlier: Array) -> Array:

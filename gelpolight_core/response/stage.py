@@ -42,6 +42,8 @@ WARN_RESIDUAL, LARGEST_RESIDUAL = 0.01, 0.03
 # a percent, no more than the rest of a calibration leaves.
 NEGLIGIBLE = 0.0025
 SIGNIFICANT = 3.0
+# As much as an exponent of 0.95: a curve known no better may cost more depth than it mends.
+LARGEST_SD = 0.02
 PLACES = 200
 
 
@@ -125,8 +127,8 @@ def measure_response(
     ------
     InputError
         If there are fewer than three different exposures or they span less than a factor of four
-        (counting only pictures that are neither dark nor saturated), if none of them can be checked
-        by the others, or if the scene moved or its light changed.
+        (counting only pictures that are neither dark nor saturated), if they leave
+        the curve uncertain or unchecked, or if the scene moved or its light changed.
     """
     times = np.asarray(exposures_ms, np.float64)
     _refuse_narrow(times, tr("there are {n} different exposures, over a factor of {r:.3g}"))
@@ -139,6 +141,7 @@ def measure_response(
     residual = max(c.residual for c in channels)
     held_out = max(c.held_out for c in channels)
     _refuse_unsteady(max(residual, held_out))
+    _refuse_unknown(max(float(c.departure_sd.max()) for c in channels))
     linear = all(c.linear for c in channels)
     return ResponseResult(
         None if linear else measured,
@@ -250,6 +253,20 @@ def _refuse_unsteady(residual: float) -> None:
         )
 
 
+def _refuse_unknown(departure_sd: float) -> None:
+    if departure_sd > LARGEST_SD:
+        raise InputError(
+            tr("the pictures leave the curve uncertain by {x:.1%} of the scale").format(
+                x=departure_sd
+            ),
+            where="response",
+            advice=tr(
+                "Add exposures in between, or show a scene with some places twice as bright "
+                "as others"
+            ),
+        )
+
+
 def _judge(
     channels: Sequence[_Channel], residual: float, held_out: float, declared: str | float | None
 ) -> QualityTable:
@@ -268,6 +285,7 @@ def _judge(
             100.0 * max(float(c.departure_sd.max()) for c in channels),
             "%",
             warn=0.5,
+            fail=100.0 * LARGEST_SD,
             advice=tr("Add exposures, and check that their times are true"),
         ),
         judge(

@@ -160,8 +160,8 @@ def test_series_that_cannot_tell_are_refused() -> None:
     assert "neither dark, saturated" in refused(series(bent, times=dark), dark)
 
 
-def test_a_scene_of_which_no_place_is_well_exposed_three_times_is_enough() -> None:
-    """Half of the scene is well exposed in the first two pictures, the rest in the last two."""
+def test_exposures_too_far_apart_for_an_even_scene_are_refused() -> None:
+    """Both halves of the scene take the same two values: nothing is known of what lies between."""
     rng, pictures = np.random.default_rng(3), []
     for time in (1.0, 8.0, 64.0):
         light = np.full((240, 320, 3), 0.1 * time)
@@ -169,9 +169,7 @@ def test_a_scene_of_which_no_place_is_well_exposed_three_times_is_enough() -> No
         light += 0.0025 * rng.standard_normal(light.shape)
         shown = np.rint(255.0 * np.clip(light, 0.0, 1.0)) / 255.0
         pictures.append(Picture("exp.png", shown.astype(np.float32)))
-    result = measure_response(pictures, (1.0, 8.0, 64.0))
-    assert result.response is None
-    assert result.quality["response_held_out_percent"].value < 1.0
+    assert "uncertain" in refused(pictures, (1.0, 8.0, 64.0))
 
 
 def test_a_scene_that_moved_is_refused() -> None:
