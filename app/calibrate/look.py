@@ -27,7 +27,7 @@ from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.stages import StageResults
 from gelpolight_core.errors import InputError
-from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
+from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.optics.lens_views import LensView
 from gelpolight_core.session.picture import Picture
@@ -120,11 +120,12 @@ def _ball_looker(project: CalibrationProject, radius_mm: float, name: str) -> Lo
     if (
         results.table is None
         or results.lights is None
+        or results.crosstalk is None
         or results.background is None
         or results.lens is None
     ):
         return partial(_too_early, stage=Stage.BALLS)
-    crosstalk = crosstalk_from_spots(results.lights.spots)
+    crosstalk = results.crosstalk.matrix
     camera = results.lens.camera
     setting = BallSetting(
         results.table,

@@ -79,7 +79,7 @@ def ball_effect(
 
     @lru_cache(maxsize=2)
     def frame(name: str) -> NDArray[np.float32]:
-        return read_picture(session.folder / name).rgb
+        return read_picture(session.folder / name, response=run.calibration.response).rgb
 
     def effect(edit: CurveEdit, name: str) -> Effect:
         maps = _maps(reconstructor.maps, run.calibration, edit)

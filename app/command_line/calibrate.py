@@ -17,7 +17,7 @@ from app.command_line.common import (
 )
 from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.pipeline import STAGES, CalibrationRun, calibrate_session
+from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session, source_files
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
     session = read_session(options.session)
     outputs = [path for path in (options.output, options.json) if path is not None]
-    used = [path for stage in STAGES for path in session.files(stage)]
+    used = source_files(session)
     refuse_overwriting(outputs, [session.folder / "session.toml", *used])
     for path in outputs:
         refuse_unwritable(path)
@@ -46,6 +46,7 @@ def run(options: argparse.Namespace) -> int:
     write_calibration(result.calibration, options.output)
     if options.json:
         write_json(run_as_json(result), options.json)
+    print(tr("camera response: {what}").format(what=result.response.summary))
     print("\n".join(quality_lines(result.calibration.quality)))
     print(
         tr("Calibration {id} written to {path}: {verdict}").format(
@@ -65,6 +66,11 @@ def run_as_json(result: CalibrationRun) -> dict[str, Any]:
         "id": c.identity,
         "model": c.model,
         "verdict": c.verdict.value,
+        "response": {
+            "source": result.response.source,
+            "linear": c.response is None,
+            "light_of_even_values": None if c.response is None else c.response.curves.tolist(),
+        },
         "camera": {
             "fx": camera.fx,
             "fy": camera.fy,
@@ -81,6 +87,7 @@ def run_as_json(result: CalibrationRun) -> dict[str, Any]:
         "led_positions_camera_mm": c.plane.to_camera(c.led_positions_mm).tolist(),
         "led_sd_mm": np.sqrt(np.diagonal(c.led_covariance_mm2, axis1=1, axis2=2)).tolist(),
         "crosstalk": c.crosstalk.tolist(),
+        "crosstalk_source": result.crosstalk.source,
         "balls": [
             {
                 "file": Path(press.name).name,

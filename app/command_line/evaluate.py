@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     make_folder(options.output)
 
     def reconstruct(path: Path) -> HeightMap:
-        picture = read_picture(path)
+        picture = read_picture(path, response=reconstructor.calibration.response)
         require_colour(picture, where=str(path))
         return reconstructor.depth(picture.rgb, name=path.name, normals=False)
 

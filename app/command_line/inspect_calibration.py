@@ -10,6 +10,7 @@ import numpy as np
 
 from app.command_line.common import quality_lines
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.response.curve import CameraResponse
 from gelpolight_core.translation import tr
 
 
@@ -18,6 +19,15 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser("inspect", help=tr("show what a calibration holds"))
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.set_defaults(run=run)
+
+
+def response_text(response: CameraResponse | None) -> str:
+    """Return in words what is undone before a picture is used."""
+    if response is None:
+        return tr("linear")
+    return tr("departs from linear by up to {x:.1f} % of the scale").format(
+        x=100.0 * response.departure
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -33,6 +43,7 @@ def run(options: argparse.Namespace) -> int:
         (tr("program"), c.provenance.program_version),
         (tr("session"), f"{c.provenance.session} ({len(c.provenance.sources)} files)"),
         (tr("picture"), f"{c.camera.width}x{c.camera.height} px"),
+        (tr("camera response"), response_text(c.response)),
         (tr("focal length"), f"{c.camera.fx:.2f}, {c.camera.fy:.2f} px"),
         (tr("principal point"), f"{c.camera.cx:.2f}, {c.camera.cy:.2f} px"),
         (tr("top surface"), f"{c.plane.distance_mm:.3f} mm"),

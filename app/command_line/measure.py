@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
                 where=str(options.truth),
                 advice=tr("Add the picture with its shape and true sizes"),
             )
-    picture = read_picture(options.image)
+    picture = read_picture(options.image, response=reconstructor.calibration.response)
     require_colour(picture, where=str(options.image))
     heightmap = reconstructor.depth(picture.rgb, name=options.image.name, normals=False)
     measurement = measure_object(

@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     make_folder(options.output)
     for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):
-        picture = read_picture(path)
+        picture = read_picture(path, response=reconstructor.calibration.response)
         require_colour(picture, where=str(path))
         heightmap = reconstructor.depth(picture.rgb, name=path.name)
         write_heightmap(heightmap, options.output, formats=formats)

@@ -101,7 +101,7 @@ def _validate(calibration: Calibration, presses: Path | None, tell: Any) -> Vali
     reconstructor = Reconstructor(calibration)
 
     def reconstruct(path: Path) -> HeightMap:
-        picture = read_picture(path)
+        picture = read_picture(path, response=reconstructor.calibration.response)
         require_colour(picture, where=str(path))
         return reconstructor.depth(picture.rgb, name=path.name, normals=False)
 

@@ -17,6 +17,7 @@ from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.response.curve import CameraResponse
 from gelpolight_core.session.session import SensorData
 
 Array = NDArray[np.float64]
@@ -136,7 +137,7 @@ class Calibration:
     led_covariance_mm2 : (3, 3, 3)
         Covariance of each.
     crosstalk : (3, 3)
-        ``I_raw = crosstalk @ I_true``, from the mirror spots.
+        ``I_raw = crosstalk @ I_true``.
     radiance, factors : (rows, columns, 3) float32
         |L| (Eq. 5) and rho (Eq. 9) on the membrane grid; 0 where they are unknown.
     reflectance : ReflectanceTable
@@ -149,6 +150,8 @@ class Calibration:
         When, who, from what.
     full : FullModel or None
         What the full model needs; None where the calibration was made for the paper's alone.
+    response : CameraResponse or None
+        Of the camera; None where it is linear.
     """
 
     sensor: SensorData
@@ -165,6 +168,7 @@ class Calibration:
     quality: Mapping[str, QualityTable]
     provenance: Provenance
     full: FullModel | None = None
+    response: CameraResponse | None = None
 
     @cached_property
     def stack(self) -> LayerStack:
@@ -203,6 +207,8 @@ class Calibration:
             full = self.full
             digest.update(repr((full.membrane, full.kept, full.decay_mm, full.misfit)).encode())
             arrays += [full.led_positions_mm, full.led_sd_mm, full.background]
+        if self.response is not None:
+            arrays.append(self.response.curves)
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
         return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"

@@ -35,7 +35,9 @@ from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.session.session import MAX_PIXELS, SensorData
+from gelpolight_core.response.curve import CameraResponse
+from gelpolight_core.session.session import SensorData
+from gelpolight_core.session.wholeness import MAX_PIXELS
 
 NODES_LIMIT = 10_000
 LEAST_BACKGROUND = -0.2
@@ -121,6 +123,8 @@ def _arrays_of(c: Calibration) -> dict[str, NDArray[Any]]:
         arrays[f"reflectance_values_{k}"] = c.reflectance.values[k]
     if c.full is not None:
         arrays |= full_arrays(c.full)
+    if c.response is not None:
+        arrays["camera_response"] = c.response.curves
     return arrays
 
 
@@ -201,6 +205,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
         provenance=_read_provenance(manifest["provenance"]),
         full=read_full(manifest["full"], arrays) if "full" in manifest else None,
+        response=_read_response(arrays.get("camera_response")),
     )
     _check(calibration)
     stated, made = manifest["grid"], _grid_of(calibration)
@@ -222,6 +227,10 @@ def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
         (values[0], values[1], values[2]),
         arrays["reflectance_coverage"],
     )
+
+
+def _read_response(curves: NDArray[Any] | None) -> CameraResponse | None:
+    return None if curves is None else CameraResponse(curves.astype(np.float64))
 
 
 def _read_provenance(entry: dict[str, Any]) -> Provenance:

@@ -9,13 +9,15 @@ from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
 
-from gelpolight_core.session.session import Session, file_hash
+from gelpolight_core.session.copies import file_hash
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 
 class Stage(StrEnum):
     """A stage, in the order in which a calibration goes through them."""
 
+    RESPONSE = "response"
     LENS = "lens"
     TOP_POSE = "top_pose"
     LIGHTS = "lights"
@@ -36,11 +38,15 @@ FOLDERS = MappingProxyType(
         Stage.BALLS: "balls",
     }
 )
-"""Folder of the pictures of each stage that has its own."""
+"""Folder of the pictures of each stage that cannot do without."""
+
+OPTIONAL_FOLDERS = MappingProxyType({Stage.RESPONSE: "response", Stage.LIGHTS: "single_led"})
+"""Folder of further pictures that a stage uses where a session has them."""
 
 NEEDS = MappingProxyType(
     {
-        Stage.LENS: (),
+        Stage.RESPONSE: (),
+        Stage.LENS: (Stage.RESPONSE,),
         Stage.TOP_POSE: (Stage.LENS,),
         Stage.LIGHTS: (Stage.TOP_POSE,),
         Stage.RADIANCE: (Stage.LIGHTS,),
@@ -91,7 +97,8 @@ def inputs_of(
     """
     found: dict[Stage, StageInputs] = {}
     for stage in Stage:
-        files = session.found(FOLDERS[stage]) if stage in FOLDERS else ()
+        folders = (FOLDERS.get(stage, ""), OPTIONAL_FOLDERS.get(stage, ""))
+        files = [path for folder in folders if folder for path in session.found(folder)]
         found[stage] = StageInputs(
             tuple((path.name, hashes(path)) for path in files),
             repr(_stated(stage, session)),
@@ -126,6 +133,8 @@ def _stated(stage: Stage, session: Session) -> object:
     """Return what a person stated or decided that a stage uses."""
     sensor, decisions = session.sensor, session.decisions
     match stage:
+        case Stage.RESPONSE:
+            return session.declared_response, sorted(session.exposures_ms.items())
         case Stage.LENS:
             return session.checkerboard
         case Stage.TOP_POSE:

@@ -20,7 +20,7 @@ from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-calibration"
-# 1: without the membrane's curves, its deviations and edits by hand.
+# 1: without the membrane's curves, its deviations, edits by hand and the camera's response.
 VERSION = 2
 MANIFEST = "manifest.json"
 MANIFEST_LIMIT = 4_000_000

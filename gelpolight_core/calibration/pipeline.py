@@ -6,6 +6,7 @@ import getpass
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from gelpolight_core.calibration.stages import (
 )
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult
-from gelpolight_core.lights.crosstalk import crosstalk_from_spots
+from gelpolight_core.lights.crosstalk import CrosstalkResult
 from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
@@ -30,14 +31,17 @@ from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.membrane import MEMBRANES
 from gelpolight_core.reflectance.stage import ReflectanceResult
+from gelpolight_core.response.stage import ResponseResult
+from gelpolight_core.session.copies import file_hash, refuse_copies
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
-from gelpolight_core.session.session import Session, file_hash, refuse_copies
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
 STAGES = tuple(FOLDERS.values())
 _SHARES = {
-    Stage.LENS: ("lens", 0.0),
+    Stage.RESPONSE: ("camera response", 0.0),
+    Stage.LENS: ("lens", 0.02),
     Stage.TOP_POSE: ("top surface", 0.3),
     Stage.LIGHTS: ("lights", 0.4),
     Stage.RADIANCE: ("light intensity", 0.45),
@@ -54,9 +58,11 @@ class CalibrationRun:
     """A calibration with the results of every stage, as the pages and the report show them."""
 
     calibration: Calibration
+    response: ResponseResult
     lens: LensResult
     top_pose: TopPoseResult
     lights: LightResult
+    crosstalk: CrosstalkResult
     radiance: RadianceResult
     reflectance: ReflectanceResult
     factors: FactorResult
@@ -83,7 +89,7 @@ def calibrate_session(
         If a stage is missing or cannot be used; the message names the file.
     """
     tell = progress or (lambda _stage, _share: None)
-    refuse_copies(path for stage in STAGES for path in session.files(stage))
+    refuse_copies(source_files(session))
     results = StageResults()
     stages = stages_of(model)
     ends = [_SHARES[stage][1] for stage in stages[1:]] + [1.0]
@@ -99,6 +105,18 @@ def calibrate_session(
             require_balls(results)
     tell(tr("done"), 1.0)
     return assemble(session, results, model=model)
+
+
+def source_files(session: Session) -> tuple[Path, ...]:
+    """Return the pictures that a calibration is made from, stage by stage.
+
+    Raises
+    ------
+    InputError
+        If a stage has none.
+    """
+    stages = (*session.optional_stages, *STAGES)
+    return tuple(path for stage in stages for path in session.files(stage))
 
 
 def _with_edits(calibration: Calibration, session: Session) -> Calibration:
@@ -134,11 +152,14 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
         If a stage was not run, or a picture of a ball shows none.
     """
     require_balls(results)
+    response, crosstalk = results.response, results.crosstalk
     lens, pose, lights = results.lens, results.top_pose, results.lights
     radiance, reflectance, factors = results.radiance, results.reflectance, results.factors
     full = results.full if model == "full" else None
     if (
-        lens is None
+        response is None
+        or crosstalk is None
+        or lens is None
         or pose is None
         or lights is None
         or radiance is None
@@ -158,15 +179,17 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
         plane=pose.plane,
         led_positions_mm=lights.led_positions_mm,
         led_covariance_mm2=lights.led_covariance_mm2,
-        crosstalk=crosstalk_from_spots(lights.spots),
+        crosstalk=crosstalk.matrix,
         radiance=radiance.radiance,
         factors=factors.factors,
         reflectance=reflectance.table,
         noise=press_noise(results.presses),
         quality={
+            **({"response": response.quality} if response.quality.figures else {}),
             "lens": lens.quality,
             "top_pose": pose.quality,
             "lights": lights.quality,
+            "crosstalk": crosstalk.quality,
             "radiance": radiance.quality,
             "reflectance": reflectance.quality,
             "factors": factors.quality,
@@ -174,10 +197,22 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
         },
         provenance=_provenance(session),
         full=full,
+        response=response.response,
     )
     calibration = _with_edits(calibration, session)
     joint = results.joint if model == "full" else None
-    return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors, joint)
+    return CalibrationRun(
+        calibration,
+        response,
+        lens,
+        pose,
+        lights,
+        crosstalk,
+        radiance,
+        reflectance,
+        factors,
+        joint,
+    )
 
 
 def judge_joint(full: FullModel) -> QualityTable:
@@ -224,9 +259,7 @@ def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
 
 
 def _provenance(session: Session) -> Provenance:
-    sources = {
-        f"{stage}/{path.name}": file_hash(path) for stage in STAGES for path in session.files(stage)
-    }
+    sources = {f"{path.parent.name}/{path.name}": file_hash(path) for path in source_files(session)}
     for name in ("session.toml", DECISIONS_FILE):
         if (session.folder / name).is_file():
             sources[name] = file_hash(session.folder / name)

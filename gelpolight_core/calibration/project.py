@@ -31,6 +31,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.session.capture import average_frames, write_picture
+from gelpolight_core.session.copies import file_hash
 from gelpolight_core.session.decisions import (
     Decisions,
     PlacedCircle,
@@ -42,7 +43,6 @@ from gelpolight_core.session.session import (
     ONE_IMAGE_STAGES,
     SensorData,
     Session,
-    file_hash,
     read_picture,
     read_session,
 )
@@ -360,7 +360,11 @@ class CalibrationProject:
             Verdict.WARN: StageState.WARN,
             Verdict.FAIL: StageState.FAIL,
         }[table.verdict]
-        said = ". ".join(table.advice) + "." if table.advice else tr("Everything is within its limits.")
+        said = (
+            ". ".join(table.advice) + "."
+            if table.advice
+            else tr("Everything is within its limits.")
+        )
         return StageStatus(stage, state, said, table)
 
 
@@ -368,9 +372,10 @@ def quality_of(stage: Stage, results: StageResults) -> QualityTable:
     """Return the quality table of a stage's result; an empty one where there is none."""
     figures: list[Any] = []
     parts: tuple[Any, ...] = {
+        Stage.RESPONSE: (results.response,),
         Stage.LENS: (results.lens,),
         Stage.TOP_POSE: (results.top_pose,),
-        Stage.LIGHTS: (results.lights,),
+        Stage.LIGHTS: (results.lights, results.crosstalk),
         Stage.RADIANCE: (results.radiance,),
         Stage.BACKGROUND: (),
         Stage.BALLS: (),

@@ -64,7 +64,9 @@ def gather_scatter(
     parts: list[list[tuple[Array, Array, NDArray[np.intp]]]] = [[], [], []]
     for index, press in enumerate(presses):
         tell(press.name, index / len(presses))
-        picture = table.apply(read_picture(session.folder / press.name).rgb)
+        picture = table.apply(
+            read_picture(session.folder / press.name, response=run.calibration.response).rgb
+        )
         scatter = ball_scatter(
             [press],
             [picture],

@@ -23,7 +23,7 @@ from gelpolight_core.calibration.inputs import NEEDS, Stage, inputs_of
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
-from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
+from gelpolight_core.lights.crosstalk import CrosstalkResult, find_crosstalk, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import LightResult, locate_leds
 from gelpolight_core.optics.camera import Camera
@@ -35,11 +35,12 @@ from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_
 from gelpolight_core.radiance.whiteboard import RadianceResult, calibrate_radiance
 from gelpolight_core.reflectance.press import BallPress, PlacedContact, find_ball
 from gelpolight_core.reflectance.stage import ReflectanceResult, calibrate_reflectance
+from gelpolight_core.response.stage import ResponseResult, declare_response, measure_response
+from gelpolight_core.session.copies import file_hash
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.session import (
     Session,
-    file_hash,
     require_colour,
 )
 from gelpolight_core.translation import tr
@@ -78,10 +79,12 @@ class SeenBall:
 class StageResults:
     """The results of all stages that were run; None where a stage was not."""
 
+    response: ResponseResult | None = None
     lens: LensResult | None = None
     top_pose: TopPoseResult | None = None
     table: ResamplingTable | None = None
     lights: LightResult | None = None
+    crosstalk: CrosstalkResult | None = None
     radiance: RadianceResult | None = None
     background: Map | None = None
     balls: tuple[SeenBall, ...] = ()
@@ -129,6 +132,8 @@ def run_stage(
         If the stage's pictures are missing or cannot be used. A picture of a ball without a ball
         is kept in the results with its fault; :func:`require_balls` raises it.
     """
+    if results.response is not None:
+        session = replace(session, response=results.response.response)
     return _RUNS[stage](session, results, tell or (lambda _share: None))
 
 
@@ -147,6 +152,14 @@ def _need(value: T | None, what: str) -> T:
             advice=tr("Complete the earlier stages first"),
         )
     return value
+
+
+def _run_response(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+    if "response" in session.optional_stages:
+        response = measure_response(*session.series(), declared=session.declared_response)
+    else:
+        response = declare_response(session.declared_response)
+    return replace(results, response=response)
 
 
 def _run_lens(session: Session, results: StageResults, _tell: Progress) -> StageResults:
@@ -183,7 +196,18 @@ def _run_lights(session: Session, results: StageResults, _tell: Progress) -> Sta
         plane_distance_sd_mm=pose.distance_sd_mm,
         plane_normal_sd_rad=float(np.radians(pose.normal_sd_deg)),
     )
-    return replace(results, lights=lights)
+    crosstalk = find_crosstalk(spots, _single_led(session, lens))
+    return replace(results, lights=lights, crosstalk=crosstalk)
+
+
+def _single_led(session: Session, lens: LensResult) -> tuple[Picture, ...]:
+    if "single_led" not in session.optional_stages:
+        return ()
+    pictures = session.single_led()
+    for picture in pictures:
+        require_colour(picture, where=f"single_led/{picture.name}")
+    _same_size(pictures[0], lens, "single_led")
+    return pictures
 
 
 def _run_radiance(session: Session, results: StageResults, _tell: Progress) -> StageResults:
@@ -222,7 +246,7 @@ def _look_for_ball(path: Path, key: str, session: Session, results: StageResults
     lens, table = _need(results.lens, "balls"), _need(results.table, "balls")
     lights, radiance = _need(results.lights, "balls"), _need(results.radiance, "balls")
     bare = _need(results.background, "balls")
-    crosstalk = crosstalk_from_spots(lights.spots)
+    crosstalk = _need(results.crosstalk, "balls").matrix
     picture = session.picture(path)
     radius = session.ball_radius_mm(path.name)
     require_colour(picture, where=str(path))
@@ -293,7 +317,7 @@ def _run_joint(session: Session, results: StageResults, _tell: Progress) -> Stag
     del session
     table, lights = _need(results.table, "balls"), _need(results.lights, "balls")
     bare, factors = _need(results.background, "balls"), _need(results.factors, "balls")
-    crosstalk = crosstalk_from_spots(lights.spots)
+    crosstalk = _need(results.crosstalk, "balls").matrix
     background = unmix(bare, crosstalk)
     noise = press_noise(results.presses)
     pixels = [
@@ -321,6 +345,7 @@ def _run_joint(session: Session, results: StageResults, _tell: Progress) -> Stag
 
 _RUNS: Mapping[Stage, Callable[[Session, StageResults, Progress], StageResults]] = MappingProxyType(
     {
+        Stage.RESPONSE: _run_response,
         Stage.LENS: _run_lens,
         Stage.TOP_POSE: _run_top_pose,
         Stage.LIGHTS: _run_lights,

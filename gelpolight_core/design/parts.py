@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SHAPES = ("cylinder", "cuboid", "coin", "nut")
+RESPONSES = ("linear", "srgb", "gamma")
 
 
 def _within(default: Any, low: float, high: float) -> Any:
@@ -44,6 +45,10 @@ class CameraDesign:
         Standard deviation of the noise in the dark (signal 0..1).
     bit_depth : int
         8 or 16.
+    response : str
+        How light becomes the camera's numbers: "linear", "srgb" (IEC 61966-2-1) or "gamma".
+    gamma : float
+        Of the response "gamma": numbers go as light to the power 1 / gamma.
     """
 
     width_px: int = _within(1280, 16, 16384)
@@ -57,6 +62,8 @@ class CameraDesign:
     shot_variance: float = _within(4e-5, 0.0, 0.1)
     read_sd: float = _within(0.0015, 0.0, 0.5)
     bit_depth: int = _within(8, 8, 16)
+    response: str = "linear"
+    gamma: float = _within(2.2, 0.2, 5.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,6 +212,25 @@ class PhotometryDesign:
     crosstalk: tuple[
         tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]
     ] = _within(((1.0, 0.04, 0.02), (0.05, 1.0, 0.05), (0.02, 0.04, 1.0)), -1.0, 10.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SessionDesign:
+    """What a simulated session holds beside the stages that every session has.
+
+    Attributes
+    ----------
+    declares_response : bool
+        Whether session.toml declares a response that is not linear.
+    response_pictures : int
+        Pictures of the whiteboard at different exposures, from 1/32 to twice its own; 0: none.
+    single_led : bool
+        Whether there are pictures of the whiteboard with one LED lit.
+    """
+
+    declares_response: bool = True
+    response_pictures: int = _within(0, 0, 32)
+    single_led: bool = False
 
 
 @dataclass(frozen=True, slots=True)

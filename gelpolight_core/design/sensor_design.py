@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.design.parts import (
+    RESPONSES,
     SHAPES,
     BallPress,
     CameraDesign,
@@ -23,6 +24,7 @@ from gelpolight_core.design.parts import (
     MembraneDesign,
     PhotometryDesign,
     Press,
+    SessionDesign,
 )
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -67,6 +69,8 @@ class SensorDesign:
         Name of the sensor.
     camera, layers, leds, ring, membrane, photometry
         The parts; `leds` are the red, the green and the blue one.
+    session
+        What a simulated session holds beside the usual stages.
     balls, presses
         What is pressed into it when a session is simulated.
     """
@@ -78,6 +82,7 @@ class SensorDesign:
     ring: LedRing = field(default_factory=LedRing)
     membrane: MembraneDesign = field(default_factory=MembraneDesign)
     photometry: PhotometryDesign = field(default_factory=PhotometryDesign)
+    session: SessionDesign = field(default_factory=SessionDesign)
     balls: tuple[BallPress, ...] = _TEN_BALLS
     presses: tuple[Press, ...] = _EIGHT_PRESSES
 
@@ -138,6 +143,12 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
             where=f"{where} [camera]",
             advice=tr("Use 8 or 16"),
         )
+    if design.camera.response not in RESPONSES:
+        raise InputError(
+            tr("there is no response {name!r}").format(name=design.camera.response),
+            where=f"{where} [camera]",
+            advice=tr("Use one of {names}").format(names=", ".join(RESPONSES)),
+        )
     for press in design.presses:
         if press.shape not in SHAPES:
             raise InputError(
@@ -175,6 +186,7 @@ _PARTS = {
     "ring": LedRing,
     "membrane": MembraneDesign,
     "photometry": PhotometryDesign,
+    "session": SessionDesign,
 }
 _LISTS = {"leds": LedDesign, "balls": BallPress, "presses": Press}
 
@@ -182,9 +194,9 @@ _LISTS = {"leds": LedDesign, "balls": BallPress, "presses": Press}
 def read_design(path: Path) -> SensorDesign:
     """Read a design file; what it leaves out keeps the default sensor's value.
 
-    The tables are ``[camera]``, ``[layers]``, ``[ring]``, ``[membrane]``, ``[photometry]``, and the
-    lists ``[[leds]]``, ``[[balls]]``, ``[[presses]]``; their keys are the attributes of the classes
-    in :mod:`gelpolight_core.design.parts`.
+    The tables are ``[camera]``, ``[layers]``, ``[ring]``, ``[membrane]``, ``[photometry]``,
+    ``[session]``, and the lists ``[[leds]]``, ``[[balls]]``, ``[[presses]]``; their keys are the
+    attributes of the classes in :mod:`gelpolight_core.design.parts`.
 
     Parameters
     ----------
@@ -272,6 +284,10 @@ def _converted(value: Any, like: Any, *, where: str) -> Any:
         if isinstance(value, str):
             return value
         kind = tr("a text")
+    elif isinstance(like, bool):
+        if isinstance(value, bool):
+            return value
+        kind = tr("true or false")
     elif isinstance(like, int):
         if isinstance(value, int) and not isinstance(value, bool):
             return value

@@ -94,9 +94,13 @@ def benchmark_frame(
         Counted runs after one warm-up.
     """
     calibration = reconstructor.calibration
-    steps = _full_steps(reconstructor, frame)
+    light = reconstructor.linearise(frame)
+    steps = _full_steps(reconstructor, light)
     if reconstructor.model == "paper":
-        steps = _paper_steps(reconstructor, frame)
+        steps = _paper_steps(reconstructor, light)
+    if calibration.response is not None:
+        undo = (lambda: reconstructor.linearise(frame), frame.nbytes + light.nbytes)
+        steps = {"linear light": undo, **steps}
     table = calibration.table
     read = frame.nbytes + table.u_px.nbytes + table.v_px.nbytes + calibration.radiance.nbytes
     must = read + table.u_px.nbytes
@@ -109,7 +113,8 @@ def benchmark_frame(
     }
 
     def plain() -> None:
-        plain_depth(*plain_slopes(frame, calibration), table.grid.pitch_mm)
+        light = reconstructor.linearise(frame)
+        plain_depth(*plain_slopes(light, calibration), table.grid.pitch_mm)
 
     times = _time_in_turn(fast, repeats)
     slow = _time_in_turn({"plain": plain}, plain_repeats)["plain"]

@@ -79,7 +79,12 @@ class Reconstructor:
             If the frame is not of the calibration's size, or not in colour.
         """
         self._check(frame, name)
-        return solve_slopes(frame, self.maps, workers=self.workers)
+        return solve_slopes(self.linearise(frame), self.maps, workers=self.workers)
+
+    def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
+        """Return a frame with the camera's response undone; floats are linear light already."""
+        response = self.calibration.response
+        return frame if response is None or frame.dtype.kind == "f" else response.linearise(frame)
 
     def depth(self, frame: NDArray[Any], *, name: str = "", normals: bool = True) -> HeightMap:
         """Reconstruct a raw frame.
@@ -87,7 +92,7 @@ class Reconstructor:
         Parameters
         ----------
         frame : (height, width, 3) uint8, uint16 or float32
-            RGB; float frames are linear light 0..1.
+            RGB; whole numbers as the camera encodes them, float frames linear light 0..1.
         name : str, optional
             The picture's name, kept in the result.
         normals : bool, optional
@@ -110,7 +115,10 @@ class Reconstructor:
     def _depth_full(self, frame: NDArray[Any], name: str, normals: bool) -> HeightMap:
         assert self.calibration.full is not None
         result = reconstruct_full(
-            as_linear(frame), self.calibration, self.calibration.full, workers=self.workers
+            as_linear(self.linearise(frame)),
+            self.calibration,
+            self.calibration.full,
+            workers=self.workers,
         )
         notes = []
         if result.rim == "free":

@@ -121,7 +121,10 @@ def _named(session: Session, stage: str) -> Mapping[str, Map]:
 
 def _reflectance_parts(run: CalibrationRun, session: Session) -> _Parts:
     table, presses = run.calibration.table, run.reflectance.presses
-    pictures = [table.apply(read_picture(session.folder / p.name).rgb) for p in presses]
+    response = run.calibration.response
+    pictures = [
+        table.apply(read_picture(session.folder / p.name, response=response).rgb) for p in presses
+    ]
     rows = []
     for press in presses:
         advice = "; ".join(press.quality.advice)

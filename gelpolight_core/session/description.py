@@ -36,6 +36,12 @@ def write_description(session: Session) -> None:
         "top_pose": _board(session.top_pose),
         "balls": radii,
     }
+    if isinstance(session.declared_response, str):
+        content["camera"] = {"response": session.declared_response}
+    elif session.declared_response is not None:
+        content["camera"] = {"gamma": session.declared_response}
+    if session.exposures_ms:
+        content["response"] = dict(session.exposures_ms)
 
     def write(stream: BinaryIO) -> None:
         tomli_w.dump(content, stream)

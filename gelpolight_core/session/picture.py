@@ -1,4 +1,4 @@
-"""A picture as the core sees it: RGB, linear light, 0..1."""
+"""A picture as the core sees it: RGB, 0..1, linear light once the camera's response is undone."""
 
 from __future__ import annotations
 

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import hashlib
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.response.curve import CameraResponse, declared_response
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.wholeness import is_whole_picture
+from gelpolight_core.session.table import Table
+from gelpolight_core.session.wholeness import decode_picture, unreadable
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
 VERSION = 1
 SUFFIXES = (".png", ".tif", ".tiff")
-MAX_PIXELS = 64_000_000
 # Diamond has 2.42; no clear elastomer or window has more.
 DENSEST_INDEX = 2.5
 ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
+SINGLE_LED_NAMES = ("red", "green", "blue")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,21 @@ class Session:
 
     What a person decided about the pictures (``decisions.toml``) is honoured: excluded ones are not
     among a stage's files.
+
+    Attributes
+    ----------
+    folder, sensor, checkerboard, top_pose
+        Where it is, and what ``session.toml`` says of sensor and boards.
+    ball_radii_mm, ball_default_radius_mm
+        Of ``[balls]``.
+    declared_response : str, float or None
+        Of ``[camera]``: ``linear``, ``srgb``, or a gamma; None where nothing is declared.
+    exposures_ms : mapping
+        Of ``[response]``: exposure time of each of its pictures.
+    response : CameraResponse or None
+        Undone as the stages' pictures are read; as declared until it is measured.
+    decisions : Decisions
+        Of ``decisions.toml``.
     """
 
     folder: Path
@@ -55,7 +70,17 @@ class Session:
     top_pose: BoardSpec
     ball_radii_mm: Mapping[str, float] = field(default_factory=dict)
     ball_default_radius_mm: float | None = None
+    declared_response: str | float | None = None
+    exposures_ms: Mapping[str, float] = field(default_factory=dict)
+    response: CameraResponse | None = None
     decisions: Decisions = field(default_factory=Decisions)
+
+    @property
+    def optional_stages(self) -> tuple[str, ...]:
+        """The stages that this session has, of those that a session may lack."""
+        has_series = bool(self.exposures_ms) or (self.folder / "response").is_dir()
+        has_single = (self.folder / "single_led").is_dir()
+        return ("response",) * has_series + ("single_led",) * has_single
 
     def captured(self, stage: str) -> tuple[Path, ...]:
         """Return all picture files of a stage in the order of their names, excluded ones too."""
@@ -103,8 +128,50 @@ class Session:
         return pictures
 
     def picture(self, path: Path) -> Picture:
-        """Return one of the session's pictures."""
-        return read_picture(path)
+        """Return one of the session's pictures as linear light."""
+        return read_picture(path, response=self.response)
+
+    def series(self) -> tuple[tuple[Picture, ...], tuple[float, ...]]:
+        """Return the pictures of ``response``, as the camera encoded them, and their times (ms).
+
+        Raises
+        ------
+        InputError
+            If a picture has no exposure time in ``[response]``, or a time has no picture.
+        """
+        pictures = replace(self, response=None).pictures("response")
+        names = {picture.name for picture in pictures}
+        for name in sorted(names ^ set(self.exposures_ms)):
+            found = tr("[response] states no exposure time for {name}")
+            if name not in names:
+                found = tr("[response] names {name}, which is not there")
+            raise InputError(
+                found.format(name=name),
+                where=str(self.folder / "session.toml"),
+                advice=tr('Write one line "{name}" = time in ms for each picture there').format(
+                    name=next(iter(sorted(names)))
+                ),
+            )
+        return pictures, tuple(self.exposures_ms[picture.name] for picture in pictures)
+
+    def single_led(self) -> tuple[Picture, ...]:
+        """Return the pictures of the whiteboard with the red, the green, the blue LED lit alone.
+
+        Raises
+        ------
+        InputError
+            If one of the three is missing, or there are others.
+        """
+        by_name = {Path(p.name).stem.casefold(): p for p in self.pictures("single_led")}
+        if set(by_name) != set(SINGLE_LED_NAMES) or len(by_name) != len(self.files("single_led")):
+            raise InputError(
+                tr("there are {found}, not red, green and blue").format(
+                    found=", ".join(path.name for path in self.files("single_led"))
+                ),
+                where=str(self.folder / "single_led"),
+                advice=tr("Give one picture for each LED lit alone: red.png, green.png, blue.png"),
+            )
+        return tuple(by_name[name] for name in SINGLE_LED_NAMES)
 
     def averaged(self, stage: str) -> Picture:
         """Return the average of a one-image stage's frames."""
@@ -155,8 +222,15 @@ def average(pictures: Sequence[Picture], *, name: str) -> Picture:
     )
 
 
-def read_picture(path: Path) -> Picture:
+def read_picture(path: Path, *, response: CameraResponse | None = None) -> Picture:
     """Read a PNG or TIFF picture, 8 or 16 bit, as linear light 0..1 in RGB order.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    response : CameraResponse, optional
+        Of the camera, to be undone; left out, the camera is linear.
 
     Raises
     ------
@@ -167,7 +241,7 @@ def read_picture(path: Path) -> Picture:
         raise InputError(
             tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
         )
-    raw = _decode(path)
+    raw = decode_picture(path)
     if raw is None:
         raise InputError(
             tr("the file is not a whole PNG or TIFF picture"),
@@ -183,43 +257,11 @@ def read_picture(path: Path) -> Picture:
     depth = 8 if raw.dtype == np.uint8 else 16
     grey = raw.ndim == 2
     bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
-    rgb = np.ascontiguousarray(bgr[:, :, ::-1], dtype=np.float32) / np.float32(2**depth - 1)
+    if response is not None:
+        rgb = response.linearise(np.ascontiguousarray(bgr[:, :, ::-1]))
+    else:
+        rgb = np.ascontiguousarray(bgr[:, :, ::-1], dtype=np.float32) / np.float32(2**depth - 1)
     return Picture(path.name, rgb, bit_depth=depth, grey=grey)
-
-
-def _decode(path: Path) -> np.ndarray[Any, Any] | None:
-    try:
-        data = np.fromfile(path, dtype=np.uint8)
-    except OSError as error:
-        raise _unreadable(error, path) from error
-    _check_declared_size(path, data[:64].tobytes())
-    if not is_whole_picture(data.tobytes()):
-        return None
-    try:
-        return cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-    except cv2.error:
-        return None
-
-
-def _unreadable(error: OSError, path: Path) -> InputError:
-    return InputError(
-        tr("the file cannot be read ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check its permissions and the disk, or copy it to a folder of your own"),
-    )
-
-
-def _check_declared_size(path: Path, head: bytes) -> None:
-    """Refuse a PNG that declares more pixels than any camera has, before memory is taken."""
-    if head[:8] != b"\x89PNG\r\n\x1a\n" or len(head) < 24:
-        return
-    width, height = int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
-    if width * height > MAX_PIXELS:
-        raise InputError(
-            tr("the picture declares {w} x {h} pixels").format(w=width, h=height),
-            where=str(path),
-            advice=tr("Use pictures of at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
-        )
 
 
 def require_colour(picture: Picture, *, where: str) -> None:
@@ -248,40 +290,12 @@ def require_colour(picture: Picture, *, where: str) -> None:
         )
 
 
-def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal text."""
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise _unreadable(error, path) from error
-
-
-def refuse_copies(files: Iterable[Path]) -> None:
-    """Refuse a picture that stands in a session twice: noise makes any two captures differ.
-
-    A copied picture is a stage that was not captured, such as the background in the place of the
-    whiteboard, which no later figure shows.
-
-    Raises
-    ------
-    InputError
-        If two of the files hold the same bytes.
-    """
-    seen: dict[str, Path] = {}
-    for path in files:
-        first = seen.setdefault(file_hash(path), path)
-        if first is not path:
-            raise InputError(
-                tr("the picture is a copy of {first}").format(
-                    first=f"{first.parent.name}/{first.name}"
-                ),
-                where=str(path),
-                advice=tr("Capture this picture itself, or remove the copy"),
-            )
-
-
 def read_session(folder: Path) -> Session:
     """Read and check ``session.toml`` of a session folder.
+
+    Beside what every session states it may have ``[camera]`` with either ``response = "linear"``
+    (as without it) or ``"srgb"``, or ``gamma = 2.2``; and ``[response]`` with the exposure time in
+    ms of each picture in the folder ``response``, such as ``"exp_01.png" = 2.0``.
 
     Raises
     ------
@@ -305,7 +319,7 @@ def read_session(folder: Path) -> Session:
             advice=tr("Mend that line"),
         ) from error
     except OSError as error:
-        raise _unreadable(error, path) from error
+        raise unreadable(error, path) from error
     except RecursionError as error:
         raise InputError(
             tr("the file is nested too deeply"), where=str(path), advice=tr("Mend the file")
@@ -321,7 +335,7 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
     InputError
         If a key is unknown, missing, of the wrong kind or out of range; `path` is named.
     """
-    top = _Table(content, "", path)
+    top = Table(content, "", path)
     if top.text("format") != FORMAT:
         raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))
     version = top.whole("version")
@@ -340,13 +354,43 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
     pose = _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard
     balls = top.table("balls")
     radii = {str(name): balls.number(str(name), 0.05, 500.0) for name in balls.content}
-    top.no_more("format", "version", "sensor", "checkerboard", "top_pose", "balls")
+    declared = _parse_camera(top.table("camera")) if "camera" in content else None
+    series = top.table("response") if "response" in content else Table({}, "response", path)
+    times = {str(name): series.number(str(name), 1e-4, 1e6) for name in series.content}
+    top.no_more(
+        "format", "version", "sensor", "checkerboard", "top_pose", "balls", "camera", "response"
+    )
     default = radii.pop("default", None)
-    decisions = read_decisions(path.parent)
-    return Session(path.parent, sensor, checkerboard, pose, radii, default, decisions)
+    return Session(
+        path.parent,
+        sensor,
+        checkerboard,
+        pose,
+        radii,
+        default,
+        declared,
+        times,
+        declared_response(declared),
+        read_decisions(path.parent),
+    )
 
 
-def _parse_sensor(table: _Table) -> SensorData:
+def _parse_camera(table: Table) -> str | float:
+    """Return the declared response: one of two names, or a gamma in the place of a name."""
+    table.no_more("response", "gamma")
+    if "gamma" not in table.content:
+        response = table.text("response")
+        if response not in ("linear", "srgb"):
+            raise table.wrong(
+                "response", tr('is neither "linear" nor "srgb"; or write gamma = 2.2')
+            )
+        return response
+    if "response" in table.content:
+        raise table.wrong("response", tr("stands beside a gamma, where only one of them can hold"))
+    return table.number("gamma", 0.2, 5.0)
+
+
+def _parse_sensor(table: Table) -> SensorData:
     sensor = SensorData(
         serial=table.text("serial"),
         led_height_mm=table.number("led_height_mm", 0.1, 500.0),
@@ -362,7 +406,7 @@ def _parse_sensor(table: _Table) -> SensorData:
     return sensor
 
 
-def _parse_board(table: _Table) -> BoardSpec:
+def _parse_board(table: Table) -> BoardSpec:
     corners = table.content.get("inner_corners")
     whole = isinstance(corners, list) and len(corners) == 2
     if not whole or not all(type(n) is int and 3 <= n <= 100 for n in corners or ()):
@@ -371,59 +415,3 @@ def _parse_board(table: _Table) -> BoardSpec:
     square = table.number("square_mm", 0.05, 500.0)
     table.no_more("inner_corners", "square_mm")
     return BoardSpec((corners[0], corners[1]), square)
-
-
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """A table of session.toml, with errors that name the key."""
-
-    content: dict[str, Any]
-    name: str
-    path: Path
-
-    def _key(self, key: str) -> str:
-        return f"[{self.name}] {key}" if self.name else key
-
-    def wrong(self, key: str, what: str) -> InputError:
-        if key not in self.content:
-            what = tr("is missing")
-        return InputError(
-            f"{self._key(key)} {what}",
-            where=str(self.path),
-            advice=tr("Mend the key {key}").format(key=self._key(key)),
-        )
-
-    def text(self, key: str) -> str:
-        value = self.content.get(key)
-        if not isinstance(value, str) or not value.strip():
-            raise self.wrong(key, tr("is not a text"))
-        return value
-
-    def whole(self, key: str) -> int:
-        value = self.content.get(key)
-        if type(value) is not int:
-            raise self.wrong(key, tr("is not a whole number"))
-        return value
-
-    def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
-        value = self.content.get(key, default)
-        good = isinstance(value, int | float) and not isinstance(value, bool)
-        if not good or not low <= value <= high:  # type: ignore[operator]
-            text = tr("is {value}, not a number from {low} to {high}")
-            raise self.wrong(key, text.format(value=str(value)[:40], low=low, high=high))
-        return float(value)  # type: ignore[arg-type]
-
-    def table(self, key: str) -> _Table:
-        value = self.content.get(key)
-        if not isinstance(value, dict):
-            raise self.wrong(key, tr("is not a table"))
-        return _Table(value, key, self.path)
-
-    def no_more(self, *known: str) -> None:
-        for key in self.content:
-            if key not in known:
-                raise InputError(
-                    tr("the key {key} is unknown").format(key=self._key(key)),
-                    where=str(self.path),
-                    advice=tr("Remove it, or correct its spelling"),
-                )

@@ -1,4 +1,4 @@
-"""From brightness to the camera's numbers: blur, crosstalk, noise, saturation, quantisation."""
+"""From brightness to the camera's numbers: blur, crosstalk, noise, saturation, response, steps."""
 
 from __future__ import annotations
 
@@ -25,20 +25,30 @@ def mixed(brightness: Array, crosstalk: tuple[tuple[float, ...], ...]) -> Array:
     return np.asarray(brightness @ np.array(crosstalk).T)
 
 
+def encoded(light: Array, camera: CameraDesign) -> Array:
+    """Return light 0..1 as the camera's response encodes it, 0..1."""
+    if camera.response == "gamma":
+        return np.asarray(light ** (1.0 / camera.gamma))
+    if camera.response == "srgb":
+        bent = 1.055 * light ** (1.0 / 2.4) - 0.055
+        return np.where(light <= 0.0031308, 12.92 * light, bent)
+    return light
+
+
 def exposed(
     signal: Array, camera: CameraDesign, rng: np.random.Generator, *, averaged: int = 1
 ) -> Frame:
     """Return the camera's numbers for a signal.
 
     Shot noise has the variance ``shot_variance * signal``, read noise ``read_sd ** 2``; averaging
-    frames divides both. What exceeds 1 saturates.
+    frames divides both. What exceeds 1 saturates; what is left is encoded and rounded.
 
     Parameters
     ----------
     signal : (rows, columns[, 3])
         Linear light, 1 is full scale.
     camera : CameraDesign
-        Noise and bit depth.
+        Noise, response and bit depth.
     rng : Generator
         Source of the noise.
     averaged : int, optional
@@ -48,7 +58,7 @@ def exposed(
     variance = camera.shot_variance * np.maximum(signal, 0.0) + camera.read_sd**2
     noise = rng.standard_normal(signal.shape, dtype=np.float32)
     value = signal + noise * np.sqrt(variance / averaged)
-    whole = np.rint(full * np.clip(value, 0.0, 1.0))
+    whole = np.rint(full * encoded(np.clip(value, 0.0, 1.0), camera))
     if camera.bit_depth == 8:
         return whole.astype(np.uint8)
     return whole.astype(np.uint16)

@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,13 @@ from gelpolight_core.simulation.indenters import (
     nut,
     press,
 )
+from gelpolight_core.simulation.plan import (
+    AVERAGED,
+    exposure_series,
+    press_names,
+    response_tables,
+    session_stages,
+)
 from gelpolight_core.simulation.rays import camera_points
 from gelpolight_core.simulation.surface import PressedSurface
 from gelpolight_core.simulation.virtual_sensor import (
@@ -50,17 +58,6 @@ from gelpolight_core.simulation.virtual_sensor import (
 from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
-
-AVERAGED = {
-    "checkerboard": 8,
-    "top_pose": 8,
-    "mirror": 8,
-    "whiteboard": 8,
-    "background": 8,
-    "balls": 1,
-    "presses": 1,
-}
-"""How many frames each stage's picture is the average of."""
 
 TRUTH_PITCH_MM = 0.05
 
@@ -93,7 +90,8 @@ def simulate_session(
     """Write a session folder of the virtual sensor with ``truth.json`` and ``truth/*.npz``.
 
     The folder holds 16 checkerboard views, the board on the top surface, mirror, whiteboard,
-    background, and the balls and presses of the design.
+    background, the balls and presses of the design, and what its ``session`` asks for besides: the
+    whiteboard at several exposures, and with one LED lit.
 
     Parameters
     ----------
@@ -121,13 +119,14 @@ def simulate_session(
         )
     sensor = VirtualSensor(design.scaled(scale), seed)
     made = not out.exists()
-    for stage in (*AVERAGED, "truth"):
+    folders = (*session_stages(design), "truth")
+    for stage in folders:
         make_folder(out / stage)
     try:
         _write_session(out, sensor, progress)
     except BaseException:
         # A part of a session is of no use, and would stand in the way of the next try.
-        for stage in (*AVERAGED, "truth"):
+        for stage in folders:
             shutil.rmtree(out / stage, ignore_errors=True)
         for text in _TEXTS:
             (out / text).unlink(missing_ok=True)
@@ -165,6 +164,11 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
     yield _Shot("mirror", "mirror.png", Mirror)
     yield _Shot("whiteboard", "whiteboard.png", Whiteboard)
     yield _Shot("background", "background.png", BareMembrane)
+    for name, exposure in exposure_series(design).items():
+        yield _Shot("response", name, partial(Whiteboard, exposure=exposure))
+    if design.session.single_led:
+        for led, name in enumerate(("red", "green", "blue")):
+            yield _Shot("single_led", f"{name}.png", partial(Whiteboard, led=led))
 
 
 def checkerboard_poses(design: SensorDesign, seed: int = 0) -> tuple[BoardPose, ...]:
@@ -180,19 +184,6 @@ def indenter_of(item: Press) -> Indenter:
     if item.shape == "cuboid":
         return Cuboid(item.size_mm, item.depth_mm, item.edge_radius_mm)
     return (coin if item.shape == "coin" else nut)(item.size_mm, item.depth_mm)
-
-
-def press_names(presses: tuple[Press, ...]) -> tuple[str, ...]:
-    """Return a file name without suffix for each press; a repeated one gets a number."""
-    names: list[str] = []
-    for item in presses:
-        if item.shape in ("cylinder", "cuboid"):
-            name = f"{item.shape}_s{item.size_mm:g}_d{round(100 * item.depth_mm):03d}"
-        else:
-            name = f"object_{item.shape}"
-        repeat = sum(n == name or n.startswith(f"{name}_r") for n in names)
-        names.append(f"{name}_r{repeat + 1}" if repeat else name)
-    return tuple(names)
 
 
 def _press_maker(design: SensorDesign, item: Press) -> Callable[[], State]:
@@ -335,7 +326,7 @@ square_mm = {_TOP_SQUARE_MM}
 
 [balls]
 {balls}
-"""
+{response_tables(design)}"""
 
 
 def truth_table(sensor: VirtualSensor) -> dict[str, Any]:
@@ -392,13 +383,17 @@ def _photometry_table(sensor: VirtualSensor) -> dict[str, Any]:
     signal = 200.0 / 255.0
     sd = math.sqrt(camera.shot_variance * signal + camera.read_sd**2)
     return {
-        "response": f"linear (gamma 1); value = {full}*linear",
+        "response": {
+            "linear": f"linear (gamma 1); value = {full}*linear",
+            "srgb": f"sRGB (IEC 61966-2-1); value = {full}*encoded",
+            "gamma": f"gamma {camera.gamma:g}; value = {full}*linear^(1/{camera.gamma:g})",
+        }[camera.response],
         "exposure_membrane": sensor.exposure,
         "whiteboard_exposure_relative_to_membrane": 1.0,
         "psf_gaussian_sigma_px": camera.blur_sigma_px,
         "noise": {"shot_var_per_unit": camera.shot_variance, "read_sigma": camera.read_sd},
         "snr_db_at_200": 20.0 * math.log10(signal / sd) if sd > 0.0 else None,
-        "averaged_frames": dict(AVERAGED),
+        "averaged_frames": {s: AVERAGED[s] for s in session_stages(sensor.design)},
     }
 
 

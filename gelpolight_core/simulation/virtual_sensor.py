@@ -50,7 +50,18 @@ class Mirror:
 
 @dataclass(frozen=True, slots=True)
 class Whiteboard:
-    """The diffuse standard pressed onto the bare elastomer."""
+    """The diffuse standard pressed onto the bare elastomer.
+
+    Attributes
+    ----------
+    exposure : float
+        Relative to that of the membrane's pictures.
+    led : int or None
+        The only LED that is lit; None: all.
+    """
+
+    exposure: float = 1.0
+    led: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +143,10 @@ class VirtualSensor:
         if isinstance(state, Mirror):
             light = self._mirror() * photometry.mirror_peak
         elif isinstance(state, Whiteboard):
-            light = self._flat(Material(photometry.whiteboard_reflectance)) * self.exposure
+            light = self._flat(Material(photometry.whiteboard_reflectance))
+            light *= self.exposure * state.exposure
+            if state.led is not None:
+                light[..., np.arange(light.shape[2]) != state.led] = 0.0
         else:
             light = self._membrane.copy()
             if isinstance(state, PressedMembrane):

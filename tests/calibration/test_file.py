@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -118,3 +119,38 @@ def test_a_calibration_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> 
     with pytest.raises(InputError):
         write_calibration(scene.calibration(), tmp_path / "no" / "such" / "c.gplcal")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_file_from_before_camera_responses_is_read_as_linear(whole: Path, tmp_path: Path) -> None:
+    old = read_calibration(rewritten(whole, tmp_path / "old.gplcal", {"version": 1}))
+    assert old.response is None
+    assert old.identity == scene.calibration().identity
+
+
+@pytest.mark.parametrize("version", [0, -1, 1.5, "2", None, True])
+def test_a_version_that_never_was_is_refused(whole: Path, tmp_path: Path, version: object) -> None:
+    with pytest.raises(InputError, match="damaged"):
+        read_calibration(rewritten(whole, tmp_path / "odd.gplcal", {"version": version}))
+
+
+@pytest.mark.parametrize(
+    "curves",
+    [
+        np.tile([0.0, 0.6, 0.5, 1.0], (3, 1)),
+        np.tile([0.0, np.nan, 1.0], (3, 1)),
+        np.tile([0.0, 0.5, 0.9], (3, 1)),
+        np.tile(np.linspace(0.0, 1.0, 10_001), (3, 1)),
+        np.tile(np.linspace(0.0, 1.0, 9), (2, 1)),
+    ],
+)
+def test_a_response_that_no_camera_has_is_refused(tmp_path: Path, curves: np.ndarray) -> None:
+    class Forged:
+        """Passes for a response until it is read."""
+
+        def __init__(self) -> None:
+            self.curves = curves
+
+    path = tmp_path / "forged.gplcal"
+    write_calibration(replace(scene.calibration(), response=Forged()), path)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="camera response"):
+        read_calibration(path)

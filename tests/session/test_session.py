@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.copies import refuse_copies
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.session import (
     average,
     read_picture,
     read_session,
-    refuse_copies,
     require_colour,
 )
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.design.parts import BallPress, Press
+from gelpolight_core.design.parts import BallPress, Press, SessionDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.boards import board_views
@@ -157,3 +157,34 @@ def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(
 def test_repeated_presses_get_names_of_their_own() -> None:
     presses = (Press("cylinder", 5.0, 1.0), Press("cylinder", 5.0, 1.0), Press("coin", 8.0, 0.6))
     assert press_names(presses) == ("cylinder_s5_d100", "cylinder_s5_d100_r2", "object_coin")
+
+
+def test_what_a_design_asks_for_besides_is_there(tmp_path: Path) -> None:
+    """A camera of gamma 2.2 that declares nothing, with a series and single-LED pictures."""
+    design = replace(
+        DESIGN,
+        balls=(),
+        presses=(),
+        camera=replace(DESIGN.camera, response="gamma", shot_variance=0.0, read_sd=0.0),
+        session=SessionDesign(declares_response=False, response_pictures=4, single_led=True),
+    )
+    simulate_session(design, tmp_path / "bent", scale=SCALE)
+    text = tomllib.loads((tmp_path / "bent" / "session.toml").read_text())
+    assert "camera" not in text
+    times = text["response"]
+    assert list(times) == [f"exp_{k:02d}.png" for k in range(4)]
+    place = (120, 160)
+    light = [
+        (cv2.imread(str(tmp_path / "bent/response" / name))[place] / 255.0) ** 2.2 for name in times
+    ]
+    # To half a step of the brighter one: 2.2 / 2 / 255 of its light over its value.
+    ratio = times["exp_02.png"] / times["exp_01.png"]
+    assert light[2] / light[1] == pytest.approx(ratio, rel=0.05)
+    for channel, name in zip((2, 1, 0), ("red", "green", "blue"), strict=True):
+        lit = cv2.imread(str(tmp_path / "bent/single_led" / f"{name}.png"))[place]
+        assert int(np.argmax(lit)) == channel
+
+
+def test_a_session_that_asks_for_nothing_has_no_folder_for_it(session: Path) -> None:
+    assert not (session / "response").exists()
+    assert not (session / "single_led").exists()

@@ -1,0 +1,1 @@
+"""The camera's response: from the numbers it delivers to linear light."""

@@ -1,0 +1,43 @@
+"""Hashes of captured files: which they were, and whether one stands in a session twice."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.wholeness import unreadable
+from gelpolight_core.translation import tr
+
+
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal text."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise unreadable(error, path) from error
+
+
+def refuse_copies(files: Iterable[Path]) -> None:
+    """Refuse a picture that stands in a session twice: noise makes any two captures differ.
+
+    A copied picture is a stage that was not captured, such as the background in the place of the
+    whiteboard, which no later figure shows.
+
+    Raises
+    ------
+    InputError
+        If two of the files hold the same bytes.
+    """
+    seen: dict[str, Path] = {}
+    for path in files:
+        first = seen.setdefault(file_hash(path), path)
+        if first is not path:
+            raise InputError(
+                tr("the picture is a copy of {first}").format(
+                    first=f"{first.parent.name}/{first.name}"
+                ),
+                where=str(path),
+                advice=tr("Capture this picture itself, or remove the copy"),
+            )

@@ -1,0 +1,72 @@
+"""A table of session.toml, whose every mistake is named with its key."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of session.toml, with errors that name the key."""
+
+    content: dict[str, Any]
+    name: str
+    path: Path
+
+    def _key(self, key: str) -> str:
+        return f"[{self.name}] {key}" if self.name else key
+
+    def wrong(self, key: str, what: str) -> InputError:
+        """Return the error about a key; that it is missing goes before what else is said."""
+        if key not in self.content:
+            what = tr("is missing")
+        return InputError(
+            f"{self._key(key)} {what}",
+            where=str(self.path),
+            advice=tr("Mend the key {key}").format(key=self._key(key)),
+        )
+
+    def text(self, key: str) -> str:
+        """Return a text that says something."""
+        value = self.content.get(key)
+        if not isinstance(value, str) or not value.strip():
+            raise self.wrong(key, tr("is not a text"))
+        return value
+
+    def whole(self, key: str) -> int:
+        """Return a whole number."""
+        value = self.content.get(key)
+        if type(value) is not int:
+            raise self.wrong(key, tr("is not a whole number"))
+        return value
+
+    def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
+        """Return a number between two others, or the default where the key is missing."""
+        value = self.content.get(key, default)
+        good = isinstance(value, int | float) and not isinstance(value, bool)
+        if not good or not low <= value <= high:  # type: ignore[operator]
+            text = tr("is {value}, not a number from {low} to {high}")
+            raise self.wrong(key, text.format(value=str(value)[:40], low=low, high=high))
+        return float(value)  # type: ignore[arg-type]
+
+    def table(self, key: str) -> Table:
+        """Return a table in this one."""
+        value = self.content.get(key)
+        if not isinstance(value, dict):
+            raise self.wrong(key, tr("is not a table"))
+        return Table(value, key, self.path)
+
+    def no_more(self, *known: str) -> None:
+        """Refuse keys other than those known."""
+        for key in self.content:
+            if key not in known:
+                raise InputError(
+                    tr("the key {key} is unknown").format(key=self._key(key)),
+                    where=str(self.path),
+                    advice=tr("Remove it, or correct its spelling"),
+                )

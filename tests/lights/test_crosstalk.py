@@ -1,0 +1,122 @@
+"""Crosstalk from pictures with one LED lit: the camera's own mixture, or a reasoned refusal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.lights.crosstalk import find_crosstalk
+from gelpolight_core.lights.mirror import MirrorSpots, Spot
+from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.session.picture import Picture
+
+TRUTH = np.array([[1.0, 0.04, 0.02], [0.05, 1.0, 0.05], [0.02, 0.04, 1.0]])
+NAMES = ("red.png", "green.png", "blue.png")
+
+
+def spots(matrix: np.ndarray) -> MirrorSpots:
+    """Return mirror spots whose colours are the columns of a matrix."""
+    made = tuple(
+        Spot((0.0, 0.0), 0.05, 9, (0.5, 0.5, 0.5), (1.0, 1.0, 1.0), tuple(column), 1.0, False)
+        for column in matrix.T
+    )
+    return MirrorSpots((made[0], made[1], made[2]), (), QualityTable())
+
+
+def single_led(
+    matrix: np.ndarray, *, offset: float = 0.0, peak: float = 0.8, even: bool = False, seed: int = 1
+) -> list[Picture]:
+    """Return the whiteboard under one LED after the other, 8 bit, with dust and a 50 dB noise."""
+    rng = np.random.default_rng(seed)
+    v, u = np.mgrid[:240, :320]
+    pictures = []
+    for led, name in enumerate(NAMES):
+        board = np.exp(-(((u - 90 - 70 * led) / 200.0) ** 2) - ((v - 120) / 200.0) ** 2)
+        board = peak * (np.ones_like(board) if even else board)
+        light = board[..., None] * matrix[:, led] + offset
+        light[60:80, 200:230] = 0.7 * light[60:80, 200:230] + 0.1
+        light = light + rng.standard_normal(light.shape) * np.sqrt(4e-5 * light + 0.0015**2)
+        shown = np.rint(255.0 * np.clip(light, 0.0, 1.0)) / 255.0
+        pictures.append(Picture(name, shown.astype(np.float32)))
+    return pictures
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.lists(st.floats(0.0, 0.3), min_size=6, max_size=6),
+    st.floats(0.0, 0.03),
+    st.floats(0.3, 1.3),
+    st.integers(0, 2**16),
+)
+def test_the_mixture_is_found_whatever_the_dark_level_and_exposure(
+    leaks: list[float], offset: float, peak: float, seed: int
+) -> None:
+    """Within half a percent: two grey levels of the brightest pixels."""
+    matrix = np.eye(3)
+    matrix[~np.eye(3, dtype=bool)] = leaks
+    found = find_crosstalk(
+        spots(np.eye(3)), single_led(matrix, offset=offset, peak=peak, seed=seed)
+    )
+    assert found.source == "single_led"
+    assert np.abs(found.matrix - matrix).max() < 0.005
+
+
+def test_even_light_without_a_dark_level_is_enough() -> None:
+    found = find_crosstalk(spots(np.eye(3)), single_led(TRUTH, even=True))
+    assert np.abs(found.matrix - TRUTH).max() < 0.005
+
+
+def test_a_camera_without_crosstalk_has_none() -> None:
+    found = find_crosstalk(spots(np.eye(3)), single_led(np.eye(3)))
+    assert np.abs(found.matrix - np.eye(3)).max() < 0.002
+
+
+def test_it_is_said_which_pictures_were_used_and_how_far_the_others_are_off() -> None:
+    from_spots = find_crosstalk(spots(TRUTH))
+    assert from_spots.source == "mirror"
+    np.testing.assert_allclose(from_spots.matrix, TRUTH)
+    agree = find_crosstalk(spots(TRUTH), single_led(TRUTH)).quality
+    assert agree["crosstalk_difference_percent"].verdict is Verdict.PASS
+    other = TRUTH.copy()
+    other[0, 1] += 0.05
+    differ = find_crosstalk(spots(other), single_led(TRUTH))
+    figure = differ.quality["crosstalk_difference_percent"]
+    assert figure.value == pytest.approx(5.0, abs=0.5)
+    assert figure.verdict is Verdict.WARN
+    assert differ.matrix[0, 1] == pytest.approx(TRUTH[0, 1], abs=0.005)
+
+
+def swap(pictures: list[Picture]) -> list[Picture]:
+    return [pictures[1], pictures[0], pictures[2]]
+
+
+def all_lit(pictures: list[Picture]) -> list[Picture]:
+    light = np.minimum(sum(p.rgb for p in pictures), 1.0).astype(np.float32)
+    return [Picture(p.name, light) for p in pictures]
+
+
+def times(factor: float) -> Callable[[list[Picture]], list[Picture]]:
+    return lambda pictures: [
+        Picture(p.name, np.minimum(factor * p.rgb, 1.0).astype(np.float32)) for p in pictures
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (swap, "single_led/green.png: the green channel has .* of the red channel"),
+        (all_lit, "of the red channel's light.*Light the red LED alone"),
+        (times(0.05), "is dark"),
+        (times(60.0), "saturated"),
+    ],
+)
+def test_pictures_that_show_something_else_are_refused(
+    change: Callable[[list[Picture]], list[Picture]], what: str
+) -> None:
+    with pytest.raises(InputError, match=what):
+        find_crosstalk(spots(TRUTH), change(single_led(TRUTH)))

@@ -1,0 +1,179 @@
+"""A camera that bends light gives the same depth as one that does not, however that is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.command_line.main import main
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session
+from gelpolight_core.design.parts import Press, SessionDesign
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.simulation.session import simulate_session
+
+SCALE = 0.3
+PRESS = "presses/cylinder_s6_d100.png"
+DEFAULT = SensorDesign()
+
+Run = tuple[Path, CalibrationRun]
+
+
+def calibrated(folder: Path, response: str, session: SessionDesign) -> Run:
+    """Return a small session of the virtual sensor with another camera, and its calibration."""
+    design = replace(
+        DEFAULT,
+        camera=replace(DEFAULT.camera, response=response),
+        balls=DEFAULT.balls[:6],
+        presses=(Press("cylinder", 6.0, 1.0, 1.0, -1.0),),
+        session=session,
+    )
+    simulate_session(design, folder / response, scale=SCALE)
+    return folder / response, calibrate_session(read_session(folder / response), model="full")
+
+
+@pytest.fixture(scope="module")
+def linear(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Return a linear camera's, with a series that says so and single-LED pictures."""
+    asked = SessionDesign(response_pictures=6, single_led=True)
+    return calibrated(tmp_path_factory.mktemp("bent"), "linear", asked)
+
+
+@pytest.fixture(scope="module")
+def gamma(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Return that of a camera whose gamma of 2.2 is declared."""
+    return calibrated(tmp_path_factory.mktemp("bent"), "gamma", SessionDesign())
+
+
+@pytest.fixture(scope="module")
+def srgb(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Return that of an sRGB camera that only a series of exposures tells of."""
+    asked = SessionDesign(declares_response=False, response_pictures=6)
+    return calibrated(tmp_path_factory.mktemp("bent"), "srgb", asked)
+
+
+def raw(run: Run) -> np.ndarray:
+    """Return the press as the camera delivers it, RGB."""
+    return np.ascontiguousarray(cv2.imread(str(run[0] / PRESS))[..., ::-1])
+
+
+def test_what_is_known_of_the_camera_is_said(linear: Run, gamma: Run, srgb: Run) -> None:
+    for (folder, run), source, left_out, declared in (
+        (linear, "measured", True, False),
+        (gamma, "declared", False, True),
+        (srgb, "measured", False, False),
+    ):
+        assert run.response.source == source
+        assert (run.calibration.response is None) is left_out
+        assert ("[camera]" in (folder / "session.toml").read_text()) is declared
+        assert next(iter(run.calibration.quality)) == "response"
+
+
+@pytest.mark.parametrize("model", ["paper", "full"])
+def test_bent_and_straight_cameras_see_the_same_depth(
+    linear: Run, gamma: Run, srgb: Run, model: str
+) -> None:
+    """5 um are half a percent of the press, what the full model leaves on matt sensors."""
+    straight = Reconstructor(linear[1].calibration, model=model).depth(raw(linear)).depth_mm
+    for run in (gamma, srgb):
+        bent = Reconstructor(run[1].calibration, model=model).depth(raw(run)).depth_mm
+        assert bent.shape == straight.shape
+        assert np.sqrt(np.mean((bent - straight) ** 2)) < 0.005
+        top = straight > 0.8
+        assert np.median(bent[top]) == pytest.approx(np.median(straight[top]), rel=0.005)
+
+
+def test_an_unmodelled_gamma_would_be_noticed(gamma: Run) -> None:
+    """The test above can fail."""
+    calibration = gamma[1].calibration
+    right = Reconstructor(calibration).depth(raw(gamma)).depth_mm
+    wrong = Reconstructor(replace(calibration, response=None)).depth(raw(gamma)).depth_mm
+    assert np.sqrt(np.mean((wrong - right) ** 2)) > 0.05
+
+
+def test_camera_numbers_and_read_pictures_are_the_same_light(gamma: Run) -> None:
+    folder, run = gamma
+    read = read_picture(folder / PRESS, response=run.calibration.response).rgb
+    for model in ("paper", "full"):
+        reconstruct = Reconstructor(run.calibration, model=model)
+        from_numbers = reconstruct.depth(raw(gamma)).depth_mm
+        np.testing.assert_array_equal(reconstruct.depth(read).depth_mm, from_numbers)
+        wide = raw(gamma).astype(np.uint16) * 257
+        np.testing.assert_allclose(reconstruct.depth(wide).depth_mm, from_numbers, atol=1e-4)
+
+
+def test_what_is_saturated_stays_saturated(gamma: Run) -> None:
+    from gelpolight_core.reconstruction.heightmap import Flag
+
+    bright = raw(gamma).copy()
+    middle = bright.shape[0] // 2, bright.shape[1] // 2
+    bright[middle[0] - 5 : middle[0] + 5, middle[1] - 5 : middle[1] + 5] = 255
+    for model in ("paper", "full"):
+        flags = Reconstructor(gamma[1].calibration, model=model).depth(bright).flags
+        assert ((flags & int(Flag.SATURATED)) != 0).sum() > 25
+
+
+def test_noise_is_judged_alike(linear: Run, gamma: Run, srgb: Run) -> None:
+    """Steps of a bent scale are wider in the light and finer in the dark, twice at the most."""
+    straight = linear[1].calibration.noise
+    for _, run in (gamma, srgb):
+        assert (
+            (run.calibration.noise / straight > 0.5) & (run.calibration.noise / straight < 2.0)
+        ).all()
+
+
+def test_the_curve_is_the_camera_s_to_a_third_of_a_percent(srgb: Run) -> None:
+    found = srgb[1].calibration.response
+    assert found is not None
+    encoded = np.linspace(0.0, 1.0, found.curves.shape[1])
+    truth = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    assert np.abs(found.curves - truth).max() < 0.0033
+
+
+def test_crosstalk_comes_from_single_led_pictures_where_there_are_any(
+    linear: Run, gamma: Run
+) -> None:
+    truth = np.array(DEFAULT.photometry.crosstalk)
+    assert linear[1].crosstalk.source == "single_led"
+    assert gamma[1].crosstalk.source == "mirror"
+    # A grey level in 250 of the brightest pixels.
+    assert np.abs(linear[1].calibration.crosstalk - truth).max() < 0.002
+    assert linear[1].crosstalk.quality["crosstalk_difference_percent"].value < 1.0
+
+
+def test_the_response_is_kept_in_the_file_and_changes_the_identity(
+    gamma: Run, tmp_path: Path
+) -> None:
+    before = gamma[1].calibration
+    write_calibration(before, tmp_path / "c.gplcal")
+    after = read_calibration(tmp_path / "c.gplcal")
+    assert before.response is not None
+    assert after.response is not None
+    np.testing.assert_array_equal(after.response.curves, before.response.curves)
+    assert after.identity == before.identity
+    assert replace(before, response=None).identity != before.identity
+
+
+def test_commands_undo_the_response(
+    linear: Run, gamma: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heights = []
+    for number, (folder, run) in enumerate((linear, gamma)):
+        path, out = tmp_path / f"{number}.gplcal", tmp_path / str(number)
+        write_calibration(run.calibration, path)
+        assert main(["reconstruct", str(path), str(folder / PRESS), "-o", str(out)]) == 0
+        with np.load(out / f"{Path(PRESS).stem}.npz") as data:
+            heights.append(float(np.median(data["depth_mm"][data["depth_mm"] > 0.8])))
+        assert main(["inspect", str(path)]) == 0
+        times = ["benchmark", str(path), str(folder / PRESS), "--repeats", "1", "--model", "paper"]
+        assert main(times) == 0
+        shown = capsys.readouterr().out
+        assert ("departs from linear" in shown) is (number == 1)
+        assert ("linear light" in shown) is (number == 1)
+    assert heights[1] == pytest.approx(heights[0], rel=0.005)
