@@ -53,6 +53,22 @@ class Provenance:
 
 
 @dataclass(frozen=True, slots=True)
+class ScaleSd:
+    """How far all lengths of a calibration may be off by one common share.
+
+    Attributes
+    ----------
+    depth : float
+        Relative standard deviation of depths and slopes, from LEDs, membrane and lateral scale.
+    lateral : float
+        Relative standard deviation of lengths across, from lens and top surface.
+    """
+
+    depth: float
+    lateral: float
+
+
+@dataclass(frozen=True, slots=True)
 class FullModel:
     """What the full model knows beyond the paper's.
 
@@ -72,6 +88,8 @@ class FullModel:
         Mean robust loss on presses held out, with the mirror's LEDs and with the refined ones.
     kept : str
         ``refined`` or ``mirror``: which LEDs `led_positions_mm` holds.
+    scale_sd : ScaleSd or None
+        How sure its lengths are; None in calibrations by programs that did not find out.
     """
 
     led_positions_mm: Array
@@ -82,6 +100,7 @@ class FullModel:
     misfit: float
     held_out: tuple[float, float]
     kept: str
+    scale_sd: ScaleSd | None = None
 
 
 @dataclass(frozen=True)

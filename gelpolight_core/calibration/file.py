@@ -19,7 +19,13 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
+from gelpolight_core.calibration.calibration import (
+    MODELS,
+    Calibration,
+    FullModel,
+    Provenance,
+    ScaleSd,
+)
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.optics.camera import Camera
@@ -152,7 +158,7 @@ def _arrays_of(c: Calibration) -> dict[str, NDArray[Any]]:
 
 
 def _manifest_of(c: Calibration) -> dict[str, Any]:
-    manifest = {
+    manifest: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "identity": c.identity,
@@ -173,6 +179,8 @@ def _manifest_of(c: Calibration) -> dict[str, Any]:
             "held_out": list(c.full.held_out),
             "kept": c.full.kept,
         }
+        if c.full.scale_sd is not None:
+            manifest["full"]["scale_sd"] = asdict(c.full.scale_sd)
     return manifest
 
 
@@ -315,7 +323,16 @@ def _read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMo
         misfit=float(entry["misfit"]),
         held_out=(before, after),
         kept=str(entry["kept"]),
+        scale_sd=_read_scale(entry["scale_sd"]) if "scale_sd" in entry else None,
     )
+
+
+def _read_scale(entry: dict[str, Any]) -> ScaleSd:
+    scale = ScaleSd(**{name: float(value) for name, value in entry.items()})
+    numbers = np.array([scale.depth, scale.lateral])
+    if not np.isfinite(numbers).all() or numbers.min() < 0.0:
+        raise ValueError("the uncertainty of lengths is not possible")
+    return scale
 
 
 def _read_quality(rows: list[dict[str, Any]]) -> QualityTable:

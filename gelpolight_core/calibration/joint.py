@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gelpolight_core.calibration.spread import jackknife_covariance
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.ball import BallPose
@@ -90,6 +91,9 @@ class JointResult:
         ones.
     kept : str
         ``refined`` or ``mirror``: whose LEDs were the better on what was held out.
+    covariance : (15, 15)
+        Of LEDs (9), exponent, gloss, roughness, cap's bounce, bounce and decay length, by leaving
+        out one press at a time; 0 for LEDs that were not refined.
     """
 
     led_positions_mm: Array
@@ -102,6 +106,7 @@ class JointResult:
     misfit: float
     held_out: tuple[float, float]
     kept: str
+    covariance: Array
 
 
 def view_directions(drift: Array) -> Array:
@@ -284,6 +289,7 @@ def refine_jointly(
         solved.misfit,
         held_out,
         "refined" if refine else "mirror",
+        solved.covariance,
     )
 
 
@@ -302,12 +308,13 @@ def _thinned(pixels: BallPixels) -> BallPixels:
 
 @dataclass(frozen=True, slots=True)
 class _Solution:
-    """Parameters, their standard deviations, robust misfit of the ratio, and mean robust loss."""
+    """Parameters, their spread, robust misfit of the ratio, and mean robust loss."""
 
     x: Array
     sd: Array
     misfit: float
     loss: float
+    covariance: Array
 
 
 def _start(presses: Sequence[BallPress], leds: Array) -> Array:
@@ -354,16 +361,34 @@ def _solve(
         max_nfev=40,
     )
     x = whole(fit.x)
-    scaled = np.concatenate(problem.residuals(x))
+    parts = problem.residuals(x)
+    scaled = np.concatenate(parts)
     loss = float(np.mean(np.sqrt(1.0 + scaled**2) - 1.0))
-    left = CORRELATION * np.concatenate(problem.residuals(x))
+    left = CORRELATION * scaled
     weight = np.concatenate([p.weight.ravel() for p in pixels])
     seen = (weight > 0.0) & (left != 0.0)
     misfit = 1.4826 * float(np.median(np.abs(left[seen] / weight[seen])))
     curvature = problem.jacobian(x)[:, first_free:]
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.concatenate([np.zeros(first_free), np.sqrt(np.maximum(variance, 0.0))])
-    return _Solution(x, sd, misfit, loss)
+    covariance = np.zeros((_GLOBAL, _GLOBAL))
+    if common is None:
+        covariance[first_free:, first_free:] = _shared_covariance(curvature, parts, first_free)
+    return _Solution(x, sd, misfit, loss, covariance)
+
+
+def _shared_covariance(jacobian: Array, parts: Sequence[Array], first_free: int) -> Array:
+    """Return the covariance of the shared parameters that were free."""
+    # Soft L1 lets residuals count for less the larger they are.
+    weights = [(1.0 + r**2) ** -0.25 for r in parts]
+    ends = np.cumsum([r.size for r in parts])
+    rows = np.split(jacobian, ends)
+    return jackknife_covariance(
+        [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)],
+        [w * r for w, r in zip(weights, parts, strict=True)],
+        rows[-1],
+        common=_GLOBAL - first_free,
+    )
 
 
 def _held_out(

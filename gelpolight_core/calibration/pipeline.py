@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import getpass
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -16,9 +16,15 @@ from gelpolight_core.calibration.calibration import (
     Calibration,
     FullModel,
     Provenance,
+    ScaleSd,
     sensor_stack,
 )
-from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
+from gelpolight_core.calibration.depth_scale import (
+    ball_height_error,
+    depth_scale_sd,
+    lateral_scale_sd,
+)
+from gelpolight_core.calibration.joint import JointResult, gather_ball_pixels, refine_jointly
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -43,6 +49,7 @@ from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 Progress = Callable[[str, float], None]
+CHECKED_BALLS = 4
 STAGES = ("checkerboard", "top_pose", *ONE_IMAGE_STAGES, "balls")
 
 
@@ -116,10 +123,10 @@ def calibrate_session(
     reflectance, factors = _reflectance_and_factors(
         presses, pictures, bare, table, lights, radiance
     )
-    full = None
+    full, joint = None, None
     if model == "full":
         tell(tr("joint refinement"), 0.85)
-        full = _full_model(presses, pictures, bare, table, lights, factors)
+        full, joint = _full_model(presses, pictures, bare, table, lights, factors)
     calibration = Calibration(
         sensor=session.sensor,
         model=model,
@@ -139,11 +146,13 @@ def calibrate_session(
             "radiance": radiance.quality,
             "reflectance": reflectance.quality,
             "factors": factors.quality,
-            **({} if full is None else {"joint": _judge_full(full)}),
         },
         provenance=_provenance(session),
         full=full,
     )
+    if joint is not None:
+        tell(tr("uncertainty"), 0.95)
+        calibration = _with_scale(calibration, joint, session, lens, pose)
     tell(tr("done"), 1.0)
     return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
 
@@ -176,7 +185,7 @@ def _full_model(
     table: ResamplingTable,
     lights: LightResult,
     factors: FactorResult,
-) -> FullModel:
+) -> tuple[FullModel, JointResult]:
     """Refine LEDs and membrane on the presses, and keep the background to compare with."""
     crosstalk = crosstalk_from_spots(lights.spots)
     background = unmix(bare, crosstalk)
@@ -188,7 +197,7 @@ def _full_model(
         for press, picture in zip(presses, pictures, strict=True)
     ]
     joint = refine_jointly(presses, pixels, lights.led_positions_mm)
-    return FullModel(
+    full = FullModel(
         joint.led_positions_mm,
         joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
         joint.membrane,
@@ -198,13 +207,46 @@ def _full_model(
         joint.held_out,
         joint.kept,
     )
+    return full, joint
+
+
+def _with_scale(
+    calibration: Calibration,
+    joint: JointResult,
+    session: Session,
+    lens: LensResult,
+    pose: TopPoseResult,
+) -> Calibration:
+    """Say how sure the lengths of the full model are, and judge it."""
+    full = calibration.full
+    assert full is not None
+    covariance = joint.covariance.copy()
+    if joint.kept == "mirror":
+        for k, own in enumerate(calibration.led_covariance_mm2):
+            covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
+    files = session.files("balls")
+    # Evenly over the session, so that one odd press does not decide.
+    some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
+    unexplained = ball_height_error(
+        calibration,
+        [read_picture(files[i]).rgb for i in some],
+        [joint.balls[i] for i in some],
+    )
+    lateral = lateral_scale_sd(
+        calibration.stack, pose.distance_sd_mm, lens.focal_sd_px[0] / lens.camera.fx
+    )
+    fitted = depth_scale_sd(full, calibration.table, covariance)
+    scale = ScaleSd(float(np.linalg.norm([fitted, unexplained, lateral])), lateral)
+    full = replace(full, scale_sd=scale)
+    quality = {**calibration.quality, "joint": _judge_full(full, scale, unexplained)}
+    return replace(calibration, full=full, quality=quality)
 
 
 def _mirror_sd(lights: LightResult) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)))
 
 
-def _judge_full(full: FullModel) -> QualityTable:
+def _judge_full(full: FullModel, scale: ScaleSd, unexplained: float) -> QualityTable:
     return QualityTable(
         (
             judge(
@@ -223,6 +265,24 @@ def _judge_full(full: FullModel) -> QualityTable:
                 "mm",
                 warn=0.2,
                 fail=1.0,
+                advice=tr("Press more balls, at more places"),
+            ),
+            judge(
+                "ball_height_error_percent",
+                tr("Height of ball presses that are reconstructed"),
+                100.0 * unexplained,
+                "%",
+                warn=2.0,
+                fail=10.0,
+                advice=tr("Check ball radii, Z1 and the refractive index"),
+            ),
+            judge(
+                "depth_sd_percent",
+                tr("Height uncertainty from the calibration"),
+                100.0 * scale.depth,
+                "%",
+                warn=2.0,
+                fail=10.0,
                 advice=tr("Press more balls, at more places"),
             ),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),

@@ -26,7 +26,12 @@ def describe(heightmap: HeightMap) -> dict[str, str]:
 
 
 def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write everything the height map holds; `normals` is left out where there are none."""
+    """Write what the height map holds; what it does not hold (None) is left out.
+
+    `depth_sd_mm` and `slope_sd` are what repeats of the picture scatter by; `depth_scale_sd` and
+    `lateral_scale_sd` the calibration's relative standard deviations, common to all pixels. The
+    examples of noise stay in the program.
+    """
     arrays: dict[str, Any] = {
         "depth_mm": heightmap.depth_mm.astype(np.float32, copy=False),
         "x_mm": np.asarray(heightmap.x_mm),
@@ -40,6 +45,13 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     }
     if heightmap.normals is not None:
         arrays["normals"] = heightmap.normals.astype(np.float32, copy=False)
+    for name in ("depth_sd_mm", "slope_sd"):
+        values = getattr(heightmap, name)
+        if values is not None:
+            arrays[name] = values.astype(np.float32, copy=False)
+    for name in ("depth_scale_sd", "lateral_scale_sd"):
+        if getattr(heightmap, name) is not None:
+            arrays[name] = np.float64(getattr(heightmap, name))
     np.savez(file, **arrays)
 
 

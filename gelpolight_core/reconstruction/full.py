@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -13,10 +13,18 @@ from scipy.ndimage import binary_fill_holes
 from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.calibration.joint import neighbourhood
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.reconstruction.denoise import quiet_even_parts
+from gelpolight_core.reconstruction.denoise import noise_left, quiet_even_parts
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
+from gelpolight_core.reconstruction.picture_noise import picture_noise
 from gelpolight_core.reconstruction.placement import place_on_grid, resample
+from gelpolight_core.reconstruction.uncertainty import (
+    DepthNoise,
+    depth_examples,
+    pixels_per_node,
+    place_noise,
+    slope_noise,
+)
 from gelpolight_core.reconstruction.weighted import WeightedIntegration, integrate_weighted
 
 Map = NDArray[np.float32]
@@ -40,8 +48,6 @@ class FullDepth:
         At the grid's own (x, y).
     normals : (rows, columns, 3) float32
         Unit normals, z < 0.
-    slope_sd : (rows, columns) float32
-        Standard deviation of the slopes from the picture's noise.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     changes_mm : tuple of float
@@ -51,19 +57,26 @@ class FullDepth:
     stopped : str
         Why the rounds ended: ``done``, or ``grows`` when the last change was larger than the one
         before and the round was taken back.
+    noise : DepthNoise or None
+        What the picture's noise does to it, where that was asked for.
     """
 
     depth_mm: Map
     normals: Map
-    slope_sd: Map
     flags: NDArray[np.uint8]
     changes_mm: tuple[float, ...]
     rim: str
     stopped: str
+    noise: DepthNoise | None = None
 
 
 def reconstruct_full(
-    rgb: Map, calibration: Calibration, full: FullModel, *, workers: int = 2
+    rgb: Map,
+    calibration: Calibration,
+    full: FullModel,
+    *,
+    workers: int = 2,
+    uncertainty: bool = False,
 ) -> FullDepth:
     """Reconstruct one picture by the full model.
 
@@ -75,13 +88,20 @@ def reconstruct_full(
         The sensor's.
     workers : int, optional
         Threads of the transforms.
+    uncertainty : bool, optional
+        Whether to find out what the picture's noise does; it takes several times as long.
     """
     field = shaded_field(rgb, calibration, full)
     pitch = calibration.table.grid.pitch_mm
     depth, (changes, stopped) = coarse_depth(field, full, pitch, workers)
     slopes, solved, rim = _round(field, depth, full, pitch, workers)
     last = float(np.abs(solved.depth_mm - depth).max())
-    return _placed(field, slopes, solved.depth_mm, (*changes, last), (rim, stopped))
+    placed = place_on_grid(solved.depth_mm, field.drift, field.x_mm, field.y_mm)
+    result = _placed(slopes, solved.depth_mm, placed, (*changes, last), (rim, stopped))
+    if not uncertainty:
+        return result
+    noise = _noise(rgb, calibration, full, field, depth, slopes, placed, workers)
+    return replace(result, noise=noise)
 
 
 def coarse_depth(
@@ -125,12 +145,7 @@ def _round(
     slopes = solve_near_light(
         field, depth_mm, full.led_positions_mm, full.membrane, workers=workers
     )
-    let_go = released_rim(field, pitch_mm)
-    weight, hold, rim = slopes.weight, None, "held"
-    if let_go.any():
-        rim = "free"
-        hold = np.where(let_go, LET_GO, 1.0).astype(np.float32)
-        weight = np.where(field.inside, weight, weight * hold)
+    weight, hold = _rim_weights(field, slopes.weight, pitch_mm)
     solved = integrate_weighted(
         slopes.slope_x,
         slopes.slope_y,
@@ -140,7 +155,16 @@ def _round(
         hold=hold,
         workers=workers,
     )
-    return slopes, solved, rim
+    return slopes, solved, "held" if hold is None else "free"
+
+
+def _rim_weights(field: ShadedField, weight: Map, pitch_mm: float) -> tuple[Map, Map | None]:
+    """Return the weights, and how firmly the border is held (None: everywhere)."""
+    let_go = released_rim(field, pitch_mm)
+    if not let_go.any():
+        return weight, None
+    hold = np.where(let_go, LET_GO, 1.0).astype(np.float32)
+    return np.where(field.inside, weight, weight * hold), hold
 
 
 def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedField:
@@ -221,13 +245,13 @@ def coarsen(field: ShadedField) -> ShadedField:
 
 
 def _placed(
-    field: ShadedField,
     slopes: RaySlopes,
     depth_mm: Map,
+    placed: tuple[Map, Map, NDArray[np.bool_]],
     changes: tuple[float, ...],
     said: tuple[str, str],
 ) -> FullDepth:
-    column, row, folded = place_on_grid(depth_mm, field.drift, field.x_mm, field.y_mm)
+    column, row, folded = placed
     depth = resample(depth_mm, column, row)
     normals = np.stack(
         [resample(np.ascontiguousarray(slopes.normals[..., k]), column, row) for k in range(3)],
@@ -238,4 +262,39 @@ def _placed(
     flags[folded] |= int(Flag.NOT_OBSERVABLE)
     outside = (flags & int(Flag.OUTSIDE)) != 0
     depth[outside] = 0.0
-    return FullDepth(depth, normals, resample(slopes.slope_sd, column, row), flags, changes, *said)
+    return FullDepth(depth, normals, flags, changes, *said)
+
+
+def _noise(
+    rgb: Map,
+    calibration: Calibration,
+    full: FullModel,
+    field: ShadedField,
+    depth_mm: Map,
+    slopes: RaySlopes,
+    placed: tuple[Map, Map, NDArray[np.bool_]],
+    workers: int,
+) -> DepthNoise:
+    """Follow the picture's noise from the raw pixels to the metric grid."""
+    table = calibration.table
+    light = np.nan_to_num(table.apply(rgb), posinf=0.0, neginf=0.0)
+    pixel_sd = np.sqrt(picture_noise(rgb).at(light))
+    count = pixels_per_node(table)
+    unmixed = unmix(light, calibration.crosstalk)
+    left, left_placed = (
+        noise_left(unmixed, field.usable, count, resampled=times) for times in (1, 2)
+    )
+    base = np.maximum(full.background, LEAST_BASE)
+    unmixing = np.linalg.inv(calibration.crosstalk)
+    per_channel = np.stack(
+        [(left * pixel_sd[..., k])[..., None] * unmixing[:, k] / base for k in range(3)]
+    ).astype(np.float32)
+    noise = slope_noise(
+        field, depth_mm, per_channel, full.led_positions_mm, full.membrane, workers=workers
+    )
+    pitch = table.grid.pitch_mm
+    weight, hold = _rim_weights(field, slopes.weight, pitch)
+    examples = depth_examples(noise, left, count, weight, hold, pitch_mm=pitch, workers=workers)
+    # Bringing normals to true positions averages them once more.
+    noise = replace(noise, slope_sd=noise.slope_sd * left_placed / left)
+    return place_noise(noise, examples, slopes, field.drift, placed[0], placed[1])

@@ -57,6 +57,18 @@ class HeightMap:
         Name of the picture, such as ``press_03.png``.
     notes : tuple of str
         What is to be said of this map, in sentences for a person.
+    slope_sd, depth_sd_mm : (rows, columns) float32 or None
+        What repeats of the picture scatter by: standard deviations of the surface's slopes (root
+        mean square of x and y) and of the depth, from the picture's noise. None where they were
+        not asked for, or by the paper's model.
+    noise_mm : (examples, rows / 4, columns / 4) float32 or None
+        Errors of the depth that this noise could as well have made, on every fourth of the nodes
+        (averages over blocks of 4 x 4).
+    depth_scale_sd, lateral_scale_sd : float or None
+        Relative standard deviations, from the calibration, of depths and slopes, and of lengths
+        across. They are common to all pixels and all pictures of a calibration: the standard
+        deviation of a depth is the root of the sum of squares of `depth_sd_mm` and
+        `depth_scale_sd` times the depth. None where the calibration does not say.
 
     Raises
     ------
@@ -74,6 +86,11 @@ class HeightMap:
     model: str
     source: str
     notes: tuple[str, ...] = ()
+    slope_sd: NDArray[np.float32] | None = None
+    depth_sd_mm: NDArray[np.float32] | None = None
+    noise_mm: NDArray[np.float32] | None = None
+    depth_scale_sd: float | None = None
+    lateral_scale_sd: float | None = None
 
     def __post_init__(self) -> None:
         """Check that the shapes fit each other."""
@@ -81,6 +98,9 @@ class HeightMap:
         expected = {"x_mm": (columns,), "y_mm": (rows,), "flags": (rows, columns)}
         if self.normals is not None:
             expected["normals"] = (rows, columns, 3)
+        for name in ("slope_sd", "depth_sd_mm"):
+            if getattr(self, name) is not None:
+                expected[name] = (rows, columns)
         for name, shape in expected.items():
             found = np.shape(getattr(self, name))
             if found != shape:

@@ -81,8 +81,6 @@ class RaySlopes:
         Unit normals of the surface, z < 0.
     weight : (rows, columns) float32
         How far the slopes are to be trusted, 0..1.
-    slope_sd : (rows, columns) float32
-        Standard deviation of the slopes from the picture's noise.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     """
@@ -91,7 +89,6 @@ class RaySlopes:
     slope_y: Map
     normals: Map
     weight: Map
-    slope_sd: Map
     flags: NDArray[np.uint8]
 
 
@@ -119,7 +116,7 @@ def solve_near_light(
         Threads; each takes a block of rows, so that the result does not depend on their number.
     """
     shape = depth_mm.shape
-    slope_x, slope_y, weight, slope_sd = (np.zeros(shape, np.float32) for _ in range(4))
+    slope_x, slope_y, weight = (np.zeros(shape, np.float32) for _ in range(3))
     normals = np.zeros((*shape, 3), np.float32)
     flags = np.zeros(shape, np.uint8)
     shape_of = np.array(
@@ -148,7 +145,6 @@ def solve_near_light(
             slope_y,
             normals,
             weight,
-            slope_sd,
             flags,
         )
 
@@ -156,7 +152,7 @@ def solve_near_light(
     edges = np.linspace(0, shape[0], 8 * max(workers, 1) + 1).astype(int).tolist()
     with ThreadPoolExecutor(max(workers, 1)) as pool:
         list(pool.map(solve, pairwise(edges)))
-    return RaySlopes(slope_x, slope_y, normals, weight, slope_sd, flags)
+    return RaySlopes(slope_x, slope_y, normals, weight, flags)
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
@@ -246,7 +242,6 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     slope_y,
     normals,
     weight,
-    slope_sd,
     flags,
 ):
     rows, columns = depth.shape
@@ -277,7 +272,6 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             nx, ny, nz = 0.0, 0.0, -1.0
             missing_count = 0
             flag = 0
-            c11, c12, c22 = 1.0, 0.0, 1.0
             for step in range(8):
                 missing_count, missing, side = 0, -1, 0
                 for k in range(3):
@@ -357,7 +351,6 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             elif missing_count >= 2:
                 trust = UNSOLVED_WEIGHT
                 nx, ny, nz = 0.0, 0.0, -1.0
-                c11, c12, c22 = 1.0, 0.0, 1.0
             if nz > -STEEPEST_NZ - 1e-6:
                 trust = UNSOLVED_WEIGHT
                 flag |= _NOT_OBSERVABLE
@@ -382,6 +375,4 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             slope_x[i, j] = -(nx * (1.0 + d * wxx) + ny * d * wyx) / along
             slope_y[i, j] = -(nx * d * wxy + ny * (1.0 + d * wyy)) / along
             weight[i, j] = trust
-            det = max(c11 * c22 - c12 * c12, 1e-12)
-            slope_sd[i, j] = sqrt(0.5 * (c11 + c22) / det) / (nz * nz)
             flags[i, j] = flag
