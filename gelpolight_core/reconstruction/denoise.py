@@ -30,7 +30,7 @@ def quiet_even_parts(light: Map, usable: NDArray[np.bool_]) -> Map:
     """
     if not usable.any():
         return light
-    quiet = np.asarray(cv2.GaussianBlur(light, (0, 0), QUIET_PX))
+    quiet = np.asarray(cv2.GaussianBlur(light, (0, 0), QUIET_PX), np.float32)
     edge = _edges(light, quiet, usable)
     return np.asarray(quiet + edge[..., None] * (light - quiet), np.float32)
 
@@ -56,7 +56,7 @@ def noise_left(
     """
     if not usable.any():
         return np.ones(usable.shape, np.float32)
-    quiet = np.asarray(cv2.GaussianBlur(light, (0, 0), QUIET_PX))
+    quiet = np.asarray(cv2.GaussianBlur(light, (0, 0), QUIET_PX), np.float32)
     edge = _edges(light, quiet, usable)
     tent = resampled / (3.0 * pixels_per_node)
     bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2

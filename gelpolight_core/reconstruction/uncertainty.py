@@ -178,8 +178,9 @@ def place_noise(
     # A ray's point slides along the surface as it goes deeper: D(P0 + d w) = d.
     along = slopes.normals[..., 2] - (slopes.normals[..., :2] * drift).sum(axis=-1)
     stretch = quarter(np.abs(along / slopes.normals[..., 2]))
-    at = [(quarter(c) - 0.5 * (SCALE - 1)) / SCALE for c in (column, row)]
-    placed = np.stack([_remap(np.asarray(e * stretch, np.float32), *at) for e in examples_mm])
+    first = np.float32(0.5 * (SCALE - 1))
+    at_column, at_row = ((quarter(c) - first) / np.float32(SCALE) for c in (column, row))
+    placed = np.stack([_remap(e * stretch, at_column, at_row) for e in examples_mm])
     rows, columns = column.shape
     variance = cv2.resize(np.mean(placed**2, axis=0), (columns, rows))
     return DepthNoise(
