@@ -7,7 +7,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, HeightMap
+from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, HeightMap
 
 
 def flag_names() -> list[str]:
@@ -28,9 +28,8 @@ def describe(heightmap: HeightMap) -> dict[str, str]:
 def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     """Write what the height map holds; what it does not hold (None) is left out.
 
-    `depth_sd_mm` and `slope_sd` are what repeats of the picture scatter by; `depth_scale_sd` and
-    `lateral_scale_sd` the calibration's relative standard deviations, common to all pixels. The
-    examples of noise stay in the program.
+    The standard deviations are described in :class:`HeightMap`. The examples of noise stay in the
+    program.
     """
     arrays: dict[str, Any] = {
         "depth_mm": heightmap.depth_mm.astype(np.float32, copy=False),
@@ -45,7 +44,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     }
     if heightmap.normals is not None:
         arrays["normals"] = heightmap.normals.astype(np.float32, copy=False)
-    for name in ("depth_sd_mm", "slope_sd"):
+    for name in SD_MAPS:
         values = getattr(heightmap, name)
         if values is not None:
             arrays[name] = values.astype(np.float32, copy=False)

@@ -19,10 +19,12 @@ from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, so
 from gelpolight_core.reconstruction.picture_noise import picture_noise
 from gelpolight_core.reconstruction.placement import place_on_grid, resample
 from gelpolight_core.reconstruction.uncertainty import (
+    MODEL_EXAMPLES,
     DepthNoise,
     depth_examples,
+    model_times,
     pixels_per_node,
-    place_noise,
+    place_examples,
     slope_noise,
 )
 from gelpolight_core.reconstruction.weighted import WeightedIntegration, integrate_weighted
@@ -30,6 +32,8 @@ from gelpolight_core.reconstruction.weighted import WeightedIntegration, integra
 Map = NDArray[np.float32]
 SATURATED = 0.995
 LEAST_BASE = 0.01
+# A share of the brightness below any camera's noise; zero would say nothing of conditioning.
+LEAST_NOISE = 1e-5
 COARSE = 4
 COARSE_ROUNDS = 3
 RIM_MM = 0.5
@@ -58,7 +62,7 @@ class FullDepth:
         Why the rounds ended: ``done``, or ``grows`` when the last change was larger than the one
         before and the round was taken back.
     noise : DepthNoise or None
-        What the picture's noise does to it, where that was asked for.
+        How far it may be off, where that was asked for.
     """
 
     depth_mm: Map
@@ -89,7 +93,7 @@ def reconstruct_full(
     workers : int, optional
         Threads of the transforms.
     uncertainty : bool, optional
-        Whether to find out what the picture's noise does; it takes several times as long.
+        Whether to find out how far it may be off; it takes several times as long.
     """
     field = shaded_field(rgb, calibration, full)
     pitch = calibration.table.grid.pitch_mm
@@ -275,26 +279,44 @@ def _noise(
     placed: tuple[Map, Map, NDArray[np.bool_]],
     workers: int,
 ) -> DepthNoise:
-    """Follow the picture's noise from the raw pixels to the metric grid."""
-    table = calibration.table
+    """Follow the picture's noise, and the model's misfit, to the metric grid."""
+    table, (column, row, _) = calibration.table, placed
     light = np.nan_to_num(table.apply(rgb), posinf=0.0, neginf=0.0)
-    pixel_sd = np.sqrt(picture_noise(rgb).at(light))
-    count = pixels_per_node(table)
     unmixed = unmix(light, calibration.crosstalk)
+    count = pixels_per_node(table)
     left, left_placed = (
         noise_left(unmixed, field.usable, count, resampled=times) for times in (1, 2)
     )
+    variance = picture_noise(rgb).at(light) @ (np.linalg.inv(calibration.crosstalk).T ** 2)
     base = np.maximum(full.background, LEAST_BASE)
-    unmixing = np.linalg.inv(calibration.crosstalk)
-    per_channel = np.stack(
-        [(left * pixel_sd[..., k])[..., None] * unmixing[:, k] / base for k in range(3)]
-    ).astype(np.float32)
-    noise = slope_noise(
-        field, depth_mm, per_channel, full.led_positions_mm, full.membrane, workers=workers
-    )
+    sd = np.asarray(left[..., None] * np.sqrt(variance) / base, np.float32)
+    sd = np.maximum(sd, LEAST_NOISE)
+    noise = slope_noise(field, depth_mm, sd, full.led_positions_mm, full.membrane, workers=workers)
     pitch = table.grid.pitch_mm
     weight, hold = _rim_weights(field, slopes.weight, pitch)
-    examples = depth_examples(noise, left, count, weight, hold, pitch_mm=pitch, workers=workers)
+    # A block's average has the noise of all raw pixels in it; no filter takes from that.
+    block = 1.0 / (COARSE * np.sqrt(count) * left)
+    white = depth_examples(noise, block, weight, hold, pitch_mm=pitch, workers=workers)
+    times = model_times(field.ratio, sd, full.misfit)
+    model = depth_examples(
+        noise,
+        times,
+        weight,
+        hold,
+        pitch_mm=pitch,
+        reach_mm=full.decay_mm,
+        examples=MODEL_EXAMPLES,
+        workers=workers,
+    )
+    examples, depth_sd = place_examples(white, slopes, field.drift, column, row)
+    _, model_sd = place_examples(model, slopes, field.drift, column, row)
     # Bringing normals to true positions averages them once more.
-    noise = replace(noise, slope_sd=noise.slope_sd * left_placed / left)
-    return place_noise(noise, examples, slopes, field.drift, placed[0], placed[1])
+    slope_sd = np.sqrt((noise.moved**2).sum(axis=0)) * left_placed / left
+    slope_model_sd = np.sqrt(((noise.moved * times) ** 2).sum(axis=0))
+    return DepthNoise(
+        resample(slope_sd, column, row),
+        depth_sd,
+        resample(slope_model_sd, column, row),
+        model_sd,
+        examples,
+    )

@@ -101,7 +101,7 @@ class Reconstructor:
         normals : bool, optional
             Whether the result holds normals.
         uncertainty : bool, optional
-            Whether the result holds what the picture's noise does to it; several times as slow.
+            Whether the result holds how far each pixel may be off; several times as slow.
             The paper's model states none.
 
         Raises
@@ -142,6 +142,8 @@ class Reconstructor:
             heightmap,
             slope_sd=None if noise is None else noise.slope_sd,
             depth_sd_mm=None if noise is None else noise.depth_sd_mm,
+            slope_model_sd=None if noise is None else noise.slope_model_sd,
+            depth_model_sd_mm=None if noise is None else noise.depth_model_sd_mm,
             noise_mm=None if noise is None else noise.examples_mm,
             depth_scale_sd=None if scale is None else scale.depth,
             lateral_scale_sd=None if scale is None else scale.lateral,
