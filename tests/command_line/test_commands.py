@@ -116,6 +116,9 @@ def test_a_press_is_measured_against_its_truth(
     m = json.loads(result.read_text())
     assert {"shape", "diameter_mm", "height_mm", "centre_mm", "yaw_deg", "drape_decay_mm"} <= set(m)
     assert {"sd", "truth", "error_percent", "verdict", "reason"} <= set(m)
+    assert set(m["noise_sd"]) == set(m["calibration_sd"]) == set(m["sd"])
+    for key in ("height_mm", "diameter_mm"):
+        assert m["sd"][key] >= np.hypot(m["noise_sd"][key], m["calibration_sd"][key]) * 0.999
     assert m["diameter_mm"] == pytest.approx(5.0, rel=0.06)
     assert m["height_mm"] == pytest.approx(1.0, rel=0.06)
 
