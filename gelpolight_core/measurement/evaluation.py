@@ -241,13 +241,7 @@ def _measured(
     try:
         heights = reconstruct(path)
         return measure_object(
-            heights.depth_mm,
-            heights.x_mm,
-            heights.y_mm,
-            shape=shape,
-            flags=heights.flags,
-            depth_scale_sd=heights.depth_scale_sd,
-            lateral_scale_sd=heights.lateral_scale_sd,
+            heights.depth_mm, heights.x_mm, heights.y_mm, shape=shape, flags=heights.flags
         )
     except InputError as error:
         return str(error)
