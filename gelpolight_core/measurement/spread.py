@@ -3,7 +3,7 @@
 ``noise`` is what repeats of the picture scatter by: examples of the depth map's noise pass through
 the fit's last step. The fit's weights move with the noise too, which that step does not show: where
 the shape is not quite what was pressed, as at a cuboid's corners, widths scatter by two to three
-times as much, still within the whole. ``calibration`` is common to all measurements with one
+times as much, about the whole at worst. ``calibration`` is common to all measurements with one
 calibration. The fit's own standard deviation holds the noise and whatever the shape does not
 explain (drape, edges, the ground's waves), with pixels that err together counted once; the whole is
 the larger of it and the noise, together with the calibration.
