@@ -56,7 +56,9 @@ def run(options: argparse.Namespace) -> int:
             )
     picture = read_picture(options.image, response=reconstructor.calibration.response)
     require_colour(picture, where=str(options.image))
-    heightmap = reconstructor.depth(picture.rgb, name=options.image.name, normals=False)
+    heightmap = reconstructor.depth(
+        picture.rgb, name=options.image.name, normals=False, uncertainty=True
+    )
     measurement = measure_object(
         heightmap.depth_mm,
         heightmap.x_mm,
@@ -64,6 +66,9 @@ def run(options: argparse.Namespace) -> int:
         shape=options.shape,
         seed_mm=tuple(options.seed) if options.seed else None,
         flags=heightmap.flags,
+        noise_mm=heightmap.noise_mm,
+        depth_scale_sd=heightmap.depth_scale_sd,
+        lateral_scale_sd=heightmap.lateral_scale_sd,
     )
     comparison = None if truth is None else compare(measurement, truth)
     if options.json:
@@ -92,6 +97,15 @@ def measurement_lines(measurement: Measurement, comparison: Comparison | None) -
         line = f"{label:<12} {_numbers(values[key])} {unit}"
         if sd is not None:
             line += f"  (sd {_numbers(sd)})"
+            parts = [
+                f"{name} {_numbers(values[part][key])}"
+                for part, name in (
+                    ("noise_sd", tr("noise")),
+                    ("calibration_sd", tr("calibration")),
+                )
+                if values[part] is not None
+            ]
+            line = line[:-1] + "".join(f", {part}" for part in parts) + ")"
         if key in errors:
             line += tr("  error {e:+.2f} %").format(e=errors[key])
         lines.append(line)

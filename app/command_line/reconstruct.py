@@ -64,7 +64,8 @@ def run(options: argparse.Namespace) -> int:
     for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):
         picture = read_picture(path, response=reconstructor.calibration.response)
         require_colour(picture, where=str(path))
-        heightmap = reconstructor.depth(picture.rgb, name=path.name)
+        # Only this format has room for standard deviations.
+        heightmap = reconstructor.depth(picture.rgb, name=path.name, uncertainty="npz" in formats)
         write_heightmap(heightmap, options.output, formats=formats)
         for note in heightmap.notes:
             tqdm.write(f"{path}: {note}", file=sys.stderr)

@@ -79,6 +79,26 @@ class Provenance:
 
 
 @dataclass(frozen=True, slots=True)
+class ScaleSd:
+    """How far all lengths of a calibration may be off by one common share.
+
+    Attributes
+    ----------
+    depth : float
+        Relative standard deviation of depths and slopes, from LEDs, membrane and lateral scale.
+    lateral : float
+        Relative standard deviation of lengths across, from lens and top surface.
+    balls : float
+        Relative error of the height of ball presses that are reconstructed, root mean square; it
+        is part of `depth`.
+    """
+
+    depth: float
+    lateral: float
+    balls: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class FullModel:
     """What the full model knows beyond the paper's.
 
@@ -105,6 +125,8 @@ class FullModel:
         The same loss with a two-lobe membrane, and with a one-dimensional one.
     membrane_kept : str
         ``two-lobe`` or ``one-dimensional``: which of them `membrane` is.
+    scale_sd : ScaleSd or None
+        How sure its lengths are; None in calibrations by programs that did not find out.
     """
 
     led_positions_mm: Array
@@ -118,6 +140,7 @@ class FullModel:
     membrane_sd: Mapping[str, float] = field(default_factory=dict)
     membrane_held_out: tuple[float, float] = (0.0, 0.0)
     membrane_kept: str = MEMBRANES[0]
+    scale_sd: ScaleSd | None = None
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import FullModel
+from gelpolight_core.calibration.calibration import FullModel, ScaleSd
 from gelpolight_core.reflectance.membrane import CURVE_NODES, MEMBRANES, Membrane
 
 CURVES = "full_membrane_diffuse"
@@ -18,7 +18,9 @@ def full_entry(full: FullModel) -> dict[str, Any]:
     """Return what of a full model goes into the manifest."""
     membrane = asdict(full.membrane)
     del membrane["diffuse"]
+    scale = {} if full.scale_sd is None else {"scale_sd": asdict(full.scale_sd)}
     return {
+        **scale,
         "membrane": membrane,
         "membrane_sd": dict(full.membrane_sd),
         "membrane_held_out": list(full.membrane_held_out),
@@ -77,7 +79,16 @@ def read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMod
         membrane_sd=sd,
         membrane_held_out=(two_lobe, one_dimensional),
         membrane_kept=str(kept),
+        scale_sd=_read_scale(entry["scale_sd"]) if "scale_sd" in entry else None,
     )
+
+
+def _read_scale(entry: dict[str, Any]) -> ScaleSd:
+    scale = ScaleSd(**{name: float(value) for name, value in entry.items()})
+    numbers = np.array([scale.depth, scale.lateral, scale.balls])
+    if not np.isfinite(numbers).all() or numbers.min() < 0.0:
+        raise ValueError("the uncertainty of lengths is not possible")
+    return scale
 
 
 def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membrane:

@@ -27,6 +27,7 @@ from gelpolight_core.calibration.joint_problem import (
     Problem,
     diffuse_curves,
 )
+from gelpolight_core.calibration.spread import jackknife_covariance
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.press import BallPress
@@ -67,6 +68,10 @@ class JointResult:
         The same loss with the two-lobe membrane, and with the one-dimensional one.
     membrane_kept : str
         ``two-lobe`` or ``one-dimensional``: which of them `membrane` is.
+    covariance : (15, 15) or (27, 27)
+        Of LEDs (9), exponent, gloss, roughness, cap's bounce, bounce and decay length, and, where
+        the membrane is one-dimensional, of the heights of its curves; by leaving out one press at
+        a time. 0 for what was held.
     """
 
     led_positions_mm: Array
@@ -82,6 +87,7 @@ class JointResult:
     kept: str
     membrane_held_out: tuple[float, float]
     membrane_kept: str
+    covariance: Array
 
 
 def refine_jointly(
@@ -122,6 +128,7 @@ def refine_jointly(
         "refined" if refine else "mirror",
         membranes,
         MEMBRANES[int(curves)],
+        shared_covariance(solved.problem, x),
     )
 
 
@@ -136,13 +143,14 @@ def _membrane_of(x: Array, balls_end: int) -> Membrane:
 
 @dataclass(frozen=True, slots=True)
 class _Solution:
-    """Parameters, their standard deviations, robust misfits of the ratio, and mean robust loss."""
+    """Parameters, their standard deviations, misfits of the ratio, mean loss, and the problem."""
 
     x: Array
     sd: Array
     misfit: float
     ball_misfits: Array
     loss: float
+    problem: Problem
 
 
 def _start(presses: Sequence[BallPress], leds: Array, *, curves: bool) -> Array:
@@ -216,7 +224,30 @@ def _described(problem: Problem, x: Array) -> _Solution:
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.zeros(x.size)
     sd[problem.free] = np.sqrt(np.maximum(variance, 0.0))
-    return _Solution(x, sd, misfit, np.array(of_balls), loss)
+    return _Solution(x, sd, misfit, np.array(of_balls), loss, problem)
+
+
+def shared_covariance(problem: Problem, x: Array) -> Array:
+    """Return the covariance of all parameters that the presses share; 0 for what was held."""
+    jacobian = problem.jacobian(x)
+    parts = problem.residuals(x)
+    # Soft L1 lets residuals count for less the larger they are.
+    weights = [(1.0 + r**2) ** -0.25 for r in parts]
+    shared = np.concatenate([np.arange(COMMON), np.arange(problem.balls_end, x.size)])
+    balls = np.arange(COMMON, problem.balls_end)
+    solved = shared[problem.free[shared]]
+    order = np.concatenate([solved, balls])
+    rows = np.split(jacobian[:, order], np.cumsum([r.size for r in parts]))
+    found = jackknife_covariance(
+        [w[:, None] * j for w, j in zip(weights, rows[:-1], strict=True)],
+        [w * r for w, r in zip(weights, parts, strict=True)],
+        rows[-1],
+        common=solved.size,
+    )
+    covariance = np.zeros((shared.size, shared.size))
+    place = np.flatnonzero(problem.free[shared])
+    covariance[np.ix_(place, place)] = found
+    return covariance
 
 
 def _relative_misfit(scaled: Array, weight: Array) -> float:

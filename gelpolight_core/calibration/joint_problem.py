@@ -57,6 +57,14 @@ def diffuse_curves(heights: Array) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(np.maximum.accumulate(curve).tolist()) for curve in curves)
 
 
+def bent_curves(
+    curves: tuple[tuple[float, ...], ...], heights: Array
+) -> tuple[tuple[float, ...], ...]:
+    """Return a membrane's diffuse curves with the spline's heights (`CURVE_SIZE`,) raised."""
+    bent = np.asarray(curves) * np.exp(heights.reshape(3, -1) @ _BUMPS.T)
+    return tuple(tuple(np.maximum.accumulate(curve).tolist()) for curve in bent)
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """Residuals of all presses, with priors.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import getpass
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.calibration.stages import (
     StageResults,
-    press_noise,
+    bare_calibration,
     require_balls,
     run_stage,
 )
@@ -152,38 +152,23 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
         If a stage was not run, or a picture of a ball shows none.
     """
     require_balls(results)
+    if model != "full":
+        results = replace(results, full=None, joint=None)
+    bare = bare_calibration(session, results)
     response, crosstalk = results.response, results.crosstalk
     lens, pose, lights = results.lens, results.top_pose, results.lights
     radiance, reflectance, factors = results.radiance, results.reflectance, results.factors
-    full = results.full if model == "full" else None
-    if (
-        response is None
-        or crosstalk is None
-        or lens is None
-        or pose is None
-        or lights is None
-        or radiance is None
-        or reflectance is None
-        or factors is None
-        or (full is None and model == "full")
-    ):
+    assert response is not None and crosstalk is not None and lens is not None
+    assert pose is not None and lights is not None and radiance is not None
+    assert reflectance is not None and factors is not None
+    if bare.model != model:
         raise InputError(
-            tr("not every stage has a result"),
+            tr("the joint refinement has no result"),
             where=str(session.folder),
             advice=tr("Complete the stages that are still open"),
         )
-    calibration = Calibration(
-        sensor=session.sensor,
-        model=model,
-        camera=lens.camera,
-        plane=pose.plane,
-        led_positions_mm=lights.led_positions_mm,
-        led_covariance_mm2=lights.led_covariance_mm2,
-        crosstalk=crosstalk.matrix,
-        radiance=radiance.radiance,
-        factors=factors.factors,
-        reflectance=reflectance.table,
-        noise=press_noise(results.presses),
+    calibration = replace(
+        bare,
         quality={
             **({"response": response.quality} if response.quality.figures else {}),
             "lens": lens.quality,
@@ -193,14 +178,11 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
             "radiance": radiance.quality,
             "reflectance": reflectance.quality,
             "factors": factors.quality,
-            **({} if full is None else {"joint": judge_joint(full)}),
+            **({} if results.full is None else {"joint": judge_joint(results.full)}),
         },
         provenance=_provenance(session),
-        full=full,
-        response=response.response,
     )
     calibration = _with_edits(calibration, session)
-    joint = results.joint if model == "full" else None
     return CalibrationRun(
         calibration,
         response,
@@ -211,7 +193,7 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
         radiance,
         reflectance,
         factors,
-        joint,
+        results.joint,
     )
 
 
@@ -237,11 +219,38 @@ def judge_joint(full: FullModel) -> QualityTable:
                 fail=1.0,
                 advice=tr("Press more balls, at more places"),
             ),
+            *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
             judge("bounce", tr("Light from the membrane around"), full.membrane.bounce, warn=1.2),
             judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
         )
+    )
+
+
+def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
+    scale = full.scale_sd
+    if scale is None:
+        return ()
+    return (
+        judge(
+            "ball_height_error_percent",
+            tr("Height of ball presses that are reconstructed"),
+            100.0 * scale.balls,
+            "%",
+            warn=2.0,
+            fail=10.0,
+            advice=tr("Check ball radii, Z1 and the refractive index"),
+        ),
+        judge(
+            "depth_sd_percent",
+            tr("Height uncertainty from the calibration"),
+            100.0 * scale.depth,
+            "%",
+            warn=2.0,
+            fail=10.0,
+            advice=tr("Press more balls, at more places"),
+        ),
     )
 
 

@@ -18,7 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import gather_ball_pixels
-from gelpolight_core.calibration.calibration import FullModel, sensor_stack
+from gelpolight_core.calibration.calibration import (
+    Calibration,
+    FullModel,
+    Provenance,
+    ScaleSd,
+    sensor_stack,
+)
+from gelpolight_core.calibration.depth_scale import (
+    ball_height_error,
+    depth_scale_sd,
+    lateral_scale_sd,
+)
 from gelpolight_core.calibration.inputs import NEEDS, Stage, inputs_of
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.errors import InputError
@@ -48,6 +59,7 @@ from gelpolight_core.translation import tr
 Map = NDArray[np.float32]
 Progress = Callable[[float], None]
 T = TypeVar("T")
+CHECKED_BALLS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,7 +326,6 @@ def _run_reflectance(session: Session, results: StageResults, _tell: Progress) -
 
 def _run_joint(session: Session, results: StageResults, _tell: Progress) -> StageResults:
     """Refine LEDs and membrane on the presses, and keep the background to compare with."""
-    del session
     table, lights = _need(results.table, "balls"), _need(results.lights, "balls")
     bare, factors = _need(results.background, "balls"), _need(results.factors, "balls")
     crosstalk = _need(results.crosstalk, "balls").matrix
@@ -340,7 +351,64 @@ def _run_joint(session: Session, results: StageResults, _tell: Progress) -> Stag
         joint.membrane_held_out,
         joint.membrane_kept,
     )
+    full = replace(full, scale_sd=_scale_sd(session, results, joint, full))
     return replace(results, joint=joint, full=full)
+
+
+def _scale_sd(
+    session: Session, results: StageResults, joint: JointResult, full: FullModel
+) -> ScaleSd:
+    """Say how sure the lengths of the full model are."""
+    calibration = bare_calibration(session, replace(results, full=full))
+    lens, pose = _need(results.lens, "balls"), _need(results.top_pose, "balls")
+    covariance = joint.covariance.copy()
+    if joint.kept == "mirror":
+        for k, own in enumerate(calibration.led_covariance_mm2):
+            covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
+    files = [ball.file for ball in results.balls if ball.press is not None]
+    # Evenly over the session, so that one odd press does not decide.
+    some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
+    unexplained = ball_height_error(
+        calibration,
+        [session.picture(session.folder / "balls" / files[i]).rgb for i in some],
+        [joint.balls[i] for i in some],
+    )
+    lateral = lateral_scale_sd(
+        calibration.stack, pose.distance_sd_mm, lens.focal_sd_px[0] / lens.camera.fx
+    )
+    fitted = depth_scale_sd(full, calibration.table, covariance)
+    together = float(np.linalg.norm([fitted, unexplained, lateral]))
+    return ScaleSd(together, lateral, unexplained)
+
+
+def bare_calibration(session: Session, results: StageResults) -> Calibration:
+    """Return what a reconstruction needs of the results, without figures and provenance.
+
+    Raises
+    ------
+    InputError
+        If a stage was not run.
+    """
+    where = str(session.folder)
+    lens, pose = _need(results.lens, where), _need(results.top_pose, where)
+    lights, radiance = _need(results.lights, where), _need(results.radiance, where)
+    return Calibration(
+        sensor=session.sensor,
+        model="paper" if results.full is None else "full",
+        camera=lens.camera,
+        plane=pose.plane,
+        led_positions_mm=lights.led_positions_mm,
+        led_covariance_mm2=lights.led_covariance_mm2,
+        crosstalk=_need(results.crosstalk, where).matrix,
+        radiance=radiance.radiance,
+        factors=_need(results.factors, where).factors,
+        reflectance=_need(results.reflectance, where).table,
+        noise=press_noise(results.presses),
+        quality={},
+        provenance=Provenance("", "", "", "", {}),
+        full=results.full,
+        response=_need(results.response, where).response,
+    )
 
 
 _RUNS: Mapping[Stage, Callable[[Session, StageResults, Progress], StageResults]] = MappingProxyType(

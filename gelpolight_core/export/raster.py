@@ -7,7 +7,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, HeightMap
+from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, HeightMap
 
 
 def flag_names() -> list[str]:
@@ -26,7 +26,11 @@ def describe(heightmap: HeightMap) -> dict[str, str]:
 
 
 def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write everything the height map holds; `normals` is left out where there are none."""
+    """Write what the height map holds; what it does not hold (None) is left out.
+
+    The standard deviations are described in :class:`HeightMap`. The examples of noise stay in the
+    program.
+    """
     arrays: dict[str, Any] = {
         "depth_mm": heightmap.depth_mm.astype(np.float32, copy=False),
         "x_mm": np.asarray(heightmap.x_mm),
@@ -40,6 +44,13 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
     }
     if heightmap.normals is not None:
         arrays["normals"] = heightmap.normals.astype(np.float32, copy=False)
+    for name in SD_MAPS:
+        values = getattr(heightmap, name)
+        if values is not None:
+            arrays[name] = values.astype(np.float32, copy=False)
+    for name in ("depth_scale_sd", "lateral_scale_sd"):
+        if getattr(heightmap, name) is not None:
+            arrays[name] = np.float64(getattr(heightmap, name))
     np.savez(file, **arrays)
 
 

@@ -87,7 +87,12 @@ class FitResult:
     Attributes
     ----------
     values, sd : dict
-        Parameters and their standard deviations (mm, radians), baseline included.
+        Parameters and their standard deviations (mm, radians), baseline included, as the residual
+        shows them: noise and whatever the shape does not explain.
+    chosen : (rows, columns) bool
+        The N pixels that were fitted.
+    gain : (parameters, N)
+        What each parameter is moved by where the depth of these pixels changes by 1.
     residual_mm : (rows, columns)
         Map minus model over the window; NaN where not used.
     residual_rms_mm : float
@@ -100,6 +105,8 @@ class FitResult:
 
     values: Mapping[str, float]
     sd: Mapping[str, float]
+    chosen: Mask
+    gain: Array
     residual_mm: Array
     residual_rms_mm: float
     correlated_pixels: float
@@ -174,7 +181,8 @@ def fit_indenter(
     for _ in range(most_rounds):
         before = vector
         inflation = 1.0 + (together - 1.0) * density
-        vector, jacobian, converged = _solve(problem, vector, weight * robust, sigma, inflation)
+        scale = np.sqrt(weight * robust / inflation) / sigma
+        vector, jacobian, converged = _solve(problem, vector, scale)
         left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
         sigma = max(_robust_scale(left * np.sqrt(weight)), MODEL_ERROR * start["height_mm"])
         ratio = np.abs(left) * np.sqrt(weight) / (HUBER * sigma)
@@ -191,6 +199,8 @@ def fit_indenter(
     return FitResult(
         values=dict(zip(names, map(float, vector), strict=True)),
         sd=dict(zip(names, map(float, sd), strict=True)),
+        chosen=chosen,
+        gain=np.linalg.pinv(jacobian.T @ jacobian) @ jacobian[: scale.size].T * scale,
         residual_mm=residual,
         residual_rms_mm=_weighted_rms(residual, window.weight),
         correlated_pixels=together,
@@ -279,11 +289,8 @@ def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def _solve(
-    problem: _Problem, vector: Array, weight: Array, sigma: float, inflation: float
-) -> tuple[Array, Array, bool]:
-    """Return the parameters, the Jacobian of the normalised residuals, and whether it converged."""
-    scale = np.sqrt(weight / inflation) / sigma
+def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array, bool]:
+    """Return the parameters, the Jacobian of the scaled residuals, and whether it converged."""
     keys = list(problem.prior)
     places = [problem.names.index(key) for key in keys]
     means = np.array([problem.prior[key][0] for key in keys])

@@ -25,6 +25,7 @@ from gelpolight_core.measurement.segmentation import (
     PressedRegion,
     find_pressed_regions,
 )
+from gelpolight_core.measurement.spread import Spread, calibration_sd, combined, noise_of_fit
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -54,6 +55,9 @@ def measure_object(
     seed_mm: tuple[float, float] | None = None,
     flags: NDArray[np.uint8] | None = None,
     depth_sd_mm: NDArray[np.floating] | float | None = None,
+    noise_mm: NDArray[np.float32] | None = None,
+    depth_scale_sd: float | None = None,
+    lateral_scale_sd: float | None = None,
     edge_radius_mm: float = 0.08,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane, its drape fitted with it.
@@ -72,6 +76,11 @@ def measure_object(
         Bit 1: outside the working area, left out; any other bit: doubtful, weighted down.
     depth_sd_mm : float or (rows, columns), optional
         Uncertainty of the map; a map of them weights the pixels against each other.
+    noise_mm : (examples, rows / 4, columns / 4), optional
+        Errors that the map's noise could have made, as a height map holds them: with them the
+        result says what repeats would scatter by.
+    depth_scale_sd, lateral_scale_sd : float, optional
+        Relative standard deviations of the calibration's depths and lengths; part of the sd.
     edge_radius_mm : float, optional
         Fillet of the object's edge where the map does not show it, known to about half of
         itself. Edges of printed and machined indenters are broken by 0.05 to 0.1 mm.
@@ -103,7 +112,12 @@ def measure_object(
     prior = EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, window.pitch_mm)
     fit = _fit(shape, window, region, prior)
     reason = find_doubt(shape, fit, window, region, prior)
-    return _measurement(shape, fit, _plateau_shift_mm(shape, fit, window), reason)
+    face = _face(shape, fit, window)
+    noise = {} if noise_mm is None else noise_of_fit(fit, window, face, noise_mm, x, y)
+    scale = {}
+    if depth_scale_sd is not None and lateral_scale_sd is not None:
+        scale = calibration_sd(shape, fit.values, depth_scale_sd, lateral_scale_sd)
+    return _measurement(shape, fit, _plateau_shift_mm(fit, face), (noise, scale), reason)
 
 
 def _checked(
@@ -237,36 +251,41 @@ def _fit(shape: str, window: WindowData, region: PressedRegion, prior: EdgePrior
     return fit_indenter(model, window, model.start(region), edge=prior)
 
 
-def _plateau_shift_mm(shape: str, fit: FitResult, window: WindowData) -> float:
+def _face(shape: str, fit: FitResult, window: WindowData) -> Mask | None:
+    """Return the pixels of the object's face; None for a ball, which has none."""
+    if shape == "ball":
+        return None
+    sharp = {**fit.values, "blur_mm2": 0.0}
+    model = MODELS[shape].depth(sharp, window.x_mm, window.y_mm)
+    return np.asarray((model >= fit.values["height_mm"] - 1e-9) & (window.weight > 0.0))
+
+
+def _plateau_shift_mm(fit: FitResult, face: Mask | None) -> float:
     """Return how far the plateau's median lies above the fitted one.
 
     The fit ties the plateau to its rim, where a reconstruction is worst; the object's height is
     that of its face.
     """
-    if shape == "ball":
+    if face is None or not face.any():
         return 0.0
-    sharp = {**fit.values, "blur_mm2": 0.0}
-    model = MODELS[shape].depth(sharp, window.x_mm, window.y_mm)
-    face = (model >= fit.values["height_mm"] - 1e-9) & (window.weight > 0.0)
-    return float(np.median(fit.residual_mm[face])) if face.any() else 0.0
+    return float(np.median(fit.residual_mm[face]))
 
 
-def _measurement(shape: str, fit: FitResult, shift_mm: float, reason: str) -> Measurement:
-    values, sd = fit.values, fit.sd
-    spread: dict[str, float | tuple[float, float] | None] = {
-        # Rim and face disagree by the shift: their height is known to no better than half of it.
-        "height_mm": math.hypot(sd["height_mm"], 0.5 * shift_mm),
-        "centre_mm": (sd["x_mm"], sd["y_mm"]),
-        "yaw_deg": None,
-        "drape_decay_mm": sd["drape_decay_mm"],
-    }
+def _measurement(
+    shape: str,
+    fit: FitResult,
+    shift_mm: float,
+    parts: tuple[dict[str, float], dict[str, float]],
+    reason: str,
+) -> Measurement:
+    values, (noise, scale) = fit.values, parts
+    # Rim and face disagree by the shift: their height is known to no better than half of it.
+    fitted = {**fit.sd, "height_mm": math.hypot(fit.sd["height_mm"], 0.5 * shift_mm)}
     diameter, side, yaw = None, None, None
     if shape == "cuboid":
-        side, side_sd, yaw = _sides(values, sd)
-        spread |= {"side_mm": side_sd, "yaw_deg": float(np.degrees(sd["yaw"]))}
+        side, yaw = _sides(values)
     else:
         diameter = values["diameter_mm"]
-        spread["diameter_mm"] = sd["diameter_mm"]
     return Measurement(
         shape=shape,
         diameter_mm=diameter,
@@ -275,7 +294,9 @@ def _measurement(shape: str, fit: FitResult, shift_mm: float, reason: str) -> Me
         centre_mm=(values["x_mm"], values["y_mm"]),
         yaw_deg=yaw,
         drape_decay_mm=values["drape_decay_mm"],
-        sd=spread,
+        sd=_spread(shape, values, combined(fitted, noise, scale)),
+        noise_sd=_spread(shape, values, noise) if noise else None,
+        calibration_sd=_spread(shape, values, scale) if scale else None,
         edge_radius_mm=values.get("edge_radius_mm"),
         blur_mm=math.sqrt(values["blur_mm2"]) if "blur_mm2" in values else None,
         baseline_mm=values["offset_mm"],
@@ -287,11 +308,35 @@ def _measurement(shape: str, fit: FitResult, shift_mm: float, reason: str) -> Me
     )
 
 
-def _sides(
-    values: Mapping[str, float], sd: Mapping[str, float]
-) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """Return the sides, their sd and the yaw brought to -45..45 degrees."""
+def _spread(shape: str, values: Mapping[str, float], sd: Mapping[str, float]) -> Spread:
+    """Return standard deviations of the fit's parameters under the measurement's names."""
+    spread: Spread = {
+        "height_mm": sd["height_mm"],
+        "centre_mm": (sd["x_mm"], sd["y_mm"]),
+        "yaw_deg": None,
+        "drape_decay_mm": sd["drape_decay_mm"],
+    }
+    if shape == "cuboid":
+        first, second = _side_keys(values)
+        # The calibration turns nothing.
+        spread |= {
+            "side_mm": (sd[first], sd[second]),
+            "yaw_deg": float(np.degrees(sd.get("yaw", 0.0))),
+        }
+    else:
+        spread["diameter_mm"] = sd["diameter_mm"]
+    return spread
+
+
+def _side_keys(values: Mapping[str, float]) -> tuple[str, str]:
+    """Return which sides are along the first and the second axis, once yaw is -45..45 degrees."""
+    even = round(values["yaw"] / (np.pi / 2.0)) % 2 == 0
+    return ("side_a_mm", "side_b_mm") if even else ("side_b_mm", "side_a_mm")
+
+
+def _sides(values: Mapping[str, float]) -> tuple[tuple[float, float], float]:
+    """Return the sides and the yaw brought to -45..45 degrees."""
     turns = round(values["yaw"] / (np.pi / 2.0))
-    keys = ("side_a_mm", "side_b_mm") if turns % 2 == 0 else ("side_b_mm", "side_a_mm")
+    first, second = _side_keys(values)
     yaw = float(np.degrees(values["yaw"] - turns * np.pi / 2.0))
-    return (values[keys[0]], values[keys[1]]), (sd[keys[0]], sd[keys[1]]), yaw
+    return (values[first], values[second]), yaw

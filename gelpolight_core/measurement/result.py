@@ -36,7 +36,8 @@ class Measurement:
     drape_decay_mm : float
         Decay length of the membrane around the object.
     sd : dict
-        Standard deviation under the same names, of the same form.
+        Standard deviation under the same names, of the same form: the fit's residual, or the
+        noise where that is larger, together with the calibration.
     edge_radius_mm, blur_mm : float or None
         Fillet of the object and blur of the map as fitted; None for a ball.
     baseline_mm : float
@@ -51,6 +52,11 @@ class Measurement:
         ``ok`` or ``doubtful``.
     reason : str
         Why doubtful; empty when ok.
+    noise_sd : dict or None
+        The part that repeats of the picture scatter by; None where the map's noise is not known.
+    calibration_sd : dict or None
+        The part that is common to all measurements with this calibration; None where it is not
+        known.
     """
 
     shape: str
@@ -69,6 +75,8 @@ class Measurement:
     outline_mm: Array
     verdict: str
     reason: str
+    noise_sd: dict[str, Any] | None = None
+    calibration_sd: dict[str, Any] | None = None
 
     @property
     def size_mm(self) -> float:
@@ -106,7 +114,11 @@ class Measurement:
             "centre_mm": list(self.centre_mm),
             "yaw_deg": self.yaw_deg,
             "drape_decay_mm": self.drape_decay_mm,
-            "sd": {k: list(v) if isinstance(v, tuple) else v for k, v in self.sd.items()},
+            "sd": _plain(self.sd),
+            "noise_sd": None if self.noise_sd is None else _plain(self.noise_sd),
+            "calibration_sd": (
+                None if self.calibration_sd is None else _plain(self.calibration_sd)
+            ),
             "truth": None if comparison is None else comparison.truth.as_json(),
             "error_percent": None if comparison is None else dict(comparison.error_percent),
             "verdict": self.verdict,
@@ -115,6 +127,10 @@ class Measurement:
             "baseline_mm": self.baseline_mm,
             "residual_rms_mm": self.residual_rms_mm,
         }
+
+
+def _plain(spread: dict[str, Any]) -> dict[str, Any]:
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in spread.items()}
 
 
 @dataclass(frozen=True, slots=True)

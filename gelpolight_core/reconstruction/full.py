@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -13,15 +13,27 @@ from scipy.ndimage import binary_fill_holes
 from gelpolight_core.calibration.ball_pixels import neighbourhood
 from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.reconstruction.denoise import quiet_even_parts
+from gelpolight_core.reconstruction.denoise import noise_left, quiet_even_parts
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
+from gelpolight_core.reconstruction.picture_noise import picture_noise
 from gelpolight_core.reconstruction.placement import place_on_grid, resample
+from gelpolight_core.reconstruction.uncertainty import (
+    MODEL_EXAMPLES,
+    DepthNoise,
+    depth_examples,
+    model_times,
+    pixels_per_node,
+    place_examples,
+    slope_noise,
+)
 from gelpolight_core.reconstruction.weighted import WeightedIntegration, integrate_weighted
 
 Map = NDArray[np.float32]
 SATURATED = 0.995
 LEAST_BASE = 0.01
+# A share of the brightness below any camera's noise; zero would say nothing of conditioning.
+LEAST_NOISE = 1e-5
 COARSE = 4
 COARSE_ROUNDS = 3
 # A round may not move the surface by more than this share of the LEDs' height: light that is
@@ -46,8 +58,6 @@ class FullDepth:
         At the grid's own (x, y).
     normals : (rows, columns, 3) float32
         Unit normals, z < 0.
-    slope_sd : (rows, columns) float32
-        Standard deviation of the slopes from the picture's noise.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     changes_mm : tuple of float
@@ -58,19 +68,26 @@ class FullDepth:
         Why the rounds ended: ``done``; ``damped`` when steps were held back and the rounds settled
         all the same; ``grows`` when the last change was larger than the one before and the round
         was taken back; ``unsettled`` when damped rounds came to no end.
+    noise : DepthNoise or None
+        How far it may be off, where that was asked for.
     """
 
     depth_mm: Map
     normals: Map
-    slope_sd: Map
     flags: NDArray[np.uint8]
     changes_mm: tuple[float, ...]
     rim: str
     stopped: str
+    noise: DepthNoise | None = None
 
 
 def reconstruct_full(
-    rgb: Map, calibration: Calibration, full: FullModel, *, workers: int = 2
+    rgb: Map,
+    calibration: Calibration,
+    full: FullModel,
+    *,
+    workers: int = 2,
+    uncertainty: bool = False,
 ) -> FullDepth:
     """Reconstruct one picture by the full model.
 
@@ -82,14 +99,21 @@ def reconstruct_full(
         The sensor's.
     workers : int, optional
         Threads of the transforms.
+    uncertainty : bool, optional
+        Whether to find out how far it may be off; it takes several times as long.
     """
     field = shaded_field(rgb, calibration, full)
     pitch = calibration.table.grid.pitch_mm
     depth, (changes, stopped) = coarse_depth(field, full, pitch, workers)
     slopes, solved, rim = _round(field, depth, full, pitch, workers)
     last = float(np.abs(solved.depth_mm - depth).max())
-    depth = held_back(depth, solved.depth_mm, longest_step_mm(full))
-    return _placed(field, slopes, depth, (*changes, last), (rim, stopped))
+    moved = held_back(depth, solved.depth_mm, longest_step_mm(full))
+    placed = place_on_grid(moved, field.drift, field.x_mm, field.y_mm)
+    result = _placed(slopes, moved, placed, (*changes, last), (rim, stopped))
+    if not uncertainty:
+        return result
+    noise = _noise(rgb, calibration, full, field, depth, slopes, placed, workers)
+    return replace(result, noise=noise)
 
 
 def coarse_depth(
@@ -154,12 +178,7 @@ def _round(
     slopes = solve_near_light(
         field, depth_mm, full.led_positions_mm, full.membrane, workers=workers
     )
-    let_go = released_rim(field, pitch_mm)
-    weight, hold, rim = slopes.weight, None, "held"
-    if let_go.any():
-        rim = "free"
-        hold = np.where(let_go, LET_GO, 1.0).astype(np.float32)
-        weight = np.where(field.inside, weight, weight * hold)
+    weight, hold = _rim_weights(field, slopes.weight, pitch_mm)
     solved = integrate_weighted(
         slopes.slope_x,
         slopes.slope_y,
@@ -169,7 +188,16 @@ def _round(
         hold=hold,
         workers=workers,
     )
-    return slopes, solved, rim
+    return slopes, solved, "held" if hold is None else "free"
+
+
+def _rim_weights(field: ShadedField, weight: Map, pitch_mm: float) -> tuple[Map, Map | None]:
+    """Return the weights, and how firmly the border is held (None: everywhere)."""
+    let_go = released_rim(field, pitch_mm)
+    if not let_go.any():
+        return weight, None
+    hold = np.where(let_go, LET_GO, 1.0).astype(np.float32)
+    return np.where(field.inside, weight, weight * hold), hold
 
 
 def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedField:
@@ -250,13 +278,13 @@ def coarsen(field: ShadedField) -> ShadedField:
 
 
 def _placed(
-    field: ShadedField,
     slopes: RaySlopes,
     depth_mm: Map,
+    placed: tuple[Map, Map, NDArray[np.bool_]],
     changes: tuple[float, ...],
     said: tuple[str, str],
 ) -> FullDepth:
-    column, row, folded = place_on_grid(depth_mm, field.drift, field.x_mm, field.y_mm)
+    column, row, folded = placed
     depth = resample(depth_mm, column, row)
     normals = np.stack(
         [resample(np.ascontiguousarray(slopes.normals[..., k]), column, row) for k in range(3)],
@@ -267,4 +295,57 @@ def _placed(
     flags[folded] |= int(Flag.NOT_OBSERVABLE)
     outside = (flags & int(Flag.OUTSIDE)) != 0
     depth[outside] = 0.0
-    return FullDepth(depth, normals, resample(slopes.slope_sd, column, row), flags, changes, *said)
+    return FullDepth(depth, normals, flags, changes, *said)
+
+
+def _noise(
+    rgb: Map,
+    calibration: Calibration,
+    full: FullModel,
+    field: ShadedField,
+    depth_mm: Map,
+    slopes: RaySlopes,
+    placed: tuple[Map, Map, NDArray[np.bool_]],
+    workers: int,
+) -> DepthNoise:
+    """Follow the picture's noise, and the model's misfit, to the metric grid."""
+    table, (column, row, _) = calibration.table, placed
+    light = np.nan_to_num(table.apply(rgb), posinf=0.0, neginf=0.0)
+    unmixed = unmix(light, calibration.crosstalk)
+    count = pixels_per_node(table)
+    left, left_placed = (
+        noise_left(unmixed, field.usable, count, resampled=times) for times in (1, 2)
+    )
+    variance = picture_noise(rgb).at(light) @ (np.linalg.inv(calibration.crosstalk).T ** 2)
+    base = np.maximum(full.background, LEAST_BASE)
+    sd = np.asarray(left[..., None] * np.sqrt(variance) / base, np.float32)
+    sd = np.maximum(sd, LEAST_NOISE)
+    noise = slope_noise(field, depth_mm, sd, full.led_positions_mm, full.membrane, workers=workers)
+    pitch = table.grid.pitch_mm
+    weight, hold = _rim_weights(field, slopes.weight, pitch)
+    # A block's average has the noise of all raw pixels in it; no filter takes from that.
+    block = 1.0 / (COARSE * np.sqrt(count) * left)
+    white = depth_examples(noise, block, weight, hold, pitch_mm=pitch, workers=workers)
+    times = model_times(field.ratio, sd, full.misfit)
+    model = depth_examples(
+        noise,
+        times,
+        weight,
+        hold,
+        pitch_mm=pitch,
+        reach_mm=full.decay_mm,
+        examples=MODEL_EXAMPLES,
+        workers=workers,
+    )
+    examples, depth_sd = place_examples(white, slopes, field.drift, column, row)
+    _, model_sd = place_examples(model, slopes, field.drift, column, row)
+    # Bringing normals to true positions averages them once more.
+    slope_sd = np.sqrt((noise.moved**2).sum(axis=0)) * left_placed / left
+    slope_model_sd = np.sqrt(((noise.moved * times) ** 2).sum(axis=0))
+    return DepthNoise(
+        resample(slope_sd, column, row),
+        depth_sd,
+        resample(slope_model_sd, column, row),
+        model_sd,
+        examples,
+    )

@@ -30,6 +30,9 @@ class Flag(IntFlag):
 FLAG_NAMES = MappingProxyType({str(flag.name).lower(): flag.value for flag in Flag})
 """Name of each flag in files, and its value in `HeightMap.flags`."""
 
+SD_MAPS = ("slope_sd", "depth_sd_mm", "slope_model_sd", "depth_model_sd_mm")
+"""The maps of standard deviations that a height map may hold."""
+
 
 @dataclass(frozen=True, slots=True)
 class HeightMap:
@@ -57,6 +60,22 @@ class HeightMap:
         Name of the picture, such as ``press_03.png``.
     notes : tuple of str
         What is to be said of this map, in sentences for a person.
+    slope_sd, depth_sd_mm : (rows, columns) float32 or None
+        What repeats of the picture scatter by: standard deviations of the surface's slopes (root
+        mean square of x and y) and of the depth, from the picture's noise. None where they were
+        not asked for, or by the paper's model.
+    slope_model_sd, depth_model_sd_mm : (rows, columns) float32 or None
+        The same from what the model does not explain of a press: alike in every repeat, another
+        in every press.
+    noise_mm : (examples, rows / 4, columns / 4) float32 or None
+        Errors of the depth that this noise could as well have made, on every fourth of the nodes
+        (averages over blocks of 4 x 4).
+    depth_scale_sd, lateral_scale_sd : float or None
+        Relative standard deviations, from the calibration, of depths and slopes, and of lengths
+        across. They are common to all pixels and all pictures of a calibration: the standard
+        deviation of a depth is the root of the sum of squares of `depth_sd_mm`,
+        `depth_model_sd_mm`, and `depth_scale_sd` times the depth. None where the calibration does
+        not say.
 
     Raises
     ------
@@ -74,6 +93,13 @@ class HeightMap:
     model: str
     source: str
     notes: tuple[str, ...] = ()
+    slope_sd: NDArray[np.float32] | None = None
+    depth_sd_mm: NDArray[np.float32] | None = None
+    slope_model_sd: NDArray[np.float32] | None = None
+    depth_model_sd_mm: NDArray[np.float32] | None = None
+    noise_mm: NDArray[np.float32] | None = None
+    depth_scale_sd: float | None = None
+    lateral_scale_sd: float | None = None
 
     def __post_init__(self) -> None:
         """Check that the shapes fit each other."""
@@ -81,6 +107,9 @@ class HeightMap:
         expected = {"x_mm": (columns,), "y_mm": (rows,), "flags": (rows, columns)}
         if self.normals is not None:
             expected["normals"] = (rows, columns, 3)
+        for name in SD_MAPS:
+            if getattr(self, name) is not None:
+                expected[name] = (rows, columns)
         for name, shape in expected.items():
             found = np.shape(getattr(self, name))
             if found != shape:

@@ -68,8 +68,6 @@ class RaySlopes:
         Unit normals of the surface, z < 0.
     weight : (rows, columns) float32
         How far the slopes are to be trusted, 0..1.
-    slope_sd : (rows, columns) float32
-        Standard deviation of the slopes from the picture's noise.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     """
@@ -78,7 +76,6 @@ class RaySlopes:
     slope_y: Map
     normals: Map
     weight: Map
-    slope_sd: Map
     flags: NDArray[np.uint8]
 
 
@@ -106,7 +103,7 @@ def solve_near_light(
         Threads; each takes a block of rows, so that the result does not depend on their number.
     """
     shape = depth_mm.shape
-    slope_x, slope_y, weight, slope_sd = (np.zeros(shape, np.float32) for _ in range(4))
+    slope_x, slope_y, weight = (np.zeros(shape, np.float32) for _ in range(3))
     normals = np.zeros((*shape, 3), np.float32)
     flags = np.zeros(shape, np.uint8)
     shape_of = np.array(
@@ -139,7 +136,6 @@ def solve_near_light(
             slope_y,
             normals,
             weight,
-            slope_sd,
             flags,
         )
 
@@ -147,7 +143,7 @@ def solve_near_light(
     edges = np.linspace(0, shape[0], 8 * max(workers, 1) + 1).astype(int).tolist()
     with ThreadPoolExecutor(max(workers, 1)) as pool:
         list(pool.map(solve, pairwise(edges)))
-    return RaySlopes(slope_x, slope_y, normals, weight, slope_sd, flags)
+    return RaySlopes(slope_x, slope_y, normals, weight, flags)
 
 
 def _dark_brightness(membrane: Membrane) -> NDArray[np.float64]:

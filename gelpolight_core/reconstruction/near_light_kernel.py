@@ -171,7 +171,6 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     slope_y,
     normals,
     weight,
-    slope_sd,
     flags,
 ):
     """Solve the nodes of rows `first` to `last`; see `solve_near_light` for what is what."""
@@ -199,7 +198,6 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             nx, ny, nz = 0.0, 0.0, -1.0
             missing_count = 0
             flag = 0
-            c11, c12, c22 = 1.0, 0.0, 1.0
             for step in range(8):
                 missing_count, missing, side = 0, -1, 0
                 for k in range(3):
@@ -283,7 +281,6 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     flag |= _SATURATED
             if missing_count >= 2:
                 nx, ny, nz = 0.0, 0.0, -1.0
-                c11, c12, c22 = 1.0, 0.0, 1.0
             along = nx * wx + ny * wy - nz
             weight[i, j], hidden = _trust(nz, along, missing_count)
             along = max(along, LEAST_ALONG_RAY)
@@ -302,6 +299,4 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             wyy = (drift[i1, j, 1] - drift[i0, j, 1]) / py
             slope_x[i, j] = -(nx * (1.0 + d * wxx) + ny * d * wyx) / along
             slope_y[i, j] = -(nx * d * wxy + ny * (1.0 + d * wyy)) / along
-            det = max(c11 * c22 - c12 * c12, 1e-12)
-            slope_sd[i, j] = sqrt(0.5 * (c11 + c22) / det) / (nz * nz)
             flags[i, j] = flag | hidden

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -86,7 +87,14 @@ class Reconstructor:
         response = self.calibration.response
         return frame if response is None or frame.dtype.kind == "f" else response.linearise(frame)
 
-    def depth(self, frame: NDArray[Any], *, name: str = "", normals: bool = True) -> HeightMap:
+    def depth(
+        self,
+        frame: NDArray[Any],
+        *,
+        name: str = "",
+        normals: bool = True,
+        uncertainty: bool = False,
+    ) -> HeightMap:
         """Reconstruct a raw frame.
 
         Parameters
@@ -97,6 +105,9 @@ class Reconstructor:
             The picture's name, kept in the result.
         normals : bool, optional
             Whether the result holds normals.
+        uncertainty : bool, optional
+            Whether the result holds how far each pixel may be off; several times as slow.
+            The paper's model states none.
 
         Raises
         ------
@@ -105,20 +116,24 @@ class Reconstructor:
         """
         self._check(frame, name)
         if self.model == "full":
-            return self._depth_full(frame, name, normals)
+            return self._depth_full(frame, name, normals, uncertainty)
         field = self.slopes(frame, name=name)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
         return self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name)
 
-    def _depth_full(self, frame: NDArray[Any], name: str, normals: bool) -> HeightMap:
-        assert self.calibration.full is not None
+    def _depth_full(
+        self, frame: NDArray[Any], name: str, normals: bool, uncertainty: bool
+    ) -> HeightMap:
+        full = self.calibration.full
+        assert full is not None
         result = reconstruct_full(
             as_linear(self.linearise(frame)),
             self.calibration,
-            self.calibration.full,
+            full,
             workers=self.workers,
+            uncertainty=uncertainty,
         )
         notes = []
         if result.rim == "free":
@@ -130,7 +145,18 @@ class Reconstructor:
         if result.stopped == "grows":
             notes.append(tr("the near-light rounds did not settle: the last was taken back"))
         shown = result.normals if normals else None
-        return self._heightmap(result.depth_mm, shown, result.flags, name, tuple(notes))
+        heightmap = self._heightmap(result.depth_mm, shown, result.flags, name, tuple(notes))
+        scale, noise = full.scale_sd, result.noise
+        return replace(
+            heightmap,
+            slope_sd=None if noise is None else noise.slope_sd,
+            depth_sd_mm=None if noise is None else noise.depth_sd_mm,
+            slope_model_sd=None if noise is None else noise.slope_model_sd,
+            depth_model_sd_mm=None if noise is None else noise.depth_model_sd_mm,
+            noise_mm=None if noise is None else noise.examples_mm,
+            depth_scale_sd=None if scale is None else scale.depth,
+            lateral_scale_sd=None if scale is None else scale.lateral,
+        )
 
     def _heightmap(
         self,

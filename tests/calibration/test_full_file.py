@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import scene
 
-from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.calibration.calibration import Calibration, FullModel, ScaleSd
 from gelpolight_core.calibration.file import MANIFEST, read_calibration, write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
@@ -38,6 +38,7 @@ def full_calibration() -> Calibration:
         membrane_sd={"exponent": 0.0, "gloss": 0.012},
         membrane_held_out=(0.0134, 0.0129),
         membrane_kept="one-dimensional",
+        scale_sd=ScaleSd(depth=0.0061, lateral=0.0002),
     )
     return replace(plain, model="full", full=full)
 
@@ -92,6 +93,7 @@ def test_the_full_model_comes_back(whole: Path) -> None:
         "membrane_sd",
         "membrane_held_out",
         "membrane_kept",
+        "scale_sd",
     ):
         assert getattr(after.full, name) == getattr(before.full, name)
     for name in ("led_positions_mm", "led_sd_mm", "background"):
@@ -155,6 +157,16 @@ def test_every_part_of_the_full_model_changes_the_identity() -> None:
     ]
     names = {replace(whole, full=full).identity for full in others}
     assert len(names | {whole.identity}) == 5
+
+
+def test_a_file_from_before_lengths_had_a_deviation_is_read(whole: Path, tmp_path: Path) -> None:
+    def drop(manifest: dict[str, Any]) -> None:
+        del manifest["full"]["scale_sd"]
+
+    old = read_calibration(forged(whole, tmp_path / "old.gplcal", drop))
+    assert old.full is not None
+    assert old.full.scale_sd is None
+    assert old.identity == full_calibration().identity
 
 
 def test_a_file_without_full_model_reads_as_the_papers(tmp_path: Path) -> None:
@@ -267,6 +279,10 @@ def test_arrays_that_are_not_finite_are_refused(
         {"membrane_kept": "velvet"},
         {"membrane_sd": {"gloss": -0.1}},
         {"membrane_held_out": [0.1]},
+        {"scale_sd": {"depth": -0.01, "lateral": 0.0}},
+        {"scale_sd": {"depth": 0.01, "lateral": float("nan")}},
+        {"scale_sd": {"depth": 0.01}},
+        {"scale_sd": 0.01},
     ],
     ids=str,
 )

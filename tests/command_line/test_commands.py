@@ -16,6 +16,8 @@ import pytest
 from app.command_line import calibrate
 from app.command_line import main as main_module
 from app.command_line.main import MENDABLE, OUR_FAULT, main
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.session import simulate_session
@@ -116,8 +118,35 @@ def test_a_press_is_measured_against_its_truth(
     m = json.loads(result.read_text())
     assert {"shape", "diameter_mm", "height_mm", "centre_mm", "yaw_deg", "drape_decay_mm"} <= set(m)
     assert {"sd", "truth", "error_percent", "verdict", "reason"} <= set(m)
+    # The paper's model states neither.
+    assert m["noise_sd"] is None
+    assert m["calibration_sd"] is None
     assert m["diameter_mm"] == pytest.approx(5.0, rel=0.06)
     assert m["height_mm"] == pytest.approx(1.0, rel=0.06)
+
+
+def test_the_full_model_says_how_sure_it_is(
+    virtual_session: Path,
+    virtual_calibration: Calibration,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    file, name = tmp_path / "full.gplcal", "cylinder_s5_d100"
+    write_calibration(virtual_calibration, file)
+    picture = str(virtual_session / "presses" / f"{name}.png")
+    result = tmp_path / "m.json"
+    assert main(["measure", str(file), picture, "--shape", "cylinder", "--json", str(result)]) == 0
+    assert "calibration 0.00" in capsys.readouterr().out
+    m = json.loads(result.read_text())
+    assert set(m["noise_sd"]) == set(m["calibration_sd"]) == set(m["sd"])
+    for key in ("height_mm", "diameter_mm"):
+        assert m["sd"][key] >= np.hypot(m["noise_sd"][key], m["calibration_sd"][key]) * 0.999
+    assert main(["reconstruct", str(file), picture, "-o", str(tmp_path)]) == 0
+    with np.load(tmp_path / f"{name}.npz", allow_pickle=False) as data:
+        for key in ("depth_sd_mm", "slope_sd", "depth_model_sd_mm", "slope_model_sd"):
+            assert data[key].shape == data["depth_mm"].shape
+            assert data[key].dtype == np.float32
+        assert 0.0 < float(data["depth_scale_sd"]) < 0.03
 
 
 def test_the_evaluation_measures_every_press_of_the_folder(

@@ -20,7 +20,7 @@ from hypothesis.extra import numpy as arrays
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.export.mesh import mesh_of
-from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, Flag, HeightMap
+from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, Flag, HeightMap
 
 ROWS, COLUMNS, PITCH_MM = 17, 23, 0.125
 
@@ -62,6 +62,21 @@ def test_one_file_per_format_named_after_the_picture(tmp_path: Path, heightmap: 
     assert paths == [folder / "press_03.tif", folder / "press_03.npz"]
     write_heightmap(heightmap, folder, formats=FORMATS)
     assert sorted(os.listdir(folder)) == sorted(f"press_03.{name}" for name in FORMATS)
+
+
+def test_npz_holds_standard_deviations_where_there_are_any(
+    tmp_path: Path, heightmap: HeightMap
+) -> None:
+    with np.load(write_one(heightmap, tmp_path, "npz")) as found:
+        assert not {*SD_MAPS, "depth_scale_sd", "lateral_scale_sd"} & set(found)
+    maps = {name: heightmap.depth_mm + np.float32(k) for k, name in enumerate(SD_MAPS)}
+    stated = replace(heightmap, **maps, depth_scale_sd=0.006, lateral_scale_sd=0.0)
+    with np.load(write_one(stated, tmp_path, "npz")) as found:
+        for name, values in maps.items():
+            assert np.array_equal(found[name], values)
+        assert (float(found["depth_scale_sd"]), float(found["lateral_scale_sd"])) == (0.006, 0.0)
+    with pytest.raises(ValueError, match="depth_sd_mm"):
+        replace(heightmap, depth_sd_mm=heightmap.depth_mm[1:])
 
 
 def test_npz_holds_everything_without_pickles(tmp_path: Path, heightmap: HeightMap) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
+from gelpolight_core.reconstruction.uncertainty import slope_noise
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 
 Array = NDArray[np.float64]
@@ -155,17 +156,22 @@ def test_slopes_follow_the_rays_from_node_to_node() -> None:
     np.testing.assert_allclose(found.slope_y[inner], slope_y[inner], atol=8e-3)
 
 
-def test_the_stated_deviation_is_what_noise_does() -> None:
-    field, depth, _ = scene_of(MATT)
-    clean = solved(field, depth, MATT)
-    noise = 0.03  # of the size of the model's own error, which the deviation includes
+@pytest.mark.parametrize("membrane", [MATT, GLOSSY], ids=["matt", "glossy"])
+def test_the_stated_deviation_is_what_noise_does(membrane: Membrane) -> None:
+    field, depth, _ = scene_of(membrane)
+    noise = 0.01
+    ratio_sd = np.full_like(field.ratio, noise)
+    stated = np.sqrt((slope_noise(field, depth, ratio_sd, LEDS, membrane).moved ** 2).sum(axis=0))
     random = np.random.default_rng(4)
-    shaken = field.ratio + noise * random.normal(size=field.ratio.shape).astype(np.float32)
-    found = solved(replace(field, ratio=shaken), depth, MATT)
-    moved = np.stack([found.slope_x - clean.slope_x, found.slope_y - clean.slope_y])
-    flat = depth < 0.02
-    stated = float(np.median(clean.slope_sd[flat]))
-    assert np.sqrt(np.mean(moved[:, flat] ** 2)) == pytest.approx(stated, rel=0.15)
+    slopes = []
+    for _ in range(20):
+        shaken = field.ratio + noise * random.normal(size=field.ratio.shape).astype(np.float32)
+        normals = solved(replace(field, ratio=shaken), depth, membrane).normals
+        slopes.append(normals[..., :2] / normals[..., 2:])
+    seen = np.sqrt(np.var(slopes, axis=0, ddof=1).mean(axis=-1))
+    # 20 repeats of two slopes know their scatter to 11 % at a node, and far better over many.
+    for part in (depth < 0.02, depth > 0.3 * depth.max()):
+        assert np.median(stated[part] / seen[part]) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("membrane", [MATT, GLOSSY], ids=["matt", "glossy"])
@@ -223,7 +229,7 @@ def test_a_pixel_that_is_no_number_spoils_nothing(bad: float) -> None:
     ratio[20, 30, 1] = bad
     ratio[40, 50] = bad
     found = solved(replace(field, ratio=ratio), depth, GLOSSY)
-    for values in (found.slope_x, found.slope_y, found.normals, found.weight, found.slope_sd):
+    for values in (found.slope_x, found.slope_y, found.normals, found.weight):
         assert np.isfinite(values).all()
     touched = np.zeros(depth.shape, bool)
     touched[20, 30] = touched[40, 50] = True
@@ -273,5 +279,5 @@ def test_the_number_of_threads_changes_no_bit(workers: int) -> None:
     ratio = (field.ratio * random.uniform(0.0, 1.3, field.ratio.shape)).astype(np.float32)
     shaken = replace(field, ratio=ratio)
     one, many = solved(shaken, depth, GLOSSY), solved(shaken, depth, GLOSSY, workers=workers)
-    for name in ("slope_x", "slope_y", "normals", "weight", "slope_sd", "flags"):
+    for name in ("slope_x", "slope_y", "normals", "weight", "flags"):
         np.testing.assert_array_equal(getattr(one, name), getattr(many, name))

@@ -1,0 +1,221 @@
+"""How far every depth of a calibrated sensor may be off by one common share.
+
+Three parts, independent of each other. (1) A press is shaded by the calibrated sensor itself, with
+the formulae of the joint refinement, and is reconstructed by sensors whose LEDs and membrane are
+moved as far as the refinement leaves them open. (2) What no choice of LEDs and membrane explains
+shows where ball presses are reconstructed like any other: their height should be the one that
+their known radius asks for. (3) The lateral scale, since depth is slope times length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.ball_pixels import neighbourhood, view_directions
+from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.optics.refraction import LayerStack
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reconstruction.full import coarse_depth, shaded_field
+from gelpolight_core.reconstruction.near_light import ShadedField, solve_near_light
+from gelpolight_core.reconstruction.weighted import integrate_weighted
+from gelpolight_core.reflectance.ball import BallPose
+from gelpolight_core.reflectance.membrane import bounce_weight
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+# A common press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
+PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
+# Enough nodes for a plateau's median; more only cost time.
+NODES = 160
+NOISE = 0.003
+ROUNDS = 2
+# Below this the half difference of two depths is rounding.
+LEAST_SHARE = 1e-6
+# Ball tops within this radius (mm) are compared; beyond, the cap's slope weighs in.
+TOP_MM = 0.3
+
+
+def ball_height_error(
+    calibration: Calibration, pictures: Sequence[Map], balls: Sequence[BallPose]
+) -> float:
+    """Return the relative error (root mean square) of ball presses that are reconstructed.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        With its full model.
+    pictures : sequence of (height, width, 3) float32
+        Raw pictures of ball presses.
+    balls : sequence of BallPose
+        Where the joint refinement has them.
+    """
+    assert calibration.full is not None
+    table = calibration.table
+    errors = []
+    for rgb, ball in zip(pictures, balls, strict=True):
+        field = shaded_field(rgb, calibration, calibration.full)
+        depth, _ = coarse_depth(field, calibration.full, table.grid.pitch_mm, 1)
+        place = table.grid.points_mm() + depth[..., None] * table.drift
+        away = np.hypot(place[..., 0] - ball.centre_mm[0], place[..., 1] - ball.centre_mm[1])
+        top = (away < TOP_MM) & field.usable
+        if top.any():
+            true = ball.depth_mm - ball.radius_mm + np.sqrt(ball.radius_mm**2 - away[top] ** 2)
+            errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)
+    return float(np.sqrt(np.mean(np.square(errors)))) if errors else 0.0
+
+
+def lateral_scale_sd(stack: LayerStack, distance_sd_mm: float, focal_sd: float) -> float:
+    """Return the relative standard deviation of lengths on the membrane.
+
+    The board on the top surface ties distance and focal length together: an error of both alike
+    moves the lateral scale only as far as refraction lifts the surface.
+
+    Parameters
+    ----------
+    stack : LayerStack
+        Between camera and top surface.
+    distance_sd_mm : float
+        Of the top surface, the focal length's share included.
+    focal_sd : float
+        Relative.
+    """
+    pairs = list(zip(stack.thicknesses_mm, stack.indices, strict=True))
+    distance, apparent = sum(t for t, _ in pairs), sum(t / n for t, n in pairs)
+    own = np.sqrt(max(distance_sd_mm**2 - (distance * focal_sd) ** 2, 0.0))
+    return float(np.hypot(own, focal_sd * (distance - apparent)) / apparent)
+
+
+def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -> float:
+    """Return the relative standard deviation of depths from LEDs and membrane.
+
+    Parameters
+    ----------
+    full : FullModel
+        The calibrated LEDs and membrane.
+    table : ResamplingTable
+        Grid and rays.
+    covariance : (15, 15) or (27, 27)
+        Of the joint refinement's shared parameters, in their order: LEDs (9), exponent, gloss,
+        roughness, bounce of the balls' caps, bounce, decay length, heights of the curves.
+    """
+    field, depth, plateau = synthetic_press(full, table)
+    height = np.median(depth[plateau])
+    sizes, directions = np.linalg.eigh(covariance)
+    share = 0.0
+    for size, direction in zip(sizes, directions.T, strict=True):
+        step = np.sqrt(max(float(size), 0.0)) * direction
+        if np.abs(step).max() < LEAST_SHARE:
+            continue
+        ends = [_depth(_moved(full, sign * step), field, depth)[plateau] for sign in (1.0, -1.0)]
+        share += float((np.median(ends[0]) - np.median(ends[1])) / (2.0 * height)) ** 2
+    return float(np.sqrt(share))
+
+
+def synthetic_press(
+    full: FullModel, table: ResamplingTable
+) -> tuple[ShadedField, Map, NDArray[np.bool_]]:
+    """Shade a round plateau with its drape, as the calibrated sensor would see it.
+
+    Returns
+    -------
+    field : ShadedField
+        On a coarse grid.
+    depth_mm : (rows, columns) float32
+        True depth along the rays.
+    plateau : (rows, columns) bool
+        Nodes that see the plateau.
+    """
+    stride = max(min(table.grid.shape) // NODES, 1)
+    grid, cut = table.grid, np.s_[::stride, ::stride]
+    x, y = grid.x_mm[::stride], grid.y_mm[::stride]
+    drift, usable = table.drift[cut], table.valid[cut]
+    width = min(np.ptp(x), np.ptp(y))
+    radius, height = PLATEAU_SHARE * width, HEIGHT_SHARE * width
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    rays = drift.reshape(-1, 2).astype(np.float64)
+    centre = np.array([x.mean(), y.mean()])
+    depth = np.zeros(len(points))
+    for _ in range(12):  # damped: a ray's slope against the drape stays below 1
+        r = np.linalg.norm(points + depth[:, None] * rays - centre, axis=1)
+        depth = 0.5 * (depth + height * np.exp(-np.maximum(r - radius, 0.0) / full.decay_mm))
+    place = points + depth[:, None] * rays
+    away = place - centre
+    r = np.linalg.norm(away, axis=1)
+    steep = np.where(r > radius, -depth / full.decay_mm, 0.0) / np.maximum(r, 1e-9)
+    normals = np.concatenate([-steep[:, None] * away, -np.ones((len(r), 1))], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    shape = usable.shape
+    ratio, around = _shaded(
+        full, (points, rays, place, depth, normals), usable, stride, grid.pitch_mm
+    )
+    field = ShadedField(
+        ratio,
+        np.full((*shape, 3), NOISE, np.float32),
+        around,
+        np.zeros((*shape, 3), bool),
+        usable,
+        usable,
+        np.ascontiguousarray(drift),
+        x,
+        y,
+    )
+    return field, depth.reshape(shape).astype(np.float32), (r < radius).reshape(shape) & usable
+
+
+def _shaded(
+    full: FullModel,
+    seen: tuple[Array, Array, Array, Array, Array],
+    usable: NDArray[np.bool_],
+    stride: int,
+    pitch_mm: float,
+) -> tuple[Map, Map]:
+    """Return press over background and its average in the neighbourhood."""
+    points, rays, place, depth, normals = seen
+    view = view_directions(rays)
+    flat = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
+    light, distance = light_directions(
+        full.led_positions_mm, np.concatenate([place, -depth[:, None]], axis=1)
+    )
+    flat_light, flat_distance = light_directions(full.led_positions_mm, flat)
+    up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
+    direct = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
+    direct *= full.membrane.response(light, normals, view)
+    direct /= full.membrane.response(flat_light, up, view)
+    share = full.membrane.bounce * bounce_weight(normals)
+    around = np.ones((*usable.shape, 3), np.float32)
+    for _ in range(3):  # the neighbourhood receives light from its own neighbourhood
+        ratio = direct + share[:, None] * around.reshape(-1, 3)
+        whole = ratio.reshape(around.shape).astype(np.float32)
+        around = neighbourhood(whole, usable, stride * pitch_mm, full.membrane.bounce_reach_mm)
+    return np.where(usable[..., None], whole, np.float32(1.0)), around
+
+
+def _moved(full: FullModel, step: Array) -> FullModel:
+    old = full.membrane
+    membrane = replace(
+        old,
+        exponent=max(old.exponent + float(step[9]), 0.1),
+        gloss=float(np.clip(old.gloss + step[10], 0.0, 0.95)),
+        roughness=float(np.clip(old.roughness + step[11], 0.05, 1.0)),
+        bounce=max(old.bounce + float(step[13]), 0.0),
+        diffuse=bent_curves(old.diffuse, step[COMMON:]) if old.diffuse else (),
+    )
+    leds = full.led_positions_mm + step[:9].reshape(3, 3)
+    return replace(full, led_positions_mm=leds, membrane=membrane)
+
+
+def _depth(full: FullModel, field: ShadedField, depth_mm: Map) -> Map:
+    """Return the depth that a sensor finds, from near the true one."""
+    for _ in range(ROUNDS):
+        slopes = solve_near_light(field, depth_mm, full.led_positions_mm, full.membrane)
+        pitch = float(field.x_mm[1] - field.x_mm[0])
+        depth_mm = integrate_weighted(
+            slopes.slope_x, slopes.slope_y, slopes.weight, pitch_mm=pitch, start_mm=depth_mm
+        ).depth_mm
+    return depth_mm

@@ -1,0 +1,121 @@
+"""How sure the lengths of a calibration are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scene
+
+from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.calibration.depth_scale import (
+    depth_scale_sd,
+    lateral_scale_sd,
+    synthetic_press,
+)
+from gelpolight_core.calibration.spread import jackknife_covariance
+from gelpolight_core.optics.refraction import LayerStack, build_stack
+from gelpolight_core.reconstruction.near_light import solve_near_light
+from gelpolight_core.reconstruction.weighted import integrate_weighted
+from gelpolight_core.reflectance.membrane import Membrane
+
+
+def full_model(calibration: Calibration) -> FullModel:
+    return FullModel(
+        calibration.led_positions_mm,
+        np.full((3, 3), 0.02),
+        Membrane(1.0, 0.2, 0.5, 0.3, 1.0),
+        calibration.radiance,
+        0.7,
+        0.01,
+        (0.0, 0.0),
+        "refined",
+    )
+
+
+def test_the_synthetic_press_is_what_the_sensor_would_find() -> None:
+    calibration = scene.calibration()
+    full = full_model(calibration)
+    field, depth, plateau = synthetic_press(full, calibration.table)
+    slopes = solve_near_light(field, depth, full.led_positions_mm, full.membrane)
+    pitch = float(field.x_mm[1] - field.x_mm[0])
+    found = integrate_weighted(slopes.slope_x, slopes.slope_y, slopes.weight, pitch_mm=pitch)
+    # A kink at the plateau's rim falls between nodes of a fifth of a millimetre.
+    assert np.median(found.depth_mm[plateau]) == pytest.approx(np.median(depth[plateau]), rel=0.05)
+
+
+def test_wider_parameters_leave_depths_as_much_less_sure() -> None:
+    calibration = scene.calibration()
+    full = full_model(calibration)
+    covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 1.0, 0.02**2, 1.0])
+    once = depth_scale_sd(full, calibration.table, covariance)
+    twice = depth_scale_sd(full, calibration.table, 4.0 * covariance)
+    assert twice == pytest.approx(2.0 * once, rel=0.05)
+    assert depth_scale_sd(full, calibration.table, 0.0 * covariance) == 0.0
+    # LED errors of 0.1 mm cost 0.4 % of depth, so 0.02 mm cost about 0.1 %; gloss of 0.01 costs
+    # up to 1 %. What a depth does not use (the cap's bounce, the decay) costs nothing.
+    assert 5e-4 < once < 2e-2
+    unused = np.diag([0.0] * 12 + [1.0, 0.0, 1.0])
+    assert depth_scale_sd(full, calibration.table, unused) < 1e-6
+
+
+def stack(glass: bool) -> LayerStack:
+    return build_stack(
+        39.0,
+        elastomer_thickness_mm=14.0,
+        elastomer_index=1.41 if glass else 1.0,
+        window_thickness_mm=0.0,
+        window_index=1.0,
+    )
+
+
+def test_focal_length_and_distance_err_together_and_leave_the_scale() -> None:
+    focal_sd = 1e-3
+    alone = 39.0 * focal_sd
+    assert lateral_scale_sd(stack(False), alone, focal_sd) < 1e-9
+    # Refraction lifts 14 mm by 14 (1 - 1/1.41) = 4.07 mm, which does not follow the focal length.
+    assert lateral_scale_sd(stack(True), alone, focal_sd) == pytest.approx(
+        focal_sd * 4.07 / (39.0 - 4.07), rel=1e-3
+    )
+    own = lateral_scale_sd(stack(False), float(np.hypot(alone, 0.039)), focal_sd)
+    assert own == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_leaving_presses_out_shows_errors_that_a_press_has_as_a_whole() -> None:
+    """A line through groups of points that err together: scatter of repeats beside the stated."""
+    random = np.random.default_rng(3)
+    groups, points = 12, 50
+    found, stated, naive = [], [], []
+    for _ in range(300):
+        places = [
+            random.uniform(0.0, 1.0) + 0.05 * random.normal(size=points) for _ in range(groups)
+        ]
+        rows = [np.stack([np.ones(points), p], axis=1) for p in places]
+        errors = [0.1 * random.normal() + 0.02 * random.normal(size=points) for _ in range(groups)]
+        line = np.linalg.lstsq(np.concatenate(rows), np.concatenate(errors), rcond=None)[0]
+        left = [r @ line - e for r, e in zip(rows, errors, strict=True)]
+        covariance = jackknife_covariance(rows, left, np.zeros((1, 2)), common=2)
+        found.append(line[1])
+        stated.append(covariance[1, 1])
+        every = np.concatenate(rows)
+        naive.append(np.linalg.inv(every.T @ every)[1, 1] * np.var(np.concatenate(left)))
+    seen = np.std(found)
+    assert np.sqrt(np.mean(stated)) == pytest.approx(seen, rel=0.25)
+    assert np.sqrt(np.mean(naive)) < 0.3 * seen
+
+
+def test_a_prior_that_alone_decides_gives_its_own_deviation() -> None:
+    weak = [np.array([[1e-6]])] * 4
+    prior = np.array([[1.0 / 0.05]])
+    covariance = jackknife_covariance(weak, [np.zeros(1)] * 4, prior, common=1)
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.05, rel=1e-6)
+
+
+def test_a_calibration_says_how_sure_its_heights_are(virtual_calibration: Calibration) -> None:
+    full = virtual_calibration.full
+    assert full is not None
+    assert full.scale_sd is not None
+    figure = virtual_calibration.quality["joint"]["depth_sd_percent"]
+    assert figure.value == pytest.approx(100.0 * full.scale_sd.depth)
+    # 0.1 to 3 %: below, it would be better than any sensor of this kind has been shown to be.
+    assert 0.1 < figure.value < 3.0
+    assert full.scale_sd.lateral < 1e-3
