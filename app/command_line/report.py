@@ -9,7 +9,7 @@ from typing import Any
 from app.command_line.common import StageProgress, refuse_overwriting
 from gelpolight_core.calibration.calibration import MODELS, Calibration
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.pipeline import STAGES, calibrate_session
+from gelpolight_core.calibration.pipeline import calibrate_session, source_files
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.measurement.evaluation import evaluate_presses
@@ -23,7 +23,6 @@ from gelpolight_core.session.session import (
     Session,
     read_picture,
     read_session,
-    refuse_copies,
     require_colour,
 )
 from gelpolight_core.translation import tr
@@ -84,10 +83,9 @@ def _of_calibration(options: argparse.Namespace) -> Report:
 
 def _of_session(options: argparse.Namespace) -> Report:
     session: Session = read_session(options.source)
-    used = [path for stage in STAGES for path in session.files(stage)]
+    used = source_files(session)
     refuse_overwriting([options.output], [session.folder / "session.toml", *used])
     refuse_unwritable(options.output)
-    refuse_copies(used)
     with StageProgress() as tell:
         result = calibrate_session(session, model=options.model or MODELS[-1], progress=tell)
         validation = _validate(result.calibration, options.presses, tell)
