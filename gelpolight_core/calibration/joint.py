@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.ball import BallPose
@@ -183,12 +184,12 @@ class _Problem:
     """Residuals of all presses, with priors.
 
     Parameters are the LEDs (9), exponent, gloss, roughness, cap's and drape's bounce, decay length,
-    and then x, y and depth of each ball; those before `first_free` are held.
+    and then x, y and depth of each ball; those that are not `free` are held.
     """
 
     presses: Sequence[BallPixels]
     start: Array
-    first_free: int
+    free: NDArray[np.bool_]
 
     def residuals(self, x: Array) -> list[Array]:
         return [self._press(x, i) for i in range(len(self.presses))]
@@ -239,7 +240,7 @@ class _Problem:
         starts = ends - [r.size for r in base]
         prior = self.priors(x)
         result = np.zeros((ends[-1] + prior.size, x.size))
-        for j in range(self.first_free, _GLOBAL):
+        for j in np.flatnonzero(self.free[:_GLOBAL]):
             moved = x.copy()
             moved[j] += _STEP
             for i, r in enumerate(self.residuals(moved)):
@@ -254,7 +255,11 @@ class _Problem:
 
 
 def refine_jointly(
-    presses: Sequence[BallPress], pixels: Sequence[BallPixels], led_positions_mm: Array
+    presses: Sequence[BallPress],
+    pixels: Sequence[BallPixels],
+    led_positions_mm: Array,
+    *,
+    terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
 ) -> JointResult:
     """Refine LEDs, membrane and balls together; keep the mirror's LEDs where they do better.
 
@@ -264,10 +269,12 @@ def refine_jointly(
         The balls as found, and their pixels.
     led_positions_mm : (3, 3)
         From the mirror spots.
+    terms : CalibrationTerms, optional
+        What is fitted; by default everything.
     """
-    held_out = _held_out(presses, pixels, led_positions_mm)
+    held_out = _held_out(presses, pixels, led_positions_mm, terms)
     refine = held_out[1] <= held_out[0]
-    solved = _solve(presses, pixels, led_positions_mm, refine=refine)
+    solved = _solve(presses, pixels, led_positions_mm, terms, refine=refine)
     x, sd = solved.x, solved.sd
     names = ("exponent", "gloss", "roughness", "cap_bounce", "bounce", "decay_mm")
     return JointResult(
@@ -310,22 +317,31 @@ class _Solution:
     loss: float
 
 
-def _start(presses: Sequence[BallPress], leds: Array) -> Array:
+def _start(
+    presses: Sequence[BallPress], leds: Array, terms: CalibrationTerms
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return where the fit starts, and which parameters the terms leave free."""
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
-    return np.concatenate([leds.ravel(), [1.0, 0.05, 0.5, 0.1, 0.1, 0.7], np.ravel(balls)])
+    gloss, bounce = 0.05 * terms.gloss, 0.1 * terms.bounce
+    start = np.concatenate([leds.ravel(), [1.0, gloss, 0.5, bounce, bounce, 0.7], np.ravel(balls)])
+    free = np.ones(start.size, bool)
+    free[:9] = terms.led_refinement
+    free[9:14] = [terms.exponent, terms.gloss, terms.gloss, terms.bounce, terms.bounce]
+    return start, free
 
 
 def _solve(
     presses: Sequence[BallPress],
     pixels: Sequence[BallPixels],
     leds: Array,
+    terms: CalibrationTerms,
     *,
     refine: bool,
     common: Array | None = None,
 ) -> _Solution:
     """Solve for all parameters; with `common`, the first 15 are held and only the balls move."""
-    start = _start(presses, leds)
-    first_free = _GLOBAL if common is not None else (0 if refine else 9)
+    start, free = _start(presses, leds, terms)
+    free[: _GLOBAL if common is not None else (0 if refine else 9)] = False
     low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
     low[9:_GLOBAL] = [0.5, 0.0, 0.15, 0.0, 0.0, 0.15]
     high[9:_GLOBAL] = [1.8, 0.9, 1.0, 1.5, 1.5, 3.0]
@@ -335,20 +351,21 @@ def _solve(
     start[depth_at] = np.clip(start[depth_at], 0.03, 0.9 * high[depth_at])
     if common is not None:
         start[:_GLOBAL] = common
-    problem = _Problem(pixels, start, first_free)
+    problem = _Problem(pixels, start, free)
     scale = np.concatenate([np.full(14, 0.1), [0.05], np.tile([0.02, 0.02, 0.05], len(pixels))])
-    held = start[:first_free]
 
-    def whole(free: Array) -> Array:
-        return np.concatenate([held, free])
+    def whole(moved: Array) -> Array:
+        x = start.copy()
+        x[free] = moved
+        return x
 
     fit = least_squares(
-        lambda free: problem.all(whole(free)),
-        start[first_free:],
-        jac=lambda free: problem.jacobian(whole(free))[:, first_free:],
-        bounds=(low[first_free:], high[first_free:]),
+        lambda moved: problem.all(whole(moved)),
+        start[free],
+        jac=lambda moved: problem.jacobian(whole(moved))[:, free],
+        bounds=(low[free], high[free]),
         loss="soft_l1",
-        x_scale=scale[first_free:],
+        x_scale=scale[free],
         ftol=1e-5,
         xtol=1e-5,
         max_nfev=40,
@@ -360,27 +377,32 @@ def _solve(
     weight = np.concatenate([p.weight.ravel() for p in pixels])
     seen = (weight > 0.0) & (left != 0.0)
     misfit = 1.4826 * float(np.median(np.abs(left[seen] / weight[seen])))
-    curvature = problem.jacobian(x)[:, first_free:]
+    curvature = problem.jacobian(x)[:, free]
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
-    sd = np.concatenate([np.zeros(first_free), np.sqrt(np.maximum(variance, 0.0))])
+    sd = np.zeros(x.size)
+    sd[free] = np.sqrt(np.maximum(variance, 0.0))
     return _Solution(x, sd, misfit, loss)
 
 
 def _held_out(
-    presses: Sequence[BallPress], pixels: Sequence[BallPixels], leds: Array
+    presses: Sequence[BallPress],
+    pixels: Sequence[BallPixels],
+    leds: Array,
+    terms: CalibrationTerms,
 ) -> tuple[float, float]:
     """Return the mean robust loss on every second press, from a fit to the others.
 
     First with the mirror's LEDs, then with refined ones.
     """
     even, odd = slice(0, None, 2), slice(1, None, 2)
-    if len(presses) < 4:
-        return 0.0, 1.0  # too few to hold any out: the mirror's LEDs stay
+    if len(presses) < 4 or not terms.led_refinement:
+        return 0.0, 1.0  # too few to hold any out, or nothing to choose: the mirror's LEDs stay
     # Half of the pixels tell which of two fits is the better as well as all do.
     pixels = [_thinned(p) for p in pixels]
     result: list[float] = []
     for refine in (False, True):
-        fitted = _solve(presses[even], pixels[even], leds, refine=refine)
-        judged = _solve(presses[odd], pixels[odd], leds, refine=refine, common=fitted.x[:_GLOBAL])
+        fitted = _solve(presses[even], pixels[even], leds, terms, refine=refine)
+        common = fitted.x[:_GLOBAL]
+        judged = _solve(presses[odd], pixels[odd], leds, terms, refine=refine, common=common)
         result.append(judged.loss)
     return result[0], result[1]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import getpass
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from gelpolight_core.calibration.calibration import (
     sensor_stack,
 )
 from gelpolight_core.calibration.joint import gather_ball_pixels, refine_jointly
+from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
@@ -119,7 +121,8 @@ def calibrate_session(
     full = None
     if model == "full":
         tell(tr("joint refinement"), 0.85)
-        full = _full_model(presses, pictures, bare, table, lights, factors)
+        crosstalk = crosstalk_from_spots(lights.spots)
+        full = _full_model(presses, pictures, bare, table, lights, factors, crosstalk)
     calibration = Calibration(
         sensor=session.sensor,
         model=model,
@@ -146,6 +149,39 @@ def calibrate_session(
     )
     tell(tr("done"), 1.0)
     return CalibrationRun(calibration, lens, pose, lights, radiance, reflectance, factors)
+
+
+def refine_again(
+    session: Session, run: CalibrationRun, *, terms: CalibrationTerms = ALL_CALIBRATION_TERMS
+) -> Calibration:
+    """Repeat the joint refinement on a run's stages, with other terms.
+
+    Parameters
+    ----------
+    session : Session
+        What the run was made from.
+    run : CalibrationRun
+        For either model; its stages are taken as they are.
+    terms : CalibrationTerms, optional
+        What the full model reckons with.
+
+    Returns
+    -------
+    Calibration
+        For the full model.
+    """
+    table = run.calibration.table
+    crosstalk = run.calibration.crosstalk if terms.crosstalk else np.eye(3)
+    bare = table.apply(_stage_picture(session, "background", run.lens).rgb)
+    pictures = tuple(
+        table.apply(_ball_picture(path, run.lens).rgb) for path in session.files("balls")
+    )
+    presses = run.reflectance.presses
+    full = _full_model(
+        presses, pictures, bare, table, run.lights, run.factors, crosstalk, terms=terms
+    )
+    quality = {**run.calibration.quality, "joint": _judge_full(full)}
+    return replace(run.calibration, model="full", crosstalk=crosstalk, quality=quality, full=full)
 
 
 def _reflectance_and_factors(
@@ -176,9 +212,11 @@ def _full_model(
     table: ResamplingTable,
     lights: LightResult,
     factors: FactorResult,
+    crosstalk: NDArray[np.float64],
+    *,
+    terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
 ) -> FullModel:
     """Refine LEDs and membrane on the presses, and keep the background to compare with."""
-    crosstalk = crosstalk_from_spots(lights.spots)
     background = unmix(bare, crosstalk)
     noise = _press_noise(presses)
     pixels = [
@@ -187,7 +225,7 @@ def _full_model(
         )
         for press, picture in zip(presses, pictures, strict=True)
     ]
-    joint = refine_jointly(presses, pixels, lights.led_positions_mm)
+    joint = refine_jointly(presses, pixels, lights.led_positions_mm, terms=terms)
     return FullModel(
         joint.led_positions_mm,
         joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
@@ -247,11 +285,8 @@ def _find_balls(
     files = session.files("balls")
     for index, path in enumerate(files):
         tell(tr("ball presses"), 0.5 + 0.3 * index / len(files))
-        picture = read_picture(path)
         radius = session.ball_radius_mm(path.name)
-        require_colour(picture, where=str(path))
-        _same_size(picture, lens.camera.width, lens.camera.height, "balls")
-        seen = table.apply(picture.rgb)
+        seen = table.apply(_ball_picture(path, lens).rgb)
         presses.append(
             find_ball(
                 unmix(seen, crosstalk),
@@ -265,6 +300,13 @@ def _find_balls(
         )
         pictures.append(seen)
     return tuple(presses), tuple(pictures)
+
+
+def _ball_picture(path: Path, lens: LensResult) -> Picture:
+    picture = read_picture(path)
+    require_colour(picture, where=str(path))
+    _same_size(picture, lens.camera.width, lens.camera.height, "balls")
+    return picture
 
 
 def _stage_picture(session: Session, stage: str, lens: LensResult) -> Picture:

@@ -17,13 +17,14 @@ from gelpolight_core.reconstruction.denoise import quiet_even_parts
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
 from gelpolight_core.reconstruction.placement import place_on_grid, resample
-from gelpolight_core.reconstruction.weighted import WeightedIntegration, integrate_weighted
+from gelpolight_core.reconstruction.poisson import integrate_slopes
+from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.weighted import integrate_weighted
 
 Map = NDArray[np.float32]
 SATURATED = 0.995
 LEAST_BASE = 0.01
 COARSE = 4
-COARSE_ROUNDS = 3
 RIM_MM = 0.5
 RIM_CHANGE = 0.08
 RIM_REACH_MM = 2.5
@@ -63,7 +64,12 @@ class FullDepth:
 
 
 def reconstruct_full(
-    rgb: Map, calibration: Calibration, full: FullModel, *, workers: int = 2
+    rgb: Map,
+    calibration: Calibration,
+    full: FullModel,
+    *,
+    terms: Terms = ALL_TERMS,
+    workers: int = 2,
 ) -> FullDepth:
     """Reconstruct one picture by the full model.
 
@@ -73,19 +79,26 @@ def reconstruct_full(
         Raw picture, linear light 0..1.
     calibration, full
         The sensor's.
+    terms : Terms, optional
+        What is reckoned with; by default everything.
     workers : int, optional
         Threads of the transforms.
     """
-    field = shaded_field(rgb, calibration, full)
+    field = shaded_field(rgb, calibration, full, terms=terms)
     pitch = calibration.table.grid.pitch_mm
-    depth, (changes, stopped) = coarse_depth(field, full, pitch, workers)
-    slopes, solved, rim = _round(field, depth, full, pitch, workers)
-    last = float(np.abs(solved.depth_mm - depth).max())
-    return _placed(field, slopes, solved.depth_mm, (*changes, last), (rim, stopped))
+    start, (changes, stopped) = coarse_depth(field, full, pitch, workers, terms=terms)
+    slopes, depth, rim = _round(field, start, full, pitch, workers, terms)
+    last = float(np.abs(depth - start).max())
+    return _placed(field, slopes, depth, (*changes, last), (rim, stopped), terms)
 
 
 def coarse_depth(
-    field: ShadedField, full: FullModel, pitch_mm: float, workers: int
+    field: ShadedField,
+    full: FullModel,
+    pitch_mm: float,
+    workers: int,
+    *,
+    terms: Terms = ALL_TERMS,
 ) -> tuple[Map, tuple[tuple[float, ...], str]]:
     """Run the near-light rounds at quarter scale.
 
@@ -100,13 +113,13 @@ def coarse_depth(
     depth = np.zeros(coarse.usable.shape, np.float32)
     changes: list[float] = []
     stopped = "done"
-    for _ in range(COARSE_ROUNDS):
-        _, solved, _ = _round(coarse, depth, full, pitch_mm * COARSE, workers)
-        changes.append(float(np.abs(solved.depth_mm - depth).max()))
+    for _ in range(terms.near_light_rounds):
+        _, solved, _ = _round(coarse, depth, full, pitch_mm * COARSE, workers, terms)
+        changes.append(float(np.abs(solved - depth).max()))
         if len(changes) > 2 and changes[-1] > changes[-2]:
             stopped = "grows"
             break
-        depth = solved.depth_mm
+        depth = solved
     rows, columns = field.usable.shape
     whole = cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR)
     return np.asarray(whole), (tuple(changes), stopped)
@@ -119,42 +132,63 @@ def as_linear(frame: NDArray[Any]) -> Map:
 
 
 def _round(
-    field: ShadedField, depth_mm: Map, full: FullModel, pitch_mm: float, workers: int
-) -> tuple[RaySlopes, WeightedIntegration, str]:
+    field: ShadedField,
+    depth_mm: Map,
+    full: FullModel,
+    pitch_mm: float,
+    workers: int,
+    terms: Terms,
+) -> tuple[RaySlopes, Map, str]:
     """One near-light round: normals at the present depth, their depth, and how the rim was held."""
     slopes = solve_near_light(
-        field, depth_mm, full.led_positions_mm, full.membrane, workers=workers
+        field,
+        depth_mm,
+        full.led_positions_mm,
+        full.membrane,
+        shadows=terms.shadows,
+        workers=workers,
     )
-    let_go = released_rim(field, pitch_mm)
+    slope_x, slope_y = slopes.slope_x, slopes.slope_y
+    if not terms.ray_true_slopes:
+        slope_x, slope_y = (slopes.normals[..., k] / slopes.normals[..., 2] for k in (0, 1))
+    if not terms.weights:
+        plain = integrate_slopes(slope_x, slope_y, pitch_mm=pitch_mm, workers=workers)
+        return slopes, np.asarray(plain.depth_mm, np.float32), "held"
+    let_go = released_rim(field, pitch_mm) if terms.free_rim else np.zeros(1, bool)
     weight, hold, rim = slopes.weight, None, "held"
     if let_go.any():
         rim = "free"
         hold = np.where(let_go, LET_GO, 1.0).astype(np.float32)
         weight = np.where(field.inside, weight, weight * hold)
     solved = integrate_weighted(
-        slopes.slope_x,
-        slopes.slope_y,
+        slope_x,
+        slope_y,
         weight,
         pitch_mm=pitch_mm,
         start_mm=depth_mm,
         hold=hold,
         workers=workers,
     )
-    return slopes, solved, rim
+    return slopes, solved.depth_mm, rim
 
 
-def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedField:
+def shaded_field(
+    rgb: Map, calibration: Calibration, full: FullModel, *, terms: Terms = ALL_TERMS
+) -> ShadedField:
     """Resample a raw picture and compare it with the background."""
     table = calibration.table
     seen = table.apply(rgb)
     bad = ~np.isfinite(seen)
     seen[bad] = 0.0
     light = unmix(seen, calibration.crosstalk)
-    saturated = table.apply((rgb >= SATURATED).astype(np.float32)) > 0.0
+    missing = bad
+    if terms.saturation:
+        missing = bad | (table.apply((rgb >= SATURATED).astype(np.float32)) > 0.0)
     base = np.maximum(full.background, LEAST_BASE)
     usable = table.valid & (full.background > LEAST_BASE).all(axis=2)
     usable &= (calibration.factors > 0.0).all(axis=2)
-    light = quiet_even_parts(light, usable)
+    if terms.denoising:
+        light = quiet_even_parts(light, usable)
     ratio = np.where(usable[..., None], light / base, 1.0).astype(np.float32)
     sigma = (calibration.noise / np.sqrt(2.0) / base).astype(np.float32)
     grid = table.grid
@@ -162,7 +196,7 @@ def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedF
         ratio,
         sigma,
         neighbourhood(ratio, usable, grid.pitch_mm, full.membrane.bounce_reach_mm),
-        saturated | bad,
+        missing,
         usable,
         filled_inside(usable),
         table.drift,
@@ -226,16 +260,20 @@ def _placed(
     depth_mm: Map,
     changes: tuple[float, ...],
     said: tuple[str, str],
+    terms: Terms,
 ) -> FullDepth:
-    column, row, folded = place_on_grid(depth_mm, field.drift, field.x_mm, field.y_mm)
-    depth = resample(depth_mm, column, row)
-    normals = np.stack(
-        [resample(np.ascontiguousarray(slopes.normals[..., k]), column, row) for k in range(3)],
-        axis=-1,
-    )
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    flags = resample(slopes.flags.astype(np.float32), column, row, nearest=True).astype(np.uint8)
-    flags[folded] |= int(Flag.NOT_OBSERVABLE)
-    outside = (flags & int(Flag.OUTSIDE)) != 0
-    depth[outside] = 0.0
-    return FullDepth(depth, normals, resample(slopes.slope_sd, column, row), flags, changes, *said)
+    depth, normals = depth_mm, slopes.normals
+    slope_sd, flags = slopes.slope_sd, slopes.flags
+    if terms.true_positions:
+        column, row, folded = place_on_grid(depth_mm, field.drift, field.x_mm, field.y_mm)
+        depth = resample(depth_mm, column, row)
+        normals = np.stack(
+            [resample(np.ascontiguousarray(normals[..., k]), column, row) for k in range(3)],
+            axis=-1,
+        )
+        normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+        slope_sd = resample(slope_sd, column, row)
+        flags = resample(flags.astype(np.float32), column, row, nearest=True).astype(np.uint8)
+        flags[folded] |= int(Flag.NOT_OBSERVABLE)
+    depth[(flags & int(Flag.OUTSIDE)) != 0] = 0.0
+    return FullDepth(depth, normals, slope_sd, flags, changes, *said)

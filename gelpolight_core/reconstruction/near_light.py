@@ -101,6 +101,7 @@ def solve_near_light(
     led_positions_mm: NDArray[np.float64],
     membrane: Membrane,
     *,
+    shadows: bool = True,
     workers: int = 1,
 ) -> RaySlopes:
     """Solve every node's normal at the present depth.
@@ -115,6 +116,8 @@ def solve_near_light(
         Sensor frame.
     membrane : Membrane
         Its response.
+    shadows : bool, optional
+        Whether a dark channel is missing information; else its value is believed.
     workers : int, optional
         Threads; each takes a block of rows, so that the result does not depend on their number.
     """
@@ -144,6 +147,7 @@ def solve_near_light(
             depth,
             leds,
             shape_of,
+            shadows,
             slope_x,
             slope_y,
             normals,
@@ -242,6 +246,7 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     depth,
     leds,
     shape,
+    shadows,
     slope_x,
     slope_y,
     normals,
@@ -289,7 +294,7 @@ def _solve_all(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     out[k] = 0
                     if saturated[i, j, k]:
                         out[k], missing, side = 1, k, 1
-                    elif not (direct[k] >= dark):
+                    elif shadows and not (direct[k] >= dark):
                         out[k], missing, side = -1, k, -1
                     if out[k] != 0:
                         missing_count += 1
