@@ -39,6 +39,7 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     # Not above: they load for seconds, and Ctrl-C shall be answered in that time too.
     from app.command_line import (
+        ablation,
         benchmark,
         calibrate,
         design,
@@ -72,6 +73,7 @@ def build_parser() -> argparse.ArgumentParser:
         evaluate,
         report,
         benchmark,
+        ablation,
         design,
     ):
         command.add_parser(commands)

@@ -28,12 +28,12 @@ from gelpolight_core.calibration.joint_problem import (
     diffuse_curves,
 )
 from gelpolight_core.calibration.spread import jackknife_covariance
+from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.press import BallPress
 
 Array = NDArray[np.float64]
-_SHAPE = slice(9, 12)  # exponent, gloss and roughness, which the one-dimensional membrane lacks
 _NAMES = ("exponent", "gloss", "roughness", "cap_bounce", "bounce", "decay_mm")
 
 
@@ -91,7 +91,11 @@ class JointResult:
 
 
 def refine_jointly(
-    presses: Sequence[BallPress], pixels: Sequence[BallPixels], led_positions_mm: Array
+    presses: Sequence[BallPress],
+    pixels: Sequence[BallPixels],
+    led_positions_mm: Array,
+    *,
+    terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
 ) -> JointResult:
     """Refine LEDs, membrane and balls together.
 
@@ -104,11 +108,13 @@ def refine_jointly(
         The balls as found, and their pixels.
     led_positions_mm : (3, 3)
         From the mirror spots.
+    terms : CalibrationTerms, optional
+        What is reckoned with; by default everything.
     """
-    held_out, membranes = _held_out(presses, pixels, led_positions_mm)
+    held_out, membranes = _held_out(presses, pixels, led_positions_mm, terms)
     refine = held_out[1] <= held_out[0]
     curves = membranes[1] <= membranes[0]
-    solved = _solve(presses, pixels, led_positions_mm, refine=refine, curves=curves)
+    solved = _solve(presses, pixels, led_positions_mm, terms, refine=refine, curves=curves)
     x, sd = solved.x, solved.sd
     end = COMMON + 3 * len(pixels)
     return JointResult(
@@ -153,29 +159,37 @@ class _Solution:
     problem: Problem
 
 
-def _start(presses: Sequence[BallPress], leds: Array, *, curves: bool) -> Array:
+def _start(
+    presses: Sequence[BallPress], leds: Array, terms: CalibrationTerms, *, curves: bool
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return where the fit starts, and which parameters are free."""
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
-    shape = [1.0, 0.0, 0.5] if curves else [1.0, 0.05, 0.5]
+    glossy = terms.gloss and not curves
+    bounce = 0.1 * terms.bounce
+    common = [1.0, 0.05 * glossy, 0.5, bounce, bounce, 0.7]
     heights = np.zeros(CURVE_SIZE if curves else 0)
-    return np.concatenate([leds.ravel(), shape, [0.1, 0.1, 0.7], np.ravel(balls), heights])
+    start = np.concatenate([leds.ravel(), common, np.ravel(balls), heights])
+    free = np.ones(start.size, dtype=bool)
+    free[:9] = terms.led_refinement
+    # A power of the cosine other than Lambert's is what the one-dimensional curves are for.
+    free[9:14] = [False, glossy, glossy, terms.bounce, terms.bounce]
+    return start, free
 
 
 def _solve(
     presses: Sequence[BallPress],
     pixels: Sequence[BallPixels],
     leds: Array,
+    terms: CalibrationTerms,
     *,
     refine: bool,
     curves: bool = False,
     judging: Array | None = None,
 ) -> _Solution:
     """Solve for all parameters, or, when judging a fit to other presses, for the balls alone."""
-    start = _start(presses, leds, curves=curves)
+    start, free = _start(presses, leds, terms, curves=curves)
     balls = slice(COMMON, COMMON + 3 * len(pixels))
-    free = np.ones(start.size, dtype=bool)
-    free[:9] = refine
-    if curves:
-        free[_SHAPE] = False
+    free[:9] &= refine
     low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
     low[9:COMMON] = [0.5, 0.0, 0.15, 0.0, 0.0, 0.15]
     high[9:COMMON] = [1.8, 0.9, 1.0, 1.5, 1.5, 3.0]
@@ -259,7 +273,10 @@ def _relative_misfit(scaled: Array, weight: Array) -> float:
 
 
 def _held_out(
-    presses: Sequence[BallPress], pixels: Sequence[BallPixels], leds: Array
+    presses: Sequence[BallPress],
+    pixels: Sequence[BallPixels],
+    leds: Array,
+    terms: CalibrationTerms,
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return mean robust losses on every second press, from fits to the others.
 
@@ -274,11 +291,12 @@ def _held_out(
     pixels = [thinned(p) for p in pixels]
 
     def loss(refine: bool, curves: bool) -> float:
-        fitted = _solve(presses[even], pixels[even], leds, refine=refine, curves=curves)
+        fitted = _solve(presses[even], pixels[even], leds, terms, refine=refine, curves=curves)
         return _solve(
-            presses[odd], pixels[odd], leds, refine=refine, curves=curves, judging=fitted.x
+            presses[odd], pixels[odd], leds, terms, refine=refine, curves=curves, judging=fitted.x
         ).loss
 
-    mirror, refined = loss(False, False), loss(True, False)
-    one_dimensional = loss(refined <= mirror, True)
+    mirror = loss(False, False)
+    refined = loss(True, False) if terms.led_refinement else np.inf
+    one_dimensional = loss(refined <= mirror, True) if terms.curves else np.inf
     return (mirror, refined), (min(mirror, refined), one_dimensional)

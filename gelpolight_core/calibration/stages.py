@@ -32,6 +32,7 @@ from gelpolight_core.calibration.depth_scale import (
 )
 from gelpolight_core.calibration.inputs import NEEDS, Stage, inputs_of
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
+from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult, calibrate_factors
 from gelpolight_core.lights.crosstalk import CrosstalkResult, find_crosstalk, unmix
@@ -325,10 +326,30 @@ def _run_reflectance(session: Session, results: StageResults, _tell: Progress) -
 
 
 def _run_joint(session: Session, results: StageResults, _tell: Progress) -> StageResults:
-    """Refine LEDs and membrane on the presses, and keep the background to compare with."""
+    refined = refine_with(results)
+    assert refined.joint is not None and refined.full is not None
+    scale = _scale_sd(session, refined, refined.joint, refined.full)
+    return replace(refined, full=replace(refined.full, scale_sd=scale))
+
+
+def refine_with(
+    results: StageResults, *, terms: CalibrationTerms = ALL_CALIBRATION_TERMS
+) -> StageResults:
+    """Refine LEDs and membrane on the presses, and keep the background to compare with.
+
+    Parameters
+    ----------
+    results : StageResults
+        Of all earlier stages.
+    terms : CalibrationTerms, optional
+        What the full model reckons with.
+    """
     table, lights = _need(results.table, "balls"), _need(results.lights, "balls")
     bare, factors = _need(results.background, "balls"), _need(results.factors, "balls")
-    crosstalk = _need(results.crosstalk, "balls").matrix
+    found = _need(results.crosstalk, "balls")
+    if not terms.crosstalk:
+        found = replace(found, matrix=np.eye(3))
+    crosstalk = found.matrix
     background = unmix(bare, crosstalk)
     noise = press_noise(results.presses)
     pixels = [
@@ -337,7 +358,7 @@ def _run_joint(session: Session, results: StageResults, _tell: Progress) -> Stag
         )
         for press, picture in zip(results.presses, results.pictures, strict=True)
     ]
-    joint = refine_jointly(results.presses, pixels, lights.led_positions_mm)
+    joint = refine_jointly(results.presses, pixels, lights.led_positions_mm, terms=terms)
     full = FullModel(
         joint.led_positions_mm,
         joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
@@ -351,8 +372,7 @@ def _run_joint(session: Session, results: StageResults, _tell: Progress) -> Stag
         joint.membrane_held_out,
         joint.membrane_kept,
     )
-    full = replace(full, scale_sd=_scale_sd(session, results, joint, full))
-    return replace(results, joint=joint, full=full)
+    return replace(results, crosstalk=found, joint=joint, full=full)
 
 
 def _scale_sd(

@@ -18,6 +18,8 @@ from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
 from gelpolight_core.reconstruction.picture_noise import picture_noise
 from gelpolight_core.reconstruction.placement import place_on_grid, resample
+from gelpolight_core.reconstruction.poisson import integrate_slopes
+from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.reconstruction.uncertainty import (
     MODEL_EXAMPLES,
     DepthNoise,
@@ -27,7 +29,7 @@ from gelpolight_core.reconstruction.uncertainty import (
     place_examples,
     slope_noise,
 )
-from gelpolight_core.reconstruction.weighted import WeightedIntegration, integrate_weighted
+from gelpolight_core.reconstruction.weighted import integrate_weighted
 
 Map = NDArray[np.float32]
 SATURATED = 0.995
@@ -35,7 +37,6 @@ LEAST_BASE = 0.01
 # A share of the brightness below any camera's noise; zero would say nothing of conditioning.
 LEAST_NOISE = 1e-5
 COARSE = 4
-COARSE_ROUNDS = 3
 # A round may not move the surface by more than this share of the LEDs' height: light that is
 # frozen further off than that says next to nothing of the slopes there.
 LONGEST_STEP = 0.2
@@ -86,6 +87,7 @@ def reconstruct_full(
     calibration: Calibration,
     full: FullModel,
     *,
+    terms: Terms = ALL_TERMS,
     workers: int = 2,
     uncertainty: bool = False,
 ) -> FullDepth:
@@ -97,18 +99,21 @@ def reconstruct_full(
         Raw picture, linear light 0..1.
     calibration, full
         The sensor's.
+    terms : Terms, optional
+        What is reckoned with; by default everything.
     workers : int, optional
         Threads of the transforms.
     uncertainty : bool, optional
         Whether to find out how far it may be off; it takes several times as long.
     """
-    field = shaded_field(rgb, calibration, full)
+    field = shaded_field(rgb, calibration, full, terms=terms)
     pitch = calibration.table.grid.pitch_mm
-    depth, (changes, stopped) = coarse_depth(field, full, pitch, workers)
-    slopes, solved, rim = _round(field, depth, full, pitch, workers)
-    last = float(np.abs(solved.depth_mm - depth).max())
-    moved = held_back(depth, solved.depth_mm, longest_step_mm(full))
-    placed = place_on_grid(moved, field.drift, field.x_mm, field.y_mm)
+    depth, (changes, stopped) = coarse_depth(field, full, pitch, workers, terms=terms)
+    slopes, solved, rim = _round(field, depth, full, pitch, workers, terms)
+    last = float(np.abs(solved - depth).max())
+    moved = held_back(depth, solved, longest_step_mm(full))
+    drift = field.drift if terms.true_positions else np.zeros_like(field.drift)
+    placed = place_on_grid(moved, drift, field.x_mm, field.y_mm)
     result = _placed(slopes, moved, placed, (*changes, last), (rim, stopped))
     if not uncertainty:
         return result
@@ -117,7 +122,12 @@ def reconstruct_full(
 
 
 def coarse_depth(
-    field: ShadedField, full: FullModel, pitch_mm: float, workers: int
+    field: ShadedField,
+    full: FullModel,
+    pitch_mm: float,
+    workers: int,
+    *,
+    terms: Terms = ALL_TERMS,
 ) -> tuple[Map, tuple[tuple[float, ...], str]]:
     """Run the near-light rounds at quarter scale.
 
@@ -132,20 +142,19 @@ def coarse_depth(
     depth = np.zeros(coarse.usable.shape, np.float32)
     changes: list[float] = []
     longest = longest_step_mm(full)
-    stopped = "done"
-    for _ in range(HELD_ROUNDS):
-        _, solved, _ = _round(coarse, depth, full, pitch_mm * COARSE, workers)
-        changes.append(float(np.abs(solved.depth_mm - depth).max()))
-        if len(changes) > 2 and changes[-1] > changes[-2]:
+    wanted = terms.near_light_rounds
+    stopped = "unsettled" if wanted else "done"
+    for _ in range(HELD_ROUNDS if wanted else 0):
+        _, solved, _ = _round(coarse, depth, full, pitch_mm * COARSE, workers, terms)
+        changes.append(float(np.abs(solved - depth).max()))
+        if len(changes) > 1 and changes[-1] > changes[-2]:
             stopped = "grows"
             break
-        depth = held_back(depth, solved.depth_mm, longest)
+        depth = held_back(depth, solved, longest)
         held = max(changes) > longest
-        if len(changes) >= COARSE_ROUNDS and (not held or changes[-1] <= SETTLED * longest):
+        if len(changes) >= wanted and (not held or changes[-1] <= SETTLED * longest):
             stopped = "damped" if held else "done"
             break
-    else:
-        stopped = "unsettled"
     rows, columns = field.usable.shape
     whole = cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR)
     return np.asarray(whole), (tuple(changes), stopped)
@@ -172,23 +181,41 @@ def as_linear(frame: NDArray[Any]) -> Map:
 
 
 def _round(
-    field: ShadedField, depth_mm: Map, full: FullModel, pitch_mm: float, workers: int
-) -> tuple[RaySlopes, WeightedIntegration, str]:
+    field: ShadedField,
+    depth_mm: Map,
+    full: FullModel,
+    pitch_mm: float,
+    workers: int,
+    terms: Terms,
+) -> tuple[RaySlopes, Map, str]:
     """One near-light round: normals at the present depth, their depth, and how the rim was held."""
     slopes = solve_near_light(
-        field, depth_mm, full.led_positions_mm, full.membrane, workers=workers
+        field,
+        depth_mm,
+        full.led_positions_mm,
+        full.membrane,
+        shadows=terms.shadows,
+        workers=workers,
     )
-    weight, hold = _rim_weights(field, slopes.weight, pitch_mm)
+    slope_x, slope_y = slopes.slope_x, slopes.slope_y
+    if not terms.ray_true_slopes:
+        slope_x, slope_y = (slopes.normals[..., k] / slopes.normals[..., 2] for k in (0, 1))
+    if not terms.weights:
+        plain = integrate_slopes(slope_x, slope_y, pitch_mm=pitch_mm, workers=workers)
+        return slopes, np.asarray(plain.depth_mm, np.float32), "held"
+    weight, hold = slopes.weight, None
+    if terms.free_rim:
+        weight, hold = _rim_weights(field, weight, pitch_mm)
     solved = integrate_weighted(
-        slopes.slope_x,
-        slopes.slope_y,
+        slope_x,
+        slope_y,
         weight,
         pitch_mm=pitch_mm,
         start_mm=depth_mm,
         hold=hold,
         workers=workers,
     )
-    return slopes, solved, "held" if hold is None else "free"
+    return slopes, solved.depth_mm, "held" if hold is None else "free"
 
 
 def _rim_weights(field: ShadedField, weight: Map, pitch_mm: float) -> tuple[Map, Map | None]:
@@ -200,18 +227,23 @@ def _rim_weights(field: ShadedField, weight: Map, pitch_mm: float) -> tuple[Map,
     return np.where(field.inside, weight, weight * hold), hold
 
 
-def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedField:
+def shaded_field(
+    rgb: Map, calibration: Calibration, full: FullModel, *, terms: Terms = ALL_TERMS
+) -> ShadedField:
     """Resample a raw picture and compare it with the background."""
     table = calibration.table
     seen = table.apply(rgb)
     bad = ~np.isfinite(seen)
     seen[bad] = 0.0
     light = unmix(seen, calibration.crosstalk)
-    saturated = table.apply((rgb >= SATURATED).astype(np.float32)) > 0.0
+    missing = bad
+    if terms.saturation:
+        missing = bad | (table.apply((rgb >= SATURATED).astype(np.float32)) > 0.0)
     base = np.maximum(full.background, LEAST_BASE)
     usable = table.valid & (full.background > LEAST_BASE).all(axis=2)
     usable &= (calibration.factors > 0.0).all(axis=2)
-    light = quiet_even_parts(light, usable)
+    if terms.denoising:
+        light = quiet_even_parts(light, usable)
     ratio = np.where(usable[..., None], light / base, 1.0).astype(np.float32)
     sigma = (calibration.noise / np.sqrt(2.0) / base).astype(np.float32)
     grid = table.grid
@@ -219,7 +251,7 @@ def shaded_field(rgb: Map, calibration: Calibration, full: FullModel) -> ShadedF
         ratio,
         sigma,
         neighbourhood(ratio, usable, grid.pitch_mm, full.membrane.bounce_reach_mm),
-        saturated | bad,
+        missing,
         usable,
         filled_inside(usable),
         table.drift,

@@ -85,6 +85,7 @@ def solve_near_light(
     led_positions_mm: NDArray[np.float64],
     membrane: Membrane,
     *,
+    shadows: bool = True,
     workers: int = 1,
 ) -> RaySlopes:
     """Solve every node's normal at the present depth.
@@ -99,6 +100,8 @@ def solve_near_light(
         Sensor frame.
     membrane : Membrane
         Its response.
+    shadows : bool, optional
+        Whether a dark channel is missing information; else its value is believed.
     workers : int, optional
         Threads; each takes a block of rows, so that the result does not depend on their number.
     """
@@ -132,6 +135,7 @@ def solve_near_light(
             shape_of,
             curves,
             dark,
+            shadows,
             slope_x,
             slope_y,
             normals,

@@ -167,6 +167,7 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     shape,
     curves,
     dark,
+    shadows,
     slope_x,
     slope_y,
     normals,
@@ -208,7 +209,7 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     out[k] = 0
                     if saturated[i, j, k]:
                         out[k], missing, side = 1, k, 1
-                    elif not (direct[k] >= low):
+                    elif shadows and not (direct[k] >= low):
                         out[k], missing, side = -1, k, -1
                     if out[k] != 0:
                         missing_count += 1

@@ -20,6 +20,7 @@ from gelpolight_core.reconstruction.normals import (
     solve_slopes,
 )
 from gelpolight_core.reconstruction.poisson import PoissonSolver
+from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.translation import tr
 
 LOOKUP_SIZE = 2048
@@ -34,6 +35,8 @@ class Reconstructor:
         Of the sensor that the pictures come from.
     model : str, optional
         ``paper`` or ``full``; by default the one that the calibration was made for.
+    terms : Terms, optional
+        What the full model reckons with; by default everything.
     workers : int, optional
         Threads of the solve and the transforms.
 
@@ -48,7 +51,12 @@ class Reconstructor:
     """
 
     def __init__(
-        self, calibration: Calibration, *, model: str | None = None, workers: int = 2
+        self,
+        calibration: Calibration,
+        *,
+        model: str | None = None,
+        terms: Terms = ALL_TERMS,
+        workers: int = 2,
     ) -> None:
         self.calibration = calibration
         self.model = model or calibration.model
@@ -58,6 +66,7 @@ class Reconstructor:
                 where=calibration.identity,
                 advice=tr("Calibrate again with --model full, or use --model paper"),
             )
+        self.terms = terms
         self.workers = workers
 
     @cached_property
@@ -132,6 +141,7 @@ class Reconstructor:
             as_linear(self.linearise(frame)),
             self.calibration,
             full,
+            terms=self.terms,
             workers=self.workers,
             uncertainty=uncertainty,
         )

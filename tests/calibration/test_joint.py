@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import BallPixels, neighbourhood, view_directions
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
+from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.press import BallPress
@@ -136,11 +137,18 @@ def found_press(pose: BallPose, random: np.random.Generator) -> BallPress:
     return BallPress("ball", start, 1.8, 0.02, 0.02, None, QualityTable(()))  # type: ignore[arg-type]
 
 
-def refined(truth: Truth, *, noise: float = 0.01, seed: int = 0, count: int = 8) -> JointResult:
+def refined(
+    truth: Truth,
+    *,
+    noise: float = 0.01,
+    seed: int = 0,
+    count: int = 8,
+    terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
+) -> JointResult:
     random = np.random.default_rng(seed)
     presses = [found_press(pose, random) for pose in BALLS[:count]]
     pixels = [pixels_of(pose, truth, noise, random) for pose in BALLS[:count]]
-    return refine_jointly(presses, pixels, MIRROR)
+    return refine_jointly(presses, pixels, MIRROR, terms=terms)
 
 
 @pytest.fixture(scope="module")
@@ -342,3 +350,30 @@ def test_the_neighbourhood_is_a_gaussian_average_and_1_where_nothing_is_known() 
     ratio[60:90, 100:140] = np.nan
     valid[60:90, 100:140] = False
     assert np.isfinite(neighbourhood(ratio, valid, pitch, reach)).all()
+
+
+def test_a_term_that_is_left_out_stays_neutral_and_is_missed(
+    glossy: tuple[Truth, JointResult],
+) -> None:
+    known, whole = glossy
+    matt = refined(known, noise=0.003, terms=CalibrationTerms(gloss=False))
+    assert matt.membrane.gloss == 0.0
+    assert matt.membrane_sd["gloss"] == 0.0
+    assert matt.misfit > 1.5 * whole.misfit
+    stated = refined(known, noise=0.003, terms=CalibrationTerms(led_refinement=False))
+    assert stated.kept == "mirror"
+    np.testing.assert_array_equal(stated.led_positions_mm, MIRROR)
+    assert stated.misfit > 1.1 * whole.misfit
+
+
+def test_light_from_around_and_exponent_are_left_out_alone() -> None:
+    known = truth(exponent=0.9, bounce=0.4)
+    dark = refined(known, noise=0.003, count=5, terms=CalibrationTerms(bounce=False))
+    assert (dark.membrane.bounce, dark.cap_bounce) == (0.0, 0.0)
+    assert dark.membrane.exponent != 1.0
+    lambertian = refined(known, noise=0.003, count=5, terms=CalibrationTerms(exponent=False))
+    assert lambertian.membrane.exponent == 1.0
+    assert lambertian.membrane.bounce > 0.0
+    whole = refined(known, noise=0.003, count=5)
+    assert dark.misfit > 1.1 * whole.misfit
+    assert lambertian.misfit > 1.1 * whole.misfit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -99,3 +100,17 @@ def test_half_the_pixels_see_the_same_scene() -> None:
     # The picture's left edge (-0.5) stays at the same angle.
     full = SensorDesign().camera
     assert (-0.5 - small.cx) / small.fx == pytest.approx((-0.5 - full.cx) / full.fx)
+
+
+def test_the_hard_design_that_is_shipped_is_as_hard_as_it_says() -> None:
+    design = read_design(Path(__file__).parents[2] / "resources" / "designs" / "hard.toml")
+    signal = 200.0 / 255.0
+    noise = (design.camera.shot_variance * signal + design.camera.read_sd**2) ** 0.5
+    assert 20.0 * math.log10(signal / noise) == pytest.approx(35.0, abs=0.1)
+    for led in design.leds:
+        assert math.hypot(led.x_mm, led.y_mm) == pytest.approx(8.5, abs=0.1)
+    assert design.layers.elastomer_thickness_mm == 9.0
+    assert design.photometry.mirror_peak > 1.0
+    rim = 0.5 * design.membrane.working_diameter_mm
+    reach = [math.hypot(p.x_mm, p.y_mm) + 0.5 * p.size_mm for p in design.presses]
+    assert max(reach) > rim

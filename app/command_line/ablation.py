@@ -1,0 +1,97 @@
+"""``gelpolight ablation``: what each term of the full model is worth, and what it costs."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from app.command_line.common import StageProgress
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.experiments.ablation import VARIANTS, Variant, ablate
+from gelpolight_core.experiments.ablation_report import ablation_table, write_ablation
+from gelpolight_core.export.atomic import make_folder, refuse_unwritable
+from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.session.session import read_session
+from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.translation import tr
+
+VIRTUAL = "virtual-sensor"
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "ablation", help=tr("show what each term of the full model is worth and costs")
+    )
+    parser.add_argument(
+        "sessions",
+        type=Path,
+        nargs="*",
+        metavar="SESSION",
+        help=tr("folders with presses and their truth; by default the virtual sensor's"),
+    )
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
+    parser.add_argument(
+        "--terms",
+        metavar="NAMES",
+        help=tr("only these, separated by commas: {names}").format(
+            names=", ".join(variant.name for variant in VARIANTS)
+        ),
+    )
+    parser.add_argument("--repeats", type=int, default=1, metavar="N")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Leave out each term in turn, write the files and print a table for each session."""
+    variants = _chosen(options.terms)
+    for folder in options.sessions:  # before the long work
+        read_session(folder)
+        read_truth(folder / "presses" / "truth.csv")
+    make_folder(options.output)
+    refuse_unwritable(options.output / "ablation.csv")
+    folders = options.sessions or [_virtual_session(options.output / VIRTUAL)]
+    ablations = []
+    for folder in folders:
+        with StageProgress() as tell:
+            ablation = ablate(
+                read_session(folder),
+                variants=variants,
+                repeats=max(options.repeats, 1),
+                progress=partial(_tell_of, folder.name, tell) if len(folders) > 1 else tell,
+            )
+        ablations.append(ablation)
+        print(ablation_table(ablation), end="\n\n", flush=True)
+    written = write_ablation(ablations, options.output)
+    print(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
+    return 0
+
+
+def _tell_of(sensor: str, tell: Any, what: str, share: float) -> None:
+    tell(f"{sensor}: {what}" if what else sensor, share)
+
+
+def _chosen(names: str | None) -> tuple[Variant, ...]:
+    if names is None:
+        return VARIANTS
+    known = {variant.name: variant for variant in VARIANTS}
+    asked = [name.strip() for name in names.split(",")]
+    for name in asked:
+        if name not in known:
+            raise InputError(
+                tr("there is no term {name!r}").format(name=name),
+                where="--terms",
+                advice=tr("Use some of {names}").format(names=", ".join(known)),
+            )
+    return tuple(known[name] for name in asked)
+
+
+def _virtual_session(folder: Path) -> Path:
+    """Simulate the virtual sensor, unless it was done for an earlier ablation."""
+    if not (folder / "session.toml").is_file():
+        with StageProgress() as tell:
+            simulate_session(SensorDesign(), folder, progress=tell)
+    return folder

@@ -1,0 +1,298 @@
+"""What each term of the full model is worth, and what it costs: each left out in turn.
+
+Terms of a frame are left out of the reconstruction alone. Terms of the membrane and the LEDs are
+left out of the joint refinement, so that the other terms can make up for them as far as they can.
+Times are those of the processor, all threads together, so that other programs at work do not count.
+Every press is reconstructed by all variants before the next one is taken, so that a slow spell of
+the machine meets all alike; what a term costs is the median of the differences within a press.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.pipeline import assemble, stages_of
+from gelpolight_core.calibration.stages import (
+    StageResults,
+    bare_calibration,
+    refine_with,
+    run_stage,
+)
+from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.score import (
+    DepthScore,
+    ScoreSummary,
+    TrueDepth,
+    read_true_depth,
+    score_depth,
+    summarise,
+)
+from gelpolight_core.measurement.truth import PressTruth, read_truth
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.session.session import Session, require_colour
+from gelpolight_core.translation import tr
+
+RIM_MM = 1.0
+"""What lies nearer to the edge of the working circle is not scored: the truth knows no edge."""
+CALIBRATING = 0.6
+"""Share of the work that the calibrations are, for the progress."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """The full model with a term left out.
+
+    Attributes
+    ----------
+    name : str
+        On the command line and in files.
+    label : str
+        What is done instead, for a person.
+    terms : Terms
+        Of the reconstruction.
+    calibration : CalibrationTerms
+        Of the joint refinement.
+    model : str
+        ``full``, or ``paper`` for the paper's model, which has none of the terms.
+    """
+
+    name: str
+    label: str
+    terms: Terms = ALL_TERMS
+    calibration: CalibrationTerms = ALL_CALIBRATION_TERMS
+    model: str = "full"
+
+
+EVERYTHING = Variant("all", "all terms on")
+VARIANTS = (
+    Variant("near_light_0", "light frozen at the flat membrane", Terms(near_light_rounds=0)),
+    Variant("near_light_1", "near light: 1 coarse round", Terms(near_light_rounds=1)),
+    Variant("near_light_3", "near light: 3 coarse rounds", Terms(near_light_rounds=3)),
+    Variant("ray_true_slopes", "slopes as if rays ran straight", Terms(ray_true_slopes=False)),
+    Variant("true_positions", "depth left at the flat position", Terms(true_positions=False)),
+    Variant("shadows", "dark channels believed", Terms(shadows=False)),
+    Variant("saturation", "saturated channels believed", Terms(saturation=False)),
+    Variant("weights", "plain sine transform, no weights", Terms(weights=False)),
+    Variant("free_rim", "rim always held at depth 0", Terms(free_rim=False)),
+    Variant("denoising", "even parts not averaged", Terms(denoising=False)),
+    Variant("bounce", "no light from around", calibration=CalibrationTerms(bounce=False)),
+    Variant("gloss", "no glossy lobe", calibration=CalibrationTerms(gloss=False)),
+    Variant("curves", "never a one-dimensional curve", calibration=CalibrationTerms(curves=False)),
+    Variant("crosstalk", "crosstalk left in", calibration=CalibrationTerms(crosstalk=False)),
+    Variant(
+        "led_refinement",
+        "LEDs as the mirror shows them",
+        calibration=CalibrationTerms(led_refinement=False),
+    ),
+    Variant("paper", "the paper's model", model="paper"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class TermResult:
+    """One variant on one sensor.
+
+    Attributes
+    ----------
+    variant : Variant
+        What was left out.
+    score : ScoreSummary
+        Errors without the term.
+    frame_ms : float
+        Median processor time of a frame without the term.
+    cost_ms : float
+        What the term adds to a frame: median difference to all terms on; 0 for all terms on.
+    calibration_s : float
+        Processor time of the joint refinement that the variant rests on; NaN for the paper's
+        model.
+    """
+
+    variant: Variant
+    score: ScoreSummary
+    frame_ms: float
+    cost_ms: float
+    calibration_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ablation:
+    """All variants on one sensor; the first has all terms on.
+
+    Attributes
+    ----------
+    sensor : str
+        The session folder's name.
+    results : tuple of TermResult
+        In the order of :data:`VARIANTS`.
+    repeats : int
+        How often each press was timed.
+    """
+
+    sensor: str
+    results: tuple[TermResult, ...]
+    repeats: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Press:
+    """A press: its row of ``truth.csv``, its picture and its true depth."""
+
+    row: PressTruth
+    rgb: NDArray[np.float32]
+    truth: TrueDepth
+
+
+@dataclass(slots=True)
+class _Candidate:
+    """A variant at work: its reconstructor, and what was seen of it so far."""
+
+    variant: Variant
+    reconstruct: Reconstructor
+    calibration_s: float
+    scores: list[DepthScore] = field(default_factory=list)
+    times_ms: list[float] = field(default_factory=list)
+
+
+def ablate(
+    session: Session,
+    *,
+    variants: Sequence[Variant] = VARIANTS,
+    repeats: int = 1,
+    workers: int = 2,
+    progress: Progress | None = None,
+) -> Ablation:
+    """Calibrate a session and reconstruct its presses with each term left out.
+
+    Parameters
+    ----------
+    session : Session
+        With ``presses/truth.csv`` and ``truth/*.npz`` beside the pictures of the stages.
+    variants : sequence of Variant, optional
+        To be compared with all terms on.
+    repeats : int, optional
+        How often every press is reconstructed, for the times.
+    workers : int, optional
+        Threads of a reconstruction.
+    progress : callable, optional
+        Told what is being done and the share done, 0..1.
+
+    Raises
+    ------
+    InputError
+        If the session cannot be calibrated, or a press has no picture or no truth.
+    """
+    tell = progress or (lambda _what, _share: None)
+    radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
+    seen = run_stage(Stage.RESPONSE, session, StageResults()).response
+    linear = session if seen is None else replace(session, response=seen.response)
+    presses = _presses(linear, radius_mm)
+    candidates = _calibrated(session, (EVERYTHING, *variants), workers, tell)
+    for candidate in candidates:
+        candidate.reconstruct.depth(presses[0].rgb, normals=False)  # makes maps and kernels ready
+    for number, press in enumerate(presses):
+        tell(press.row.file, CALIBRATING + (1.0 - CALIBRATING) * number / len(presses))
+        _take_in_turn(candidates, press, repeats, radius_mm)
+    tell("", 1.0)
+    everything = np.array(candidates[0].times_ms)
+    results = tuple(
+        TermResult(
+            c.variant,
+            summarise(c.scores),
+            float(np.median(c.times_ms)),
+            float(np.median(everything - c.times_ms)),
+            c.calibration_s,
+        )
+        for c in candidates
+    )
+    return Ablation(session.folder.resolve().name, results, repeats)
+
+
+def _presses(session: Session, radius_mm: float) -> list[_Press]:
+    """Read all presses before the long work, so that what is missing is said at once."""
+    folder = session.folder / "presses"
+    presses = []
+    for row in read_truth(folder / "truth.csv").rows:
+        picture = session.picture(folder / row.file)
+        require_colour(picture, where=str(folder / row.file))
+        truth = read_true_depth((session.folder / "truth" / row.file).with_suffix(".npz"))
+        press = _Press(row, picture.rgb, truth)
+        _score(press, truth, radius_mm)
+        presses.append(press)
+    return presses
+
+
+def _score(press: _Press, found: TrueDepth | HeightMap, radius_mm: float) -> DepthScore:
+    height_mm = press.row.truth.height_mm
+    try:
+        return score_depth(
+            np.asarray(found.depth_mm, np.float32),
+            found.x_mm,
+            found.y_mm,
+            press.truth,
+            height_mm=height_mm,
+            radius_mm=radius_mm,
+        )
+    except ValueError as error:
+        raise InputError(
+            tr("its truth has no plateau of {h:g} mm in view, {r:g} mm about the centre").format(
+                h=height_mm, r=radius_mm
+            ),
+            where=press.row.file,
+            advice=tr("Mend the height in truth.csv, or take the row out"),
+        ) from error
+
+
+def _take_in_turn(
+    candidates: Sequence[_Candidate], press: _Press, repeats: int, radius_mm: float
+) -> None:
+    """Reconstruct one press by every candidate, round by round."""
+    for repeat in range(repeats):
+        for candidate in candidates:
+            begin = time.process_time()
+            found = candidate.reconstruct.depth(press.rgb, normals=False)
+            candidate.times_ms.append(1e3 * (time.process_time() - begin))
+            if repeat == 0:
+                candidate.scores.append(_score(press, found, radius_mm))
+
+
+def _calibrated(
+    session: Session, variants: Sequence[Variant], workers: int, tell: Progress
+) -> list[_Candidate]:
+    """Calibrate the stages once, and refine them for every set of terms that is asked for."""
+    asked = {variant.calibration for variant in variants}
+    whole = 1 + len(asked)
+    results = StageResults()
+    stages = stages_of("paper")
+    for number, stage in enumerate(stages):
+        tell(stage.value, CALIBRATING * number / len(stages) / whole)
+        results = run_stage(stage, session, results)
+    paper = assemble(session, results, model="paper").calibration
+    made: dict[CalibrationTerms, tuple[Calibration, float]] = {}
+    candidates = []
+    for variant in variants:
+        terms = variant.calibration
+        if terms not in made:
+            tell(variant.label, CALIBRATING * (1 + len(made)) / whole)
+            begin = time.process_time()
+            refined = bare_calibration(session, refine_with(results, terms=terms))
+            made[terms] = refined, time.process_time() - begin
+        calibration, seconds = made[terms]
+        if variant.model == "paper":
+            calibration, seconds = paper, float("nan")
+        reconstruct = Reconstructor(
+            calibration, model=variant.model, terms=variant.terms, workers=workers
+        )
+        candidates.append(_Candidate(variant, reconstruct, seconds))
+    return candidates

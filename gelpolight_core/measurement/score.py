@@ -1,0 +1,166 @@
+"""How far a depth map is from the true one: height of the plateau, size at half height, depth."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+PLATEAU = 0.98
+KEYS = ("depth_mm", "x0_mm", "y0_mm", "pitch_mm")
+
+
+@dataclass(frozen=True, slots=True)
+class TrueDepth:
+    """The true depth of a press on a metric grid in the sensor frame.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float64
+        Indentation.
+    x_mm, y_mm : (columns,), (rows,) float64
+        Nodes.
+    """
+
+    depth_mm: NDArray[np.float64]
+    x_mm: NDArray[np.float64]
+    y_mm: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class DepthScore:
+    """Signed errors of one depth map.
+
+    Attributes
+    ----------
+    height_percent : float
+        Median over the true plateau (above 98 % of the nominal height), beside the true median.
+    size_percent : float
+        Root of the area above half the nominal height, beside the true one.
+    rms_um : float
+        Root mean square of the difference of the depths.
+    """
+
+    height_percent: float
+    size_percent: float
+    rms_um: float
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreSummary:
+    """Scores of several presses.
+
+    Attributes
+    ----------
+    height_percent, size_percent : float
+        Mean absolute errors.
+    rms_um, worst_rms_um : float
+        Mean and largest RMS.
+    count : int
+        Presses.
+    """
+
+    height_percent: float
+    size_percent: float
+    rms_um: float
+    worst_rms_um: float
+    count: int
+
+
+def score_depth(
+    depth_mm: NDArray[np.float32],
+    x_mm: NDArray[np.floating],
+    y_mm: NDArray[np.floating],
+    truth: TrueDepth,
+    *,
+    height_mm: float,
+    radius_mm: float,
+) -> DepthScore:
+    """Compare a depth map with the truth at the truth's nodes.
+
+    Parameters
+    ----------
+    depth_mm : (rows, columns)
+        Depth on a regular grid; what is not finite counts as 0.
+    x_mm, y_mm : (columns,), (rows,)
+        Its nodes, sensor frame.
+    truth : TrueDepth
+        What was pressed.
+    height_mm : float
+        Nominal height of the object.
+    radius_mm : float
+        Only nodes within it of the sensor frame's origin count.
+
+    Raises
+    ------
+    ValueError
+        If no node of the true plateau lies within the radius and the depth map.
+    """
+    x, y = np.meshgrid(truth.x_mm, truth.y_mm)
+    column = (x - x_mm[0]) / (x_mm[1] - x_mm[0])
+    row = (y - y_mm[0]) / (y_mm[1] - y_mm[0])
+    rows, columns = depth_mm.shape
+    counts = (column >= 0) & (row >= 0) & (column <= columns - 1) & (row <= rows - 1)
+    counts &= np.hypot(x, y) < radius_mm
+    known = np.nan_to_num(depth_mm, nan=0.0, posinf=0.0, neginf=0.0).astype(np.float32)
+    found = cv2.remap(
+        known, column.astype(np.float32), row.astype(np.float32), cv2.INTER_LINEAR
+    ).astype(np.float64)
+    true = truth.depth_mm
+    top = counts & (true > PLATEAU * height_mm)
+    if not top.any():
+        raise ValueError(f"no plateau of {height_mm} mm within {radius_mm} mm of the centre")
+    area = [np.count_nonzero(counts & (depth > 0.5 * height_mm)) for depth in (found, true)]
+    return DepthScore(
+        float(100.0 * (np.median(found[top]) / np.median(true[top]) - 1.0)),
+        float(100.0 * (np.sqrt(area[0] / area[1]) - 1.0)),
+        float(1e3 * np.sqrt(np.mean((found - true)[counts] ** 2))),
+    )
+
+
+def summarise(scores: Iterable[DepthScore]) -> ScoreSummary:
+    """Return the mean absolute errors of several presses, and the worst RMS."""
+    table = np.abs([(s.height_percent, s.size_percent, s.rms_um) for s in scores])
+    height, size, rms = table.mean(axis=0).tolist()
+    return ScoreSummary(height, size, rms, float(table[:, 2].max()), len(table))
+
+
+def read_true_depth(path: Path) -> TrueDepth:
+    """Read the truth of a press (npz: depth_mm, x0_mm, y0_mm, pitch_mm).
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not such a file, or lacks one of these.
+    """
+    if not path.is_file():
+        raise InputError(
+            tr("there is no such file"),
+            where=str(path),
+            advice=tr("Use a session that holds the true depth of its presses"),
+        )
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
+            depth, x0, y0, pitch = (np.asarray(data[key], np.float64) for key in KEYS)
+    except (KeyError, TypeError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        raise _not_a_truth(path) from error
+    if depth.ndim != 2 or not pitch > 0.0 or not np.isfinite(depth).all():
+        raise _not_a_truth(path)
+    rows, columns = depth.shape
+    return TrueDepth(depth, x0 + pitch * np.arange(columns), y0 + pitch * np.arange(rows))
+
+
+def _not_a_truth(path: Path) -> InputError:
+    return InputError(
+        tr("the file does not hold the true depth of a press"),
+        where=str(path),
+        advice=tr("It needs {keys}; simulate the session again").format(keys=", ".join(KEYS)),
+    )

@@ -1,0 +1,156 @@
+"""Scoring a depth map against the truth, on shapes whose errors are known beforehand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.score import (
+    DepthScore,
+    TrueDepth,
+    read_true_depth,
+    score_depth,
+    summarise,
+)
+
+PITCH_MM = 0.05
+RADIUS_MM = 6.0
+
+
+def axis(pitch_mm: float, reach_mm: float = 7.0) -> np.ndarray:
+    return pitch_mm * np.arange(-round(reach_mm / pitch_mm), round(reach_mm / pitch_mm) + 1)
+
+
+def frustum(
+    x_mm: np.ndarray, y_mm: np.ndarray, *, height_mm: float = 1.0, radius_mm: float = 2.5, at=(0, 0)
+) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Return a round table with walls 0.4 mm wide, half its height at `radius_mm`."""
+    x, y = np.meshgrid(x_mm, y_mm)
+    away = np.hypot(x - at[0], y - at[1])
+    return height_mm * np.clip(0.5 + (radius_mm - away) / 0.4, 0.0, 1.0)
+
+
+def scored(found: np.ndarray, x_mm: np.ndarray, y_mm: np.ndarray, **options: float) -> DepthScore:
+    nodes = axis(PITCH_MM)
+    truth = TrueDepth(frustum(nodes, nodes), nodes, nodes)
+    given_options = {"height_mm": 1.0, "radius_mm": RADIUS_MM, **options}
+    return score_depth(found.astype(np.float32), x_mm, y_mm, truth, **given_options)
+
+
+def test_the_truth_itself_has_no_error() -> None:
+    nodes = axis(PITCH_MM)
+    score = scored(frustum(nodes, nodes), nodes, nodes)
+    assert score.height_percent == pytest.approx(0.0, abs=1e-4)
+    assert score.size_percent == pytest.approx(0.0, abs=1e-9)
+    assert score.rms_um < 1e-3
+
+
+@given(st.floats(0.8, 1.2))
+def test_a_height_that_is_wrong_by_a_share_is_said_as_that_share(share: float) -> None:
+    nodes = axis(PITCH_MM)
+    score = scored(share * frustum(nodes, nodes), nodes, nodes)
+    assert score.height_percent == pytest.approx(100 * (share - 1), abs=1e-3)
+
+
+@given(st.floats(2.0, 3.0))
+def test_a_table_of_another_width_has_its_own_size_at_half_height(radius_mm: float) -> None:
+    nodes = axis(PITCH_MM)
+    score = scored(frustum(nodes, nodes, radius_mm=radius_mm), nodes, nodes)
+    # The area is counted in nodes: the rim is uncertain by a small part of one, 2 % of 2.5 mm.
+    assert score.size_percent == pytest.approx(100 * (radius_mm / 2.5 - 1), abs=0.5)
+    if abs(radius_mm - 2.5) < 0.2:  # the plateau is still on the plateau
+        assert score.height_percent == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_depth_that_is_off_everywhere_is_off_by_its_rms() -> None:
+    nodes = axis(PITCH_MM)
+    score = scored(frustum(nodes, nodes) + 0.02, nodes, nodes)
+    assert score.rms_um == pytest.approx(20.0, abs=1e-3)
+    assert score.height_percent == pytest.approx(2.0, abs=1e-3)
+
+
+def test_a_table_at_another_place_has_its_size_and_height_but_not_its_depth() -> None:
+    nodes = axis(PITCH_MM)
+    moved = 0.05
+    score = scored(frustum(nodes, nodes, at=(moved, 0.0)), nodes, nodes)
+    assert score.size_percent == pytest.approx(0.0, abs=0.1)
+    assert score.height_percent == pytest.approx(0.0, abs=1e-4)
+    # Walls of slope 2.5 on a ring 2 pi 2.5 by 0.4 mm; across, the mean of cos^2 is a half.
+    expected = 1e3 * 2.5 * moved * np.sqrt(0.5 * 2 * np.pi * 2.5 * 0.4 / (np.pi * RADIUS_MM**2))
+    assert score.rms_um == pytest.approx(expected, rel=0.1)
+
+
+@given(st.floats(0.02, 0.09), st.floats(-0.04, 0.04))
+def test_the_maps_grid_does_not_matter(pitch_mm: float, shift_mm: float) -> None:
+    x_mm = axis(pitch_mm) + shift_mm
+    y_mm = axis(pitch_mm, 6.5) - shift_mm
+    score = scored(frustum(x_mm, y_mm), x_mm, y_mm)
+    assert score.height_percent == pytest.approx(0.0, abs=1e-3)
+    assert score.size_percent == pytest.approx(0.0, abs=0.2)
+    assert score.rms_um < 5.0
+
+
+def test_rows_are_y_and_columns_are_x() -> None:
+    nodes = axis(PITCH_MM)
+    wide = TrueDepth(frustum(nodes, nodes, at=(1.5, 0.0)), nodes, nodes)
+    options = {"height_mm": 1.0, "radius_mm": RADIUS_MM}
+    right = frustum(nodes, nodes, at=(1.5, 0.0)).astype(np.float32)
+    assert score_depth(right, nodes, nodes, wide, **options).rms_um < 1e-3
+    assert score_depth(np.ascontiguousarray(right.T), nodes, nodes, wide, **options).rms_um > 100.0
+
+
+def test_what_lies_beyond_the_radius_does_not_count() -> None:
+    nodes = axis(PITCH_MM)
+    found = frustum(nodes, nodes)
+    found[np.hypot(*np.meshgrid(nodes, nodes)) > RADIUS_MM + 0.1] = 3.0
+    assert scored(found, nodes, nodes).rms_um < 1e-3
+    found[len(nodes) // 2, 30] = np.nan  # counts as 0, which it is there
+    assert scored(found, nodes, nodes).rms_um < 1e-3
+
+
+def test_a_truth_without_the_stated_height_is_refused() -> None:
+    nodes = axis(PITCH_MM)
+    with pytest.raises(ValueError, match="plateau"):
+        scored(frustum(nodes, nodes), nodes, nodes, height_mm=1.1)
+
+
+def test_a_summary_holds_mean_absolute_errors_and_the_worst() -> None:
+    summary = summarise([DepthScore(1.0, -2.0, 10.0), DepthScore(-3.0, 1.0, 30.0)])
+    assert summary.height_percent == pytest.approx(2.0)
+    assert summary.size_percent == pytest.approx(1.5)
+    assert (summary.rms_um, summary.worst_rms_um, summary.count) == (20.0, 30.0, 2)
+
+
+def test_the_truth_of_the_virtual_sensor_is_read_where_it_is(virtual_session: Path) -> None:
+    truth = read_true_depth(virtual_session / "truth" / "cylinder_s5_d100.npz")
+    x, y = np.meshgrid(truth.x_mm, truth.y_mm)
+    top = truth.depth_mm > 0.98
+    # The design presses it at (3.6, -2.2).
+    assert (x[top].mean(), y[top].mean()) == pytest.approx((3.6, -2.2), abs=0.02)
+
+
+@pytest.mark.parametrize("content", [b"", b"not an archive", b"PK\x03\x04cut", None])
+def test_a_truth_that_cannot_be_read_is_refused(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "press.npz"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError):
+        read_true_depth(path)
+
+
+def test_a_truth_that_lacks_a_part_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "press.npz", depth_mm=np.zeros((3, 3)), pitch_mm=0.05)
+    with pytest.raises(InputError, match="true depth"):
+        read_true_depth(tmp_path / "press.npz")
+
+
+def test_a_bare_array_is_no_truth(tmp_path: Path) -> None:
+    np.save(tmp_path / "press.npy", np.zeros((3, 3)))
+    (tmp_path / "press.npy").rename(tmp_path / "press.npz")
+    with pytest.raises(InputError, match="true depth"):
+        read_true_depth(tmp_path / "press.npz")

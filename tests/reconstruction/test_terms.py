@@ -1,0 +1,190 @@
+"""Each term of a frame's reconstruction, left out: what it is there for then goes wrong."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.measurement.score import DepthScore, read_true_depth, score_depth
+from gelpolight_core.reconstruction.full import FullDepth, reconstruct_full, shaded_field
+from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.terms import Terms
+from gelpolight_core.session.session import read_picture
+from gelpolight_core.simulation.indenters import Cylinder
+from gelpolight_core.simulation.indenters import press as pressed
+from gelpolight_core.simulation.virtual_sensor import PressedMembrane, VirtualSensor
+
+Map = NDArray[np.float32]
+NAME = "cylinder_s4_d150"  # deep, with steep walls and shadows
+
+
+@pytest.fixture(scope="module")
+def rgb(virtual_session: Path) -> Map:
+    return read_picture(virtual_session / "presses" / f"{NAME}.png").rgb
+
+
+@pytest.fixture(scope="module")
+def whole(rgb: Map, virtual_calibration: Calibration) -> FullDepth:
+    """Return the press with all terms on."""
+    return solved(rgb, virtual_calibration)
+
+
+def solved(rgb: Map, calibration: Calibration, **left_out: bool | int) -> FullDepth:
+    assert calibration.full is not None
+    return reconstruct_full(rgb, calibration, calibration.full, terms=Terms(**left_out))  # type: ignore[arg-type]
+
+
+def scored(result: FullDepth, calibration: Calibration, session: Path) -> DepthScore:
+    grid = calibration.table.grid
+    truth = read_true_depth(session / "truth" / f"{NAME}.npz")
+    return score_depth(result.depth_mm, grid.x_mm, grid.y_mm, truth, height_mm=1.5, radius_mm=12.0)
+
+
+def test_all_terms_on_is_the_default_to_the_last_bit(
+    rgb: Map, whole: FullDepth, virtual_calibration: Calibration
+) -> None:
+    assert virtual_calibration.full is not None
+    default = reconstruct_full(rgb, virtual_calibration, virtual_calibration.full)
+    for item in fields(FullDepth):
+        a, b = getattr(default, item.name), getattr(whole, item.name)
+        np.testing.assert_array_equal(a, b)
+    by_name = Reconstructor(virtual_calibration).depth(rgb)
+    np.testing.assert_array_equal(by_name.depth_mm, whole.depth_mm)
+
+
+def test_light_frozen_at_the_flat_membrane_makes_the_press_too_high(
+    rgb: Map, whole: FullDepth, virtual_calibration: Calibration, virtual_session: Path
+) -> None:
+    """PHYSICS: nearer light is brighter, by several percent of a depth of 1.5 mm."""
+    frozen = solved(rgb, virtual_calibration, near_light_rounds=0)
+    assert len(frozen.changes_mm) == 1
+    error = scored(frozen, virtual_calibration, virtual_session).height_percent
+    best = scored(whole, virtual_calibration, virtual_session).height_percent
+    assert abs(error) > abs(best) + 1.0
+
+
+def test_every_near_light_round_comes_nearer_to_the_last(
+    rgb: Map, whole: FullDepth, virtual_calibration: Calibration
+) -> None:
+    away = [
+        np.abs(
+            solved(rgb, virtual_calibration, near_light_rounds=n).depth_mm - whole.depth_mm
+        ).max()
+        for n in (0, 1, 2, 3)
+    ]
+    assert away[0] > 2.0 * away[1] > 2.0 * away[2]
+    assert away[3] == 0.0
+
+
+def test_slopes_as_if_rays_ran_straight_make_another_depth(
+    rgb: Map, whole: FullDepth, virtual_calibration: Calibration, virtual_session: Path
+) -> None:
+    straight = solved(rgb, virtual_calibration, ray_true_slopes=False)
+    worse = scored(straight, virtual_calibration, virtual_session)
+    best = scored(whole, virtual_calibration, virtual_session)
+    assert worse.rms_um > 1.5 * best.rms_um
+
+
+def test_a_depth_left_at_its_flat_position_lies_beside_the_truth(
+    rgb: Map, whole: FullDepth, virtual_calibration: Calibration, virtual_session: Path
+) -> None:
+    left = solved(rgb, virtual_calibration, true_positions=False)
+    assert left.depth_mm.max() == pytest.approx(whole.depth_mm.max(), rel=1e-3)
+    worse = scored(left, virtual_calibration, virtual_session)
+    assert worse.rms_um > 2.0 * scored(whole, virtual_calibration, virtual_session).rms_um
+    # Farther from the centre a ray meets the raised membrane nearer to it: the press looks moved.
+    top = whole.depth_mm > 0.75
+    grid = virtual_calibration.table.grid
+    x, y = np.meshgrid(grid.x_mm, grid.y_mm)
+    moved = [np.hypot(x[m].mean(), y[m].mean()) for m in (top, left.depth_mm > 0.75)]
+    row, column = np.argwhere(top).mean(axis=0).round().astype(int)
+    lean = np.hypot(*virtual_calibration.table.drift[row, column])
+    assert moved[1] - moved[0] == pytest.approx(0.75 * lean, rel=0.15)
+
+
+def test_dark_channels_that_are_believed_are_not_flagged_and_cost_accuracy(
+    rgb: Map, whole: FullDepth, virtual_calibration: Calibration, virtual_session: Path
+) -> None:
+    believed = solved(rgb, virtual_calibration, shadows=False)
+    assert ((whole.flags & int(Flag.DARK)) != 0).sum() > 100
+    assert not (believed.flags & int(Flag.DARK)).any()
+    worse = scored(believed, virtual_calibration, virtual_session)
+    assert worse.rms_um > scored(whole, virtual_calibration, virtual_session).rms_um
+
+
+def test_saturated_channels_that_are_believed_flatten_what_faces_the_light(
+    rgb: Map, virtual_calibration: Calibration
+) -> None:
+    overexposed = np.minimum(rgb * 1.6, 1.0).astype(np.float32)
+    full = virtual_calibration.full
+    assert full is not None
+    brighter = replace(full, background=full.background * np.float32(1.6))
+    minded, believed = (
+        reconstruct_full(overexposed, virtual_calibration, brighter, terms=Terms(saturation=on))
+        for on in (True, False)
+    )
+    assert ((minded.flags & int(Flag.SATURATED)) != 0).sum() > 100
+    assert not (believed.flags & int(Flag.SATURATED)).any()
+    cut = solved(rgb, virtual_calibration)
+    missed = [np.sqrt(np.mean((r.depth_mm - cut.depth_mm) ** 2)) for r in (minded, believed)]
+    assert missed[1] > 1.5 * missed[0]
+
+
+def test_a_pixel_that_is_not_a_number_is_missing_whatever_is_believed(
+    rgb: Map, virtual_calibration: Calibration
+) -> None:
+    spoilt = rgb.copy()
+    spoilt[230:233, 120:123] = np.nan
+    result = solved(spoilt, virtual_calibration, saturation=False, shadows=False)
+    assert np.isfinite(result.depth_mm).all()
+
+
+def test_without_weights_what_cannot_be_seen_spoils_the_depth(
+    rgb: Map, whole: FullDepth, virtual_calibration: Calibration, virtual_session: Path
+) -> None:
+    even = solved(rgb, virtual_calibration, weights=False)
+    worse = scored(even, virtual_calibration, virtual_session)
+    best = scored(whole, virtual_calibration, virtual_session)
+    assert worse.rms_um > best.rms_um + 2.0
+
+
+def test_a_rim_that_is_held_pulls_a_contact_that_crosses_it_down(
+    virtual_calibration: Calibration,
+) -> None:
+    design = SensorDesign().scaled(0.5)
+    surface = pressed(Cylinder(6.0, 0.8, 0.05), x_mm=-11.0, y_mm=3.0, decay_mm=0.7, pitch_mm=0.04)
+    frame = VirtualSensor(design, 0).frame(PressedMembrane(surface), stream="rim")
+    rgb = frame.astype(np.float32) / 255.0
+    free = solved(rgb, virtual_calibration)
+    held = solved(rgb, virtual_calibration, free_rim=False)
+    assert (free.rim, held.rim) == ("free", "held")
+    grid = virtual_calibration.table.grid
+    x, y = np.meshgrid(grid.x_mm, grid.y_mm)
+    top = (np.hypot(x + 11.0, y - 3.0) < 2.7) & (np.hypot(x, y) < 12.0)
+    error = [abs(np.median(r.depth_mm[top]) - 0.8) for r in (free, held)]
+    assert error[1] > 2.0 * error[0]
+
+
+def test_denoising_quiets_the_even_ground(rgb: Map, virtual_calibration: Calibration) -> None:
+    full = virtual_calibration.full
+    assert full is not None
+    noise = []
+    for on in (True, False):
+        field = shaded_field(rgb, virtual_calibration, full, terms=Terms(denoising=on))
+        x, y = np.meshgrid(field.x_mm, field.y_mm)
+        ground = (np.hypot(x - 1.2, y - 4.1) > 6.0) & (np.hypot(x, y) < 11.0) & field.usable
+        noise.append(float(np.std(field.ratio[ground] - 1.0)))
+    # A quarter of the camera's own noise stays, and all of what the membrane does there.
+    assert noise[0] < 0.75 * noise[1]
+
+
+def test_the_press_used_here_is_the_designs() -> None:
+    item = SensorDesign().presses[2]
+    assert (item.shape, item.size_mm, item.depth_mm) == ("cylinder", 4.0, 1.5)
