@@ -14,29 +14,102 @@ from numpy.typing import NDArray
 
 Map = NDArray[np.float32]
 QUIET_PX = 1.2
-WIDE_PX = 2.4
+WIDER_PX = (2.4, 4.8, 9.6)
+# Relative noise below which the curvature of normals over brightness tilts nothing that shows.
+CALM = 0.01
 SIGNIFICANT = 4.0
 
 
-def quiet_even_parts(light: Map, usable: NDArray[np.bool_]) -> Map:
-    """Return the picture with its even parts averaged over a few nodes.
+def quiet_even_parts(
+    light: Map, background: Map, sigma: Map, usable: NDArray[np.bool_]
+) -> tuple[Map, Map]:
+    """Return press over background with its even parts averaged, and the noise that is left.
+
+    Press and background are averaged alike, so that neither the fall of the light nor a speck of
+    the membrane shows in their ratio. Where little light leaves more noise than `CALM`, wider
+    averages are taken, as far as the picture is even over them.
 
     Parameters
     ----------
-    light : (rows, columns, 3) float32
-        Linear light.
+    light, background : (rows, columns, 3) float32
+        Linear light, the background above 0.
+    sigma : (rows, columns, 3) float32
+        Standard deviation of their ratio's noise.
     usable : (rows, columns) bool
         Nodes with light and membrane; the noise is measured there.
+
+    Returns
+    -------
+    ratio, sigma : (rows, columns, 3) float32
+        Averaged, and its standard deviation.
     """
+    ratio = light / background
     if not usable.any():
-        return light
-    quiet = np.asarray(cv2.GaussianBlur(light, (0, 0), QUIET_PX), np.float32)
-    edge = _edges(light, quiet, usable)
-    return np.asarray(quiet + edge[..., None] * (light - quiet), np.float32)
+        return ratio, sigma
+    noise = sigma
+    seen = usable[..., None].astype(np.float32)
+    light, background = light * seen, background * seen
+    for width_px in (QUIET_PX, *WIDER_PX):
+        need = np.float32(1.0)
+        if width_px > QUIET_PX:
+            need = np.clip(noise / np.float32(CALM) - np.float32(1.0), 0.0, 1.0)
+            need[~usable] = 0.0
+            if not need.any():
+                break
+        quiet, edge = _quieted(light, background, usable, width_px)
+        share = (np.float32(1.0) - edge)[..., None] * need
+        ratio = ratio + share * (quiet - ratio)
+        left = np.float32(1.0 / (2.0 * np.sqrt(np.pi) * width_px))
+        noise = noise + share * (sigma * left - noise)
+    return np.asarray(ratio, np.float32), np.asarray(noise, np.float32)
+
+
+def _quieted(
+    light: Map, background: Map, usable: NDArray[np.bool_], width_px: float
+) -> tuple[Map, Map]:
+    """Return the averaged ratio, and how far (rows, columns) it is to be left as it is, 0..1."""
+    wide_px = 2.0 * width_px
+    least = np.float32(1e-6)
+    below = np.maximum(_average(background, width_px), least)
+    average = _average(light, width_px)
+    quiet = average / below
+    wide = _average(light, wide_px) / np.maximum(_average(background, wide_px), least)
+    seen = light[usable]
+    level = np.maximum(np.median(seen, axis=0), least)
+    noise = 1.4826 * np.median(np.abs(seen - average[usable]), axis=0) + least
+    # Shot noise grows as the root of the light.
+    local = noise * np.sqrt(np.maximum(average / level, 0.2)) / below
+    # White noise of sd 1 leaves this much between the two averages.
+    left = np.sqrt(1.0 / width_px**2 + 1.0 / wide_px**2 - 4.0 / (width_px**2 + wide_px**2))
+    limit = SIGNIFICANT * local * left / np.sqrt(4.0 * np.pi)
+    excess = (np.abs(quiet - wide) / limit).max(axis=2) - 1.0
+    edge = np.where(usable, np.clip(excess, 0.0, 1.0), 0.0).astype(np.float32)
+    reach = 2 * round(2.0 * width_px / QUIET_PX) + 1
+    grown = cv2.dilate(edge, np.ones((reach, reach), np.uint8))
+    return quiet, np.asarray(cv2.GaussianBlur(grown, (0, 0), 1.5 * width_px / QUIET_PX))
+
+
+def _average(light: Map, width_px: float) -> Map:
+    """Return the average over a Gaussian; wide ones are taken over blocks of pixels."""
+    block = int(width_px / QUIET_PX / 2.0)
+    if block < 2:
+        return np.asarray(cv2.GaussianBlur(light, (0, 0), width_px), np.float32)
+    rows, columns = light.shape[:2]
+    size = (-(-columns // block), -(-rows // block))
+    small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+    # The blocks themselves average already.
+    spread_px = np.sqrt(width_px**2 - (block**2 - 1.0) / 12.0) / block
+    small = cv2.GaussianBlur(small, (0, 0), float(spread_px))
+    return np.asarray(cv2.resize(small, (columns, rows), interpolation=cv2.INTER_LINEAR))
 
 
 def noise_left(
-    light: Map, usable: NDArray[np.bool_], pixels_per_node: Map, *, resampled: int = 1
+    light: Map,
+    background: Map,
+    usable: NDArray[np.bool_],
+    pixels_per_node: Map,
+    *,
+    resampled: int = 1,
 ) -> Map:
     """Return the share (rows, columns) of a raw pixel's noise that a quieted node still has.
 
@@ -47,8 +120,8 @@ def noise_left(
 
     Parameters
     ----------
-    light, usable
-        As for :func:`quiet_even_parts`.
+    light, background, usable
+        As for :func:`quiet_even_parts`; its wider averages are not reckoned with.
     pixels_per_node : (rows, columns) float32
         Raw pixels in the area of one node.
     resampled : int, optional
@@ -56,8 +129,8 @@ def noise_left(
     """
     if not usable.any():
         return np.ones(usable.shape, np.float32)
-    quiet = np.asarray(cv2.GaussianBlur(light, (0, 0), QUIET_PX), np.float32)
-    edge = _edges(light, quiet, usable)
+    seen = usable[..., None].astype(np.float32)
+    _, edge = _quieted(light * seen, background * seen, usable, QUIET_PX)
     tent = resampled / (3.0 * pixels_per_node)
     bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2
 
@@ -68,19 +141,3 @@ def noise_left(
     variance = even**2 * shared(2.0 * QUIET_PX**2) + edge**2 * bare
     variance += 2.0 * even * edge * shared(QUIET_PX**2)
     return np.sqrt(variance).astype(np.float32)
-
-
-def _edges(light: Map, quiet: Map, usable: NDArray[np.bool_]) -> Map:
-    """Return how far (rows, columns) the picture is to be left as it is, 0..1."""
-    wide = np.asarray(cv2.GaussianBlur(light, (0, 0), WIDE_PX))
-    seen = light[usable]
-    level = np.median(seen, axis=0)
-    noise = 1.4826 * np.median(np.abs(seen - quiet[usable]), axis=0) + 1e-6
-    # Shot noise grows as the root of the light.
-    local = noise * np.sqrt(np.maximum(quiet / np.maximum(level, 1e-6), 0.2))
-    # White noise of sd 1 leaves this much between the two averages.
-    left = np.sqrt(1.0 / QUIET_PX**2 + 1.0 / WIDE_PX**2 - 4.0 / (QUIET_PX**2 + WIDE_PX**2))
-    limit = SIGNIFICANT * local * left / np.sqrt(4.0 * np.pi)
-    excess = (np.abs(quiet - wide) / limit).max(axis=2) - 1.0
-    edge = np.clip(excess, 0.0, 1.0).astype(np.float32)
-    return np.asarray(cv2.GaussianBlur(cv2.dilate(edge, np.ones((5, 5), np.uint8)), (0, 0), 1.5))

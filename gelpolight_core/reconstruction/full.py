@@ -242,10 +242,11 @@ def shaded_field(
     base = np.maximum(full.background, LEAST_BASE)
     usable = table.valid & (full.background > LEAST_BASE).all(axis=2)
     usable &= (calibration.factors > 0.0).all(axis=2)
-    if terms.denoising:
-        light = quiet_even_parts(light, usable)
-    ratio = np.where(usable[..., None], light / base, 1.0).astype(np.float32)
     sigma = (calibration.noise / np.sqrt(2.0) / base).astype(np.float32)
+    ratio = np.asarray(light / base, np.float32)
+    if terms.denoising:
+        ratio, sigma = quiet_even_parts(light, base, sigma, usable)
+    ratio = np.where(usable[..., None], ratio, 1.0).astype(np.float32)
     grid = table.grid
     return ShadedField(
         ratio,
@@ -345,11 +346,11 @@ def _noise(
     light = np.nan_to_num(table.apply(rgb), posinf=0.0, neginf=0.0)
     unmixed = unmix(light, calibration.crosstalk)
     count = pixels_per_node(table)
+    base = np.maximum(full.background, LEAST_BASE)
     left, left_placed = (
-        noise_left(unmixed, field.usable, count, resampled=times) for times in (1, 2)
+        noise_left(unmixed, base, field.usable, count, resampled=times) for times in (1, 2)
     )
     variance = picture_noise(rgb).at(light) @ (np.linalg.inv(calibration.crosstalk).T ** 2)
-    base = np.maximum(full.background, LEAST_BASE)
     sd = np.asarray(left[..., None] * np.sqrt(variance) / base, np.float32)
     sd = np.maximum(sd, LEAST_NOISE)
     noise = slope_noise(field, depth_mm, sd, full.led_positions_mm, full.membrane, workers=workers)

@@ -13,6 +13,8 @@ import numpy as np
 from gelpolight_core.reconstruction.heightmap import Flag
 
 DARK_SIGMAS = 4.0
+# A channel with more than this share of the flat membrane's light is not dark, however noisy it is.
+DARK_SHARE = 0.15
 STEEPEST_NZ = 0.15
 LEAST_ALONG_RAY = 0.1
 ONE_DARK_WEIGHT = 0.5
@@ -205,7 +207,9 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     bounce = shape[3] * around[i, j, k] * 0.5 * (1.0 + nz)
                     direct[k] = (ratio[i, j, k] - bounce) * scale[k]
                     spread[k] = sqrt(sigma[i, j, k] ** 2 + MODEL_ERROR**2) * scale[k]
-                    low = max(dark[k], DARK_SIGMAS * sigma[i, j, k] * scale[k])
+                    low = max(
+                        dark[k], min(DARK_SIGMAS * sigma[i, j, k] * scale[k], 0.15 * scale[k])
+                    )
                     out[k] = 0
                     if saturated[i, j, k]:
                         out[k], missing, side = 1, k, 1

@@ -366,14 +366,15 @@ def test_a_term_that_is_left_out_stays_neutral_and_is_missed(
     assert stated.misfit > 1.1 * whole.misfit
 
 
-def test_light_from_around_and_exponent_are_left_out_alone() -> None:
+def test_light_from_around_and_curves_are_left_out_alone() -> None:
     known = truth(exponent=0.9, bounce=0.4)
     dark = refined(known, noise=0.003, count=5, terms=CalibrationTerms(bounce=False))
     assert (dark.membrane.bounce, dark.cap_bounce) == (0.0, 0.0)
-    assert dark.membrane.exponent != 1.0
-    lambertian = refined(known, noise=0.003, count=5, terms=CalibrationTerms(exponent=False))
-    assert lambertian.membrane.exponent == 1.0
-    assert lambertian.membrane.bounce > 0.0
+    lobes = refined(known, noise=0.003, count=5, terms=CalibrationTerms(curves=False))
+    assert lobes.membrane_kept == "two-lobe"
+    assert not lobes.membrane.diffuse
+    assert lobes.membrane.bounce > 0.0
     whole = refined(known, noise=0.003, count=5)
+    assert whole.membrane_kept == "one-dimensional"
     assert dark.misfit > 1.1 * whole.misfit
-    assert lambertian.misfit > 1.1 * whole.misfit
+    assert lobes.misfit > 1.1 * whole.misfit

@@ -84,7 +84,6 @@ def test_a_list_of_calibrations_loads_no_numerical_library() -> None:
     [
         (("format",), "something else"),
         (("version",), 0),
-        (("version",), 2),
         (("identity",), 7),
         (("sensor", "serial"), None),
         (("provenance",), None),

@@ -11,7 +11,13 @@ import numpy as np
 import pytest
 
 from app.command_line.main import MENDABLE, main
-from gelpolight_core.calibration.pipeline import calibrate_session, refine_again
+from gelpolight_core.calibration.pipeline import assemble, stages_of
+from gelpolight_core.calibration.stages import (
+    StageResults,
+    bare_calibration,
+    refine_with,
+    run_stage,
+)
 from gelpolight_core.calibration.terms import CalibrationTerms
 from gelpolight_core.experiments.ablation import VARIANTS
 from gelpolight_core.session.session import read_session
@@ -60,7 +66,7 @@ def test_the_table_says_what_each_term_is_worth(
         assert by_term[name]["rms_um"] == pytest.approx(
             whole["rms_um"] + by_term[name]["worth_rms_um"]
         )
-    # Three coarse rounds and the finding of true places take time.
+    # Two coarse rounds and the finding of true places take time.
     assert by_term["near_light_0"]["cost_ms"] > 0.0
     assert by_term["true_positions"]["cost_ms"] > 0.0
     assert by_term["gloss"]["cost_calibration_s"] is not None
@@ -75,15 +81,18 @@ def test_the_table_says_what_each_term_is_worth(
 
 def test_a_calibration_with_all_terms_is_the_sessions_own(small: Path) -> None:
     session = read_session(small)
-    run = calibrate_session(session, model="full")
-    again = refine_again(session, run)
-    assert again.identity == run.calibration.identity
-    mixed = refine_again(session, run, terms=CalibrationTerms(crosstalk=False))
+    results = StageResults()
+    for stage in stages_of("full"):
+        results = run_stage(stage, session, results)
+    whole = assemble(session, results).calibration
+    again = bare_calibration(session, refine_with(results))
+    assert again.identity == whole.identity
+    mixed = bare_calibration(session, refine_with(results, terms=CalibrationTerms(crosstalk=False)))
     np.testing.assert_array_equal(mixed.crosstalk, np.eye(3))
-    assert mixed.full is not None and run.calibration.full is not None
+    assert mixed.full is not None and whole.full is not None
     # 5 % of the neighbours' light is left in.
-    more = mixed.full.background / np.maximum(run.calibration.full.background, 0.05)
-    inside = run.calibration.table.valid & (run.calibration.full.background > 0.1).all(axis=2)
+    more = mixed.full.background / np.maximum(whole.full.background, 0.05)
+    inside = whole.table.valid & (whole.full.background > 0.1).all(axis=2)
     assert np.median(more[inside]) == pytest.approx(1.08, abs=0.04)
 
 

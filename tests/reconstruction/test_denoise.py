@@ -18,9 +18,19 @@ def picture(noise: float) -> tuple[np.ndarray, np.ndarray]:
     return clean, (clean + rng.normal(0, noise, clean.shape)).astype(np.float32)
 
 
+USABLE = np.ones((160, 200), bool)
+ONE = np.ones((160, 200, 3), np.float32)
+
+
+def quieted(light: np.ndarray, sigma: float = 0.005) -> np.ndarray:
+    """Return the averaged ratio over an even background."""
+    ratio, _ = quiet_even_parts(light, ONE, np.float32(sigma) * ONE, USABLE)
+    return ratio
+
+
 def test_noise_goes_and_the_step_stays() -> None:
     clean, noisy = picture(0.01)
-    quiet = quiet_even_parts(noisy, np.ones((160, 200), bool))
+    quiet = quieted(noisy)
     even = np.s_[10:-10, 10:100]
     assert (quiet - clean)[even].std() < 0.35 * (noisy - clean)[even].std()
     # The step itself is used as it is: no pixel of it is averaged across.
@@ -29,9 +39,9 @@ def test_noise_goes_and_the_step_stays() -> None:
 
 def test_a_picture_without_noise_or_without_membrane_is_left_alone() -> None:
     clean, noisy = picture(0.0)
-    quiet = quiet_even_parts(noisy, np.ones((160, 200), bool))
+    quiet = quieted(noisy)
     assert np.abs(quiet - clean).max() < 2e-3
-    untouched = quiet_even_parts(noisy, np.zeros((160, 200), bool))
+    untouched, _ = quiet_even_parts(noisy, ONE, ONE, np.zeros((160, 200), bool))
     np.testing.assert_array_equal(untouched, noisy)
 
 
@@ -44,7 +54,31 @@ def test_the_noise_that_is_left_is_known(shift: float) -> None:
     move = np.float32([[1, 0, shift], [0, 1, shift]])
     seen = cv2.warpAffine(raw, move, (200, 160), borderMode=cv2.BORDER_REPLICATE)
     usable = np.ones((160, 200), bool)
-    stated = noise_left(seen, usable, np.ones((160, 200), np.float32))
-    left = (quiet_even_parts(seen, usable) - 0.5)[10:-10, 10:-10].std() / 0.01
+    stated = noise_left(seen, ONE, usable, np.ones((160, 200), np.float32))
+    left = (quieted(seen) - 0.5)[10:-10, 10:-10].std() / 0.01
     # Stated is the average over where nodes fall between the pixels, not each place's own.
     assert np.median(stated) == pytest.approx(left, rel=0.15)
+
+
+def test_little_light_is_averaged_wider_and_the_light_it_has_is_known() -> None:
+    """A fortieth of the light: a fifth of the noise of the first average is left, none invented."""
+    random = np.random.default_rng(2)
+    background = np.full((160, 200, 3), 0.02, np.float32)
+    background[:, :100] = 0.8
+    press = background + random.normal(0.0, 0.004, background.shape).astype(np.float32)
+    sigma = np.float32(0.004) / background
+    ratio, left = quiet_even_parts(press, background, sigma, USABLE)
+    dim, bright = np.s_[20:-20, 140:180], np.s_[20:-20, 20:60]
+    assert (ratio - 1.0)[dim].std() < 0.25 * 0.2 * 0.25
+    assert abs(float(ratio[dim].mean()) - 1.0) < 0.01
+    assert (ratio - 1.0)[dim].std() == pytest.approx(float(left[dim].mean()), rel=0.3)
+    assert (ratio - 1.0)[bright].std() == pytest.approx(0.005 * 0.235, rel=0.15)
+
+
+def test_what_lies_outside_of_the_membrane_does_not_darken_its_rim() -> None:
+    usable = np.zeros((160, 200), bool)
+    usable[40:120, 50:150] = True
+    background = np.where(usable[..., None], 0.02, 0.01).astype(np.float32) * ONE
+    press = np.where(usable[..., None], background, 0.0).astype(np.float32)
+    ratio, _ = quiet_even_parts(press, background, 0.2 * ONE, usable)
+    np.testing.assert_allclose(ratio[usable], 1.0, atol=1e-3)

