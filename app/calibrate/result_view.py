@@ -21,7 +21,7 @@ from app.calibrate.steps import Step
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import StageState, StageStatus
+from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.translation import tr
 
 
@@ -103,9 +103,16 @@ class ResultView(QWidget):
         elif running is not None:
             text = tr("Computing: one moment.")
         else:
-            text = tr("{n} stages are still open.").format(n=len(open_steps))
+            text = tr("{n} stages are still open: complete them from the top.").format(
+                n=len(open_steps)
+            )
+            if any(s.state is StageState.STALE for s in open_steps):
+                text = tr("{n} stages are not of the present captures: press Recompute.").format(
+                    n=len(open_steps)
+                )
         self.headline.setText(text)
         self.save.setEnabled(done or (made and running is None))
+        self.save.setStyleSheet("font-weight: bold;" if done else "")
         self.report.setEnabled(self.save.isEnabled())
 
 

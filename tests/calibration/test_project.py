@@ -12,7 +12,8 @@ import pytest
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject, Cancelled, StageState
+from gelpolight_core.calibration.project import CalibrationProject, Cancelled
+from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.description import create_session
@@ -81,7 +82,7 @@ def test_taking_a_change_back_makes_the_result_present_again(project: Calibratio
 
 def test_another_led_height_makes_all_after_the_lights_stale(project: CalibrationProject) -> None:
     sensor = replace(project.session.sensor, led_height_mm=15.0)
-    project.set_sensor(sensor)
+    project.describe(replace(project.session, sensor=sensor))
     stale = set(project.stale())
     assert Stage.LIGHTS in stale
     assert Stage.JOINT in stale
