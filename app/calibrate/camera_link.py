@@ -29,6 +29,7 @@ class CameraLink(QObject):
         super().__init__(parent)
         self._watching, self._context = watching, context
         self._why = ""
+        self._wanted = self._shown = False
         self._tick = QTimer(self)
         self._tick.setInterval(STATUS_MS)
         self._tick.timeout.connect(self._look)
@@ -38,17 +39,28 @@ class CameraLink(QObject):
         """Where frames come from; None where no camera is chosen."""
         return self._watching.stream
 
+    def use(self, wanted: bool) -> None:
+        """Take pictures, or none where nobody looks: they would slow the computation down."""
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self.open()
+
     def open(self) -> None:
-        """Take pictures of the chosen source from now on."""
+        """Take pictures of the chosen source from now on, where they are wanted."""
         self.close()
         info = self._context.source.info
-        if info is not None:
+        if info is not None and self._wanted and self._shown:
             stream = Stream(info.open())
             stream.start()
             self._watching.set_stream(stream)
             self._context.status.update(camera=info.name)
             self._tick.start()
         self.switched.emit()
+
+    def enter(self, shown: bool) -> None:
+        """Follow the page: whether it is shown."""
+        self._shown = shown
+        self.open()
 
     def close(self) -> None:
         """Let the camera go."""

@@ -215,17 +215,16 @@ class LutEditor(QWidget):
             self._actions[key] = action
             self.addAction(action)
 
-    def _lay_out(self) -> None:
-        bar = named(QToolBar(), "lut.tools", tr("Tools of the reflectance curve"))
-        if self._history is None:
-            self._add_undo()
-        groups = (
+    def _groups(self) -> tuple[list[str], ...]:
+        return (
             [f"channel.{name}" for name in CHANNELS],
+            ["compare", "view"],
             ["add", "remove", "thin", "snap", "smooth"],
             ["lasso", "reset"],
-            ["compare", "view"],
             ["undo", "redo"] if self._history is None else [],
         )
+
+    def _fill_bar(self, bar: QToolBar, groups: Sequence[Sequence[str]]) -> None:
         for keys in groups:
             for key in keys:
                 bar.addAction(self._actions[key])
@@ -234,6 +233,19 @@ class LutEditor(QWidget):
                     named(button, f"lut.{key}.button", self._actions[key].text())
                     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
             bar.addSeparator()
+
+    def _lay_out(self) -> None:
+        if self._history is None:
+            self._add_undo()
+        rows = (
+            ("lut.tools", tr("Tools of the reflectance curve"), self._groups()[:2]),
+            ("lut.more_tools", tr("More tools of the reflectance curve"), self._groups()[2:]),
+        )
+        layout = QVBoxLayout(self)
+        for name, accessible, groups in rows:
+            bar = named(QToolBar(), name, accessible)
+            layout.addWidget(bar)
+            self._fill_bar(bar, groups)
         split = QSplitter(Qt.Orientation.Horizontal)
         split.addWidget(self.plot)
         split.setStretchFactor(0, 3)
@@ -241,8 +253,6 @@ class LutEditor(QWidget):
             split.addWidget(self.live)
             split.setStretchFactor(1, 1)
             split.setSizes([860, 400])
-        layout = QVBoxLayout(self)
-        layout.addWidget(bar)
         layout.addWidget(split, 1)
         layout.addWidget(self._hint)
         layout.addWidget(self._notice)

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from app.calibrate.states import is_done, state_colour, state_icon, state_word
 from app.calibrate.steps import Step
+from app.shell import theme
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.calibration.inputs import Stage
@@ -82,6 +83,11 @@ class ResultView(QWidget):
         self.saved.setWordWrap(True)
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         column.addWidget(self.saved)
+
+    def show_saved(self, sentence: str, role: str = "pass") -> None:
+        """Say where the calibration or its report was saved, or why not."""
+        self.saved.setText(sentence)
+        self.saved.setStyleSheet(f"color: {theme.colour(role).name()};")
 
     def show_statuses(self, statuses: Mapping[Stage, StageStatus], running: Stage | None) -> None:
         """Show how every stage stands."""

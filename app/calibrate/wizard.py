@@ -215,12 +215,12 @@ class Wizard(QMainWindow):
 
     def enter(self) -> None:
         """Look at the camera, as the wizard is shown."""
-        self.camera.open()
+        self.camera.enter(True)
         self._focus_on_what_comes_next()
 
     def leave(self) -> None:
         """Let the camera go, as the wizard is hidden."""
-        self.camera.close()
+        self.camera.enter(False)
 
     def close_session(self) -> None:
         """End all work; everything captured and decided is on disk."""
@@ -286,6 +286,7 @@ class Wizard(QMainWindow):
         self.pictures.tabs.setCurrentIndex(RESULT if key == "refraction" else PICTURE)
         self._capture_key.setEnabled(self.step.stage is not None and key != "refraction")
         self.looking.take_step(self.step)
+        self.camera.use(self.looking.has_pictures or key == "validation")
         self._compute_what_never_was()
         self._refresh()
         centre: dict[str, QWidget] = {"setup": self.setup, "result": self.result}
