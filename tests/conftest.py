@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,11 @@ import pytest
 from hypothesis import settings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from gelpolight_core.calibration.calibration import Calibration
     from gelpolight_core.calibration.pipeline import CalibrationRun
+    from gelpolight_core.calibration.project import CalibrationProject
 
 # The same examples on every machine, so that a verdict can be repeated; look further, now and then,
 # with --hypothesis-profile=explore.
@@ -53,3 +57,55 @@ def virtual_run(virtual_session: Path) -> CalibrationRun:
 def virtual_calibration(virtual_run: CalibrationRun) -> Calibration:
     """Return the full model's calibration of the virtual session; not to be changed."""
     return virtual_run.calibration
+
+
+@pytest.fixture(scope="session")
+def small_session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the virtual sensor's session at a quarter of its size: what it costs is counted."""
+    from gelpolight_core.design.sensor_design import SensorDesign
+    from gelpolight_core.simulation.session import simulate_session
+
+    folder = tmp_path_factory.mktemp("small-sensor") / "session"
+    simulate_session(SensorDesign(), folder, scale=0.25)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_calibration(small_session: Path) -> Calibration:
+    """Return what the command line makes of the small session; not to be changed."""
+    from gelpolight_core.calibration.pipeline import calibrate_session
+    from gelpolight_core.session.session import read_session
+
+    return calibrate_session(read_session(small_session)).calibration
+
+
+@pytest.fixture(scope="session")
+def small_project(
+    small_session: Path, tmp_path_factory: pytest.TempPathFactory
+) -> CalibrationProject:
+    """Return a project computed on a copy of the small session; not to be changed."""
+    from gelpolight_core.calibration.project import CalibrationProject
+
+    folder = tmp_path_factory.mktemp("project") / "session"
+    shutil.copytree(small_session, folder)
+    project = CalibrationProject(folder)
+    while project.stale():
+        project.compute(project.stale()[0])
+    return project
+
+
+@pytest.fixture
+def computed_project(
+    small_project: CalibrationProject, tmp_path: Path
+) -> Callable[[], CalibrationProject]:
+    """Return a function that opens a computed project on a folder of its own."""
+    from gelpolight_core.calibration.project import CalibrationProject
+
+    def make() -> CalibrationProject:
+        folder = tmp_path / "workspace" / "sensors" / "virtual-1" / "sessions" / "session"
+        shutil.copytree(small_project.session.folder, folder)
+        copied = CalibrationProject(folder)
+        copied._results, copied._outcomes = small_project._results, dict(small_project._outcomes)
+        return copied
+
+    return make

@@ -1,4 +1,4 @@
-"""What can be undone: a person's decisions about a session's pictures."""
+"""What can be undone: a person's corrections of a session."""
 
 from __future__ import annotations
 
@@ -6,32 +6,51 @@ from collections.abc import Callable
 
 from PySide6.QtGui import QUndoCommand
 
-from gelpolight_core.session.decisions import Decisions
+from gelpolight_core.errors import InputError
 
 
-class Decide(QUndoCommand):
-    """One change of the decisions; undoing it brings the former ones back.
+class Correction(QUndoCommand):
+    """One correction and how to take it back; neither touches what it is not about.
+
+    One that cannot be written to disk does not stand, and leaves the history.
 
     Parameters
     ----------
     text : str
         What the history list says.
-    before, after : Decisions
-        As they were, and as they shall be.
-    apply : callable
-        Puts decisions in place, on disk first.
+    act, take_back : callable
+        On disk before they return, or an InputError.
+    done : callable
+        Called after either.
+    refused : callable
+        Told why it could not be done.
     """
 
     def __init__(
-        self, text: str, before: Decisions, after: Decisions, apply: Callable[[Decisions], None]
+        self,
+        text: str,
+        act: Callable[[], None],
+        take_back: Callable[[], None],
+        *,
+        done: Callable[[], None],
+        refused: Callable[[str], object],
     ) -> None:
         super().__init__(text)
-        self._before, self._after, self._apply = before, after, apply
+        self._act, self._take_back = act, take_back
+        self._done, self._refused = done, refused
 
     def redo(self) -> None:
-        """Decide."""
-        self._apply(self._after)
+        """Correct."""
+        self._run(self._act)
 
     def undo(self) -> None:
         """Take it back."""
-        self._apply(self._before)
+        self._run(self._take_back)
+
+    def _run(self, change: Callable[[], None]) -> None:
+        try:
+            change()
+        except InputError as error:
+            self.setObsolete(True)
+            self._refused(str(error))
+        self._done()

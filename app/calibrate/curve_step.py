@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
@@ -20,15 +21,19 @@ from gelpolight_core.session.decisions import Point
 from gelpolight_core.translation import tr
 
 Material = tuple[CurveEdit, CurveEdit, ReflectanceScatter, Callable[[CurveEdit, str], Effect]]
+Nodes = dict[int, tuple[Point, ...]]
 
 
 class CurveStep(QWidget):
     """Holds the editor; makes it anew when the presses behind the curves have changed.
 
+    Edits are corrections of the session like all others, in its one history: undoing one puts the
+    decisions back, and the editor shows them.
+
     Parameters
     ----------
     controller : CalibrationController
-        Of the session; an edit becomes one of its decisions.
+        Of the session.
     """
 
     def __init__(self, controller: CalibrationController) -> None:
@@ -36,6 +41,7 @@ class CurveStep(QWidget):
         named(self, "curves", tr("Reflectance curves"))
         self._controller = controller
         self.editor: LutEditor | None = None
+        self._fitted: CurveEdit | None = None
         self._made_of: object = None
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
@@ -48,18 +54,21 @@ class CurveStep(QWidget):
         """Show the present curves; says so where there are none yet."""
         project = self._controller.project
         present = project.results.reflectance
-        current = Stage.REFLECTANCE not in project.stale() and present is not None
-        if not current:
+        if present is None or Stage.REFLECTANCE in project.stale():
             self.close_editor()
-            self._said.setText(tr("The curves come with the ball presses. Capture them first."))
-            self._said.show()
+            self._made_of = None
+            waits = self._controller.jobs.busy
+            self._say(
+                tr("The curves are being fitted.")
+                if waits
+                else tr("The curves come with the ball presses: complete the earlier steps first.")
+            )
             return
         if present is self._made_of:
             return
         self._made_of = present
         self.close_editor()
-        self._said.setText(tr("Gathering the pixels of the ball presses."))
-        self._said.show()
+        self._say(tr("Gathering the pixels of the ball presses."))
         self._controller.jobs.submit(
             Job(tr("Gathering the scatter"), lambda _tell: _gather(project), self._show, self._fail)
         )
@@ -72,33 +81,60 @@ class CurveStep(QWidget):
             self.editor.deleteLater()
             self.editor = None
 
-    def _fail(self, sentence: str) -> None:
-        self._made_of = None
+    def _say(self, sentence: str) -> None:
         self._said.setText(sentence)
+        self._said.show()
+
+    def _fail(self, sentence: str) -> None:
+        self._say(sentence)
 
     def _show(self, material: Material) -> None:
         fitted, state, scatter, effect = material
         self.close_editor()
         self._said.hide()
-        self.editor = LutEditor(state, scatter, previous=fitted, effect=effect)
-        self.editor.edited.connect(self._on_edited)
+        self._fitted = fitted
+        self.editor = LutEditor(
+            state, scatter, previous=fitted, effect=effect, history=self._on_edit
+        )
         self._column.addWidget(self.editor, 1)
 
-    def _on_edited(self, state: CurveEdit) -> None:
-        curves: dict[int, tuple[Point, ...]] = {}
-        for channel, (curve, fit) in enumerate(zip(state.curves, state.fits, strict=True)):
-            if curve != fit:
-                curves[channel] = tuple(zip(curve.cosines, curve.values, strict=True))
-        self._controller.edit_curves(curves)
+    def _on_edit(self, text: str, before: CurveEdit, after: CurveEdit) -> None:
+        assert self._fitted is not None
+        fitted = self._fitted
+        self._controller.correct(
+            text, partial(self._put, fitted, after), partial(self._put, fitted, before),
+            Stage.REFLECTANCE,
+        )  # fmt: skip
+
+    def _put(self, fitted: CurveEdit, state: CurveEdit) -> None:
+        """Decide on curves, and show them; an editor of other presses shows the nodes alone."""
+        nodes = _nodes(state, fitted)
+        self._controller.project.edit_curves(nodes)
+        if self.editor is not None and self._fitted is not None:
+            same = self._fitted is fitted
+            self.editor.show_state(state if same else with_curves(self._fitted, _curves(nodes)))
+
+
+def _nodes(state: CurveEdit, fitted: CurveEdit) -> Nodes:
+    """Return the nodes of the curves that are not as the session's stage has fitted them."""
+    return {
+        channel: tuple(zip(curve.cosines, curve.values, strict=True))
+        for channel, (curve, fit) in enumerate(zip(state.curves, fitted.curves, strict=True))
+        if curve != fit
+    }
+
+
+def _curves(nodes: Nodes) -> dict[int, Curve]:
+    return {
+        channel: Curve(tuple(c for c, _ in points), tuple(v for _, v in points))
+        for channel, points in nodes.items()
+    }
 
 
 def _gather(project: CalibrationProject) -> Material:
     run = project.finish(model="paper")
     session = project.session
-    fitted = start_edit(run.reflectance.table)
-    edited = {
-        channel: Curve(tuple(c for c, _ in nodes), tuple(v for _, v in nodes))
-        for channel, nodes in session.decisions.curves.items()
-    }
+    fitted = start_edit(project.results.reflectance.table)
     scatter = gather_scatter(run, session)
+    edited = _curves(dict(session.decisions.curves))
     return fitted, with_curves(fitted, edited), scatter, ball_effect(run, session)

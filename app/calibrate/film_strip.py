@@ -9,10 +9,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 from PySide6.QtCore import QPoint, QSize, Qt, Signal
-from PySide6.QtGui import QIcon, QImage, QKeyEvent, QPainter, QPixmap
+from PySide6.QtGui import QIcon, QImage, QKeyEvent, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu, QWidget
 
 from app.calibrate.states import state_icon, state_word
+from app.shell import theme
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -97,8 +98,26 @@ class FilmStrip(QListWidget):
         item = self.currentItem()
         return _take(item).path.name if item is not None and item.isSelected() else ""
 
+    def show_newest(self) -> None:
+        """Bring the newest picture into sight."""
+        if self.count():
+            self.scrollToItem(self.item(self.count() - 1))
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say so where there is nothing."""
+        super().paintEvent(event)
+        if not self.count():
+            painter = QPainter(self.viewport())
+            painter.setPen(theme.colour("muted"))
+            area = self.viewport().rect()
+            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, tr("Captures come here"))
+            painter.end()
+
     def choose(self, name: str) -> None:
-        """Choose a picture by its name."""
+        """Choose a picture by its name; none by an empty one."""
+        if not name:
+            self.clearSelection()
+            self.setCurrentRow(-1)
         for row in range(self.count()):
             if _take(self.item(row)).path.name == name:
                 self.setCurrentRow(row)

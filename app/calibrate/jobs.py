@@ -32,12 +32,17 @@ class Job:
         Gets a function to tell the share done to, which also stops the work when it was cancelled.
     done : callable
         Called in the GUI thread with what `work` returned.
+    failed : callable or None
+        Called in the GUI thread with a sentence where it came to nothing; None: Jobs.refused.
+    must : bool
+        Whether it is done even where all else is cancelled.
     """
 
     title: str
     work: Callable[[Callable[[float], None]], Any]
     done: Callable[[Any], None] = field(default=lambda _result: None)
     failed: Callable[[str], None] | None = None
+    must: bool = False
     share: float = 0.0
     future: Future[Any] | None = None
     cancel: threading.Event = field(default_factory=threading.Event)
@@ -45,6 +50,13 @@ class Job:
 
 class Jobs(QObject):
     """Runs jobs in their order; tells in the GUI thread how they fare.
+
+    Parameters
+    ----------
+    name : str
+        Of the thread.
+    parent : QObject, optional
+        Owner.
 
     Signals
     -------
@@ -57,9 +69,9 @@ class Jobs(QObject):
     progressed = Signal(str, float)
     refused = Signal(str)
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix="calibration")
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
         self._waiting: deque[Job] = deque()
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
@@ -81,12 +93,14 @@ class Jobs(QObject):
     def cancel(self) -> None:
         """Stop the job that runs, at its next step, and drop those that wait."""
         for job in self._waiting:
+            if job.must:
+                continue
             job.cancel.set()
             if job.future is not None:
                 job.future.cancel()
 
     def close(self) -> None:
-        """Cancel everything and end the thread."""
+        """Cancel what may be, end the thread after the rest; nobody is told of it any more."""
         self.cancel()
         self._timer.stop()
         self._pool.shutdown(wait=True)

@@ -23,13 +23,14 @@ from app.calibrate.detection import Detection, or_refusal
 from app.calibrate.marks import mirror_places, spot_markers, working_rim
 from app.calibrate.steps import Step
 from app.live.overlay import Circle, Overlay
-from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.stages import StageResults
 from gelpolight_core.errors import InputError
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.optics.lens_views import LensView
+from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -83,10 +84,28 @@ def look_for(
         case Stage.RADIANCE:
             return partial(detect_whiteboard, table=results.table)
         case Stage.BACKGROUND:
-            return partial(detect_background, table=results.table)
+            return partial(_background, table=results.table, boards=_Boards(session))
         case Stage.BALLS:
             return _ball_looker(project, radius_mm, name)
     return partial(_too_early, stage=step.stage)
+
+
+class _Boards:
+    """The whiteboard's picture, read when it is first needed: in the thread that looks."""
+
+    def __init__(self, session: Session) -> None:
+        self._files = session.found(FOLDERS[Stage.RADIANCE])
+        self._rgb: Rgb | None = None
+
+    @property
+    def rgb(self) -> Rgb | None:
+        if self._rgb is None and self._files:
+            self._rgb, self._files = read_raw(self._files[-1]), ()
+        return self._rgb
+
+
+def _background(rgb: Rgb, table: ResamplingTable | None, boards: _Boards) -> Detection:
+    return or_refusal(lambda: detect_background(rgb, table=table, whiteboard=boards.rgb))
 
 
 def _too_early(_rgb: Rgb, stage: Stage | None) -> Detection:

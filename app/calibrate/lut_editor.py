@@ -67,6 +67,10 @@ class LutEditor(QWidget):
         An older version to compare with; by default `start`.
     effect : callable, optional
         From (state, press's name) to :class:`~app.calibrate.lut_effect.Effect`.
+    history : callable, optional
+        Given the text of an edit, the state before it and the one after it, to be kept in a history
+        that others share; it has to show the new state, and later whichever stands. Without it the
+        editor has a history of its own.
     parent : QWidget, optional
         Of the editor.
     """
@@ -80,9 +84,11 @@ class LutEditor(QWidget):
         *,
         previous: CurveEdit | None = None,
         effect: Callable[[CurveEdit, str], Effect] | None = None,
+        history: Callable[[str, CurveEdit, CurveEdit], None] | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
+        self._history = history
         self._start = self._state = self._shown = start
         self._previous = previous or start
         self._scatter = scatter
@@ -174,7 +180,7 @@ class LutEditor(QWidget):
                 f"channel.{name}",
                 tr(name).capitalize(),
                 tr("Show the {name} channel's curve").format(name=tr(name)),
-                f"Ctrl+{k + 1}",
+                f"{k + 1}",
                 check=True,
             )
             action.triggered.connect(lambda _on, k=k: self.choose_channel(k))
@@ -196,8 +202,7 @@ class LutEditor(QWidget):
         add("view", tr("Whole curve"), tr("Show the whole curve"), "Home")
         return actions
 
-    def _lay_out(self) -> None:
-        bar = named(QToolBar(), "lut.tools", tr("Tools of the reflectance curve"))
+    def _add_undo(self) -> None:
         undo = self.undo_stack.createUndoAction(self, tr("Undo"))
         redo = self.undo_stack.createRedoAction(self, tr("Redo"))
         for key, action, shortcut in (
@@ -209,13 +214,17 @@ class LutEditor(QWidget):
             action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             self._actions[key] = action
             self.addAction(action)
-        groups = (
+
+    def _groups(self) -> tuple[list[str], ...]:
+        return (
             [f"channel.{name}" for name in CHANNELS],
+            ["compare", "view"],
             ["add", "remove", "thin", "snap", "smooth"],
             ["lasso", "reset"],
-            ["compare", "view"],
-            ["undo", "redo"],
+            ["undo", "redo"] if self._history is None else [],
         )
+
+    def _fill_bar(self, bar: QToolBar, groups: Sequence[Sequence[str]]) -> None:
         for keys in groups:
             for key in keys:
                 bar.addAction(self._actions[key])
@@ -224,6 +233,19 @@ class LutEditor(QWidget):
                     named(button, f"lut.{key}.button", self._actions[key].text())
                     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
             bar.addSeparator()
+
+    def _lay_out(self) -> None:
+        if self._history is None:
+            self._add_undo()
+        rows = (
+            ("lut.tools", tr("Tools of the reflectance curve"), self._groups()[:2]),
+            ("lut.more_tools", tr("More tools of the reflectance curve"), self._groups()[2:]),
+        )
+        layout = QVBoxLayout(self)
+        for name, accessible, groups in rows:
+            bar = named(QToolBar(), name, accessible)
+            layout.addWidget(bar)
+            self._fill_bar(bar, groups)
         split = QSplitter(Qt.Orientation.Horizontal)
         split.addWidget(self.plot)
         split.setStretchFactor(0, 3)
@@ -231,8 +253,6 @@ class LutEditor(QWidget):
             split.addWidget(self.live)
             split.setStretchFactor(1, 1)
             split.setSizes([860, 400])
-        layout = QVBoxLayout(self)
-        layout.addWidget(bar)
         layout.addWidget(split, 1)
         layout.addWidget(self._hint)
         layout.addWidget(self._notice)
@@ -287,12 +307,15 @@ class LutEditor(QWidget):
     def _commit(self, text: str, after: CurveEdit) -> None:
         self._notice.clear()
         if after == self._state:
-            self._show(after)
+            self.show_state(after)
             return
         name = tr(CHANNELS[self.channel])
-        self.undo_stack.push(_Swap(f"{text} ({name})", self._state, after, self._show))
+        if self._history is not None:
+            self._history(f"{text} ({name})", self._state, after)
+        else:
+            self.undo_stack.push(_Swap(f"{text} ({name})", self._state, after, self.show_state))
 
-    def _show(self, state: CurveEdit) -> None:
+    def show_state(self, state: CurveEdit) -> None:
         """Make a state the one that stands."""
         changed = state != self._state
         self._state = self._shown = state

@@ -22,6 +22,7 @@ from gelpolight_core.translation import tr
 
 POLL_MS = 30
 UM = 1000.0
+LEAST_WIDTH = 250
 
 
 class LivePanel(QWidget):
@@ -48,6 +49,7 @@ class LivePanel(QWidget):
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
+        self.setMinimumWidth(LEAST_WIDTH)
         self._start = self._state = before
         self._before: dict[str, Effect] = {}
         self._worker: NewestWins[tuple[CurveEdit, str], tuple[Effect, Effect]] = NewestWins(

@@ -72,18 +72,13 @@ class CalibratePage(QWidget):
         return True
 
     def open_path(self, path: Path) -> None:
-        """Open a session folder.
-
-        Raises
-        ------
-        InputError
-            If it is not one.
-        """
+        """Open a session folder; where it is none, say why on the start view."""
         folder = path.parent if path.name == "session.toml" else path
         try:
             project = CalibrationProject(folder)
         except InputError as error:
-            self.context.toasts.show(str(error), "fail")
+            self._leave_session()
+            self.start.show_problem(str(error))
             return
         self._show_wizard(project)
 
@@ -124,12 +119,13 @@ class CalibratePage(QWidget):
             create_session(replace(stated, folder=folder))
             project = CalibrationProject(folder)
         except InputError as error:
-            self.context.toasts.show(str(error), "fail")
+            self.form.show_problem(str(error))
             return
         self._show_wizard(project, step="lens")
 
     def _show_wizard(self, project: CalibrationProject, *, step: str = "") -> None:
         self._close_wizard()
+        self.start.show_problem("")
         self.wizard = Wizard(project, context=self.context)
         self.wizard.left.connect(self._leave_session)
         self._stack.addWidget(self.wizard)
@@ -141,6 +137,7 @@ class CalibratePage(QWidget):
 
     def _leave_session(self) -> None:
         self._close_wizard()
+        self.start.show_problem("")
         self.start.show_recent(self.context.settings.recent_sessions)
         self._stack.setCurrentWidget(self.start)
 

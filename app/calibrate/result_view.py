@@ -18,10 +18,11 @@ from PySide6.QtWidgets import (
 
 from app.calibrate.states import is_done, state_colour, state_icon, state_word
 from app.calibrate.steps import Step
+from app.shell import theme
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import StageState, StageStatus
+from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.translation import tr
 
 
@@ -83,6 +84,11 @@ class ResultView(QWidget):
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         column.addWidget(self.saved)
 
+    def show_saved(self, sentence: str, role: str = "pass") -> None:
+        """Say where the calibration or its report was saved, or why not."""
+        self.saved.setText(sentence)
+        self.saved.setStyleSheet(f"color: {theme.colour(role).name()};")
+
     def show_statuses(self, statuses: Mapping[Stage, StageStatus], running: Stage | None) -> None:
         """Show how every stage stands."""
         for stage, row in self._rows.items():
@@ -103,9 +109,16 @@ class ResultView(QWidget):
         elif running is not None:
             text = tr("Computing: one moment.")
         else:
-            text = tr("{n} stages are still open.").format(n=len(open_steps))
+            text = tr("{n} stages are still open: complete them from the top.").format(
+                n=len(open_steps)
+            )
+            if any(s.state is StageState.STALE for s in open_steps):
+                text = tr("{n} stages are not of the present captures: press Recompute.").format(
+                    n=len(open_steps)
+                )
         self.headline.setText(text)
         self.save.setEnabled(done or (made and running is None))
+        self.save.setStyleSheet("font-weight: bold;" if done else "")
         self.report.setEnabled(self.save.isEnabled())
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog
@@ -49,12 +51,20 @@ class Saving(QObject):
             return path
 
         def done(path: Path) -> None:
-            self._view.saved.setText(tr("Saved as {path}, and in use now.").format(path=path))
+            self._view.show_saved(
+                tr("Saved as {path}, and in use now. Validate it next.").format(path=path)
+            )
             self._context.requests.library_changed.emit()
             self.saved.emit(str(path))
-            self._context.toasts.show(tr("Calibration saved. Validate it next."), "pass")
 
-        self._controller.jobs.submit(Job(tr("Saving the calibration"), work, done))
+        self._submit(tr("Saving the calibration"), work, done)
+
+    def _submit(
+        self, title: str, work: Callable[[object], Any], done: Callable[[Any], None]
+    ) -> None:
+        self._view.show_saved(title + "…")
+        job = Job(title, work, done, lambda sentence: self._view.show_saved(sentence, "fail"))
+        self._controller.jobs.submit(job)
 
     def report(self) -> None:
         """Ask for a place, and write the report there."""
@@ -82,6 +92,6 @@ class Saving(QObject):
             return run
 
         def done(_run: CalibrationRun) -> None:
-            self._context.toasts.show(tr("Report written to {path}").format(path=path), "pass")
+            self._view.show_saved(tr("Report written to {path}").format(path=path))
 
-        self._controller.jobs.submit(Job(tr("Writing the report"), work, done))
+        self._submit(tr("Writing the report"), work, done)

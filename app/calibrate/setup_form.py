@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.shell import theme
 from app.widgets.naming import named
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.session.session import DENSEST_INDEX, SensorData, Session
@@ -70,6 +71,20 @@ class SetupForm(QScrollArea):
         holder.setMinimumWidth(FORM_WIDTH - 120)
         middle.addWidget(holder)
         middle.addStretch(1)
+        self.title = QLabel(tr("What is known of the sensor"))
+        font = self.title.font()
+        font.setPointSizeF(font.pointSizeF() * 1.35)
+        font.setBold(True)
+        self.title.setFont(font)
+        self.task = QLabel(
+            tr(
+                "State it from the housing's drawing and the parts; every length here scales the"
+                " result. It can be changed later. Then press the button at the foot."
+            )
+        )
+        self.task.setWordWrap(True)
+        column.addWidget(self.title)
+        column.addWidget(self.task)
         column.addWidget(self._build_sensor())
         column.addWidget(self._build_boards())
         column.addWidget(self._build_balls())
@@ -137,10 +152,17 @@ class SetupForm(QScrollArea):
         form.addRow(tr("Usual radius"), self.ball)
         return box
 
+    def show_problem(self, sentence: str) -> None:
+        """Say why what is stated could not be taken."""
+        self.problem.setText(sentence)
+        self.problem.setStyleSheet(f"color: {theme.colour('fail').name()};")
+
     def show_session(self, session: Session, *, new: bool) -> None:
         """Show what is stated of a session; `new`: nothing of it is on disk yet."""
         self._session = session
         sensor = session.sensor
+        self.title.setVisible(new)
+        self.task.setVisible(new)
         self.serial.setText(sensor.serial)
         self.led_height.setValue(sensor.led_height_mm)
         self.thickness.setValue(sensor.elastomer_thickness_mm)

@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLabel, QPushButton, QVBoxLayout, QWidget
 
+from app.shell import theme
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -61,9 +62,20 @@ class StartView(QWidget):
             button.setFixedWidth(460)
             button.clicked.connect(signal)
             column.addWidget(button)
+        self.problem = named(QLabel(), "start.problem", tr("Why it was not opened"))
+        self.problem.setWordWrap(True)
+        self.problem.setFixedWidth(460)
+        self.problem.hide()
+        column.addWidget(self.problem)
         self._recent = QVBoxLayout()
         column.addSpacing(12)
         column.addLayout(self._recent)
+
+    def show_problem(self, sentence: str) -> None:
+        """Say why a session was not opened; an empty text: it was."""
+        self.problem.setText(sentence)
+        self.problem.setStyleSheet(f"color: {theme.colour('fail').name()};")
+        self.problem.setVisible(bool(sentence))
 
     def show_recent(self, folders: Sequence[Path]) -> None:
         """Offer these sessions."""

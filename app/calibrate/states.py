@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
 from app.calibrate.steps import Step
 from app.shell import theme
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import StageState, StageStatus
+from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.translation import tr
 
 RUNNING = "running"
@@ -39,18 +39,28 @@ def state_colour(state: str) -> QColor:
 
 def state_icon(state: str) -> QIcon:
     """Return a sign for a state: its shape tells it without the colour."""
+    sign = QIcon()
+    back = theme.colour("base")
+    sign.addPixmap(_picture(state, state_colour(state), back), QIcon.Mode.Normal)
+    # On the highlighted row of a list.
+    chosen, behind = theme.colour("highlighted"), theme.colour("highlight")
+    sign.addPixmap(_picture(state, chosen, behind), QIcon.Mode.Selected)
+    return sign
+
+
+def _picture(state: str, colour: QColor, back: QColor) -> QPixmap:
     ratio = 2
     picture = QPixmap(SIZE * ratio, SIZE * ratio)
     picture.setDevicePixelRatio(ratio)
     picture.fill(Qt.GlobalColor.transparent)
     painter = QPainter(picture)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _paint(painter, state, state_colour(state))
+    _paint(painter, state, colour, back)
     painter.end()
-    return QIcon(picture)
+    return picture
 
 
-def _paint(painter: QPainter, state: str, colour: QColor) -> None:
+def _paint(painter: QPainter, state: str, colour: QColor, back: QColor) -> None:
     box = QRectF(2, 2, SIZE - 4, SIZE - 4)
     pen = QPen(colour, 1.8)
     pen.setCapStyle(Qt.PenCapStyle.RoundCap)
@@ -69,7 +79,7 @@ def _paint(painter: QPainter, state: str, colour: QColor) -> None:
         painter.drawPolygon([QPointF(9, 2), QPointF(16.5, 15.5), QPointF(1.5, 15.5)])
     else:
         painter.drawEllipse(box)
-    painter.setPen(QPen(theme.colour("base"), 2.0))
+    painter.setPen(QPen(back, 2.0))
     if state == "pass":
         painter.drawPolyline([QPointF(5.4, 9.4), QPointF(8.0, 12.0), QPointF(12.8, 6.4)])
     elif state == "fail":

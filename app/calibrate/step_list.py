@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
-from app.calibrate.states import state_icon, state_word
+from app.calibrate.states import RUNNING, state_icon, state_word
 from app.calibrate.steps import Step
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -44,10 +44,17 @@ class StepList(QListWidget):
         """Show how each step stands: (state, sentence) by the step's key."""
         for row, step in enumerate(self._steps):
             state, sentence = states.get(step.key, ("empty", ""))
-            item = self.item(row)
-            item.setIcon(state_icon(state))
-            item.setToolTip(f"{step.title}: {state_word(state)}. {sentence}".strip())
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
+            self._show_state(row, step, state, sentence)
+
+    def show_running(self, step: Step) -> None:
+        """Show that a step is being computed."""
+        self._show_state(self._steps.index(step), step, RUNNING, "")
+
+    def _show_state(self, row: int, step: Step, state: str, sentence: str) -> None:
+        item = self.item(row)
+        item.setIcon(state_icon(state))
+        item.setToolTip(f"{step.title}: {state_word(state)}. {sentence}".strip())
+        item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
 
     def go_to(self, row: int) -> None:
         """Show a step as the one that is open."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -18,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.calibrate.assembly import AssemblyPicture
-from app.calibrate.states import state_colour, state_icon, state_word
+from app.calibrate.states import RUNNING, state_colour, state_icon, state_word
 from app.calibrate.steps import Step
 from app.shell import theme
 from app.widgets.naming import named
@@ -28,10 +30,18 @@ from gelpolight_core.quality import QualityTable
 from gelpolight_core.translation import tr
 
 WIDTH = 372
+# Room that is always there, so that nothing below moves when a sentence changes.
+LIVE_LINES = 4
+NOTICE_LINES = 2
 
 
-class StepPanel(QScrollArea):
-    """The side panel of a step with pictures.
+class StepPanel(QWidget):
+    """The side panel of a step with pictures; its foot is always in sight.
+
+    Attributes
+    ----------
+    finished : bool
+        Whether the step needs nothing more.
 
     Signals
     -------
@@ -41,8 +51,6 @@ class StepPanel(QScrollArea):
         Take a picture now.
     import_wanted()
         Choose picture files.
-    automatic_changed(bool)
-        Take a picture by itself when it is still and good.
     next_wanted()
         Go to the next step.
     cancel_wanted()
@@ -54,7 +62,6 @@ class StepPanel(QScrollArea):
     lay_wanted = Signal()
     capture_wanted = Signal()
     import_wanted = Signal()
-    automatic_changed = Signal(bool)
     next_wanted = Signal()
     cancel_wanted = Signal()
     recompute_wanted = Signal()
@@ -62,22 +69,22 @@ class StepPanel(QScrollArea):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         named(self, "calibrate.panel", tr("This step"))
-        self.setWidgetResizable(True)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setMinimumWidth(WIDTH)
-        self.setMaximumWidth(WIDTH + 60)
-        inside = QWidget()
-        inside.setMaximumWidth(WIDTH + 40)
-        self.setWidget(inside)
+        self.setFixedWidth(WIDTH)
+        self.finished = False
+        self._step: Step | None = None
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(0, 0, 0, 0)
+        outer.setSpacing(0)
+        self._scroll, inside = side_scroll("calibrate.panel.scroll", tr("This step"))
+        outer.addWidget(self._scroll, 1)
         self._column = QVBoxLayout(inside)
-        self._column.setContentsMargins(12, 10, 12, 10)
+        self._column.setContentsMargins(12, 10, 12, 6)
         self._column.setSpacing(8)
         self._build_head()
         self._build_capture()
         self._build_state()
         self._column.addStretch(1)
-        self._build_foot()
+        outer.addLayout(self._build_foot())
 
     def _build_head(self) -> None:
         self.title = named(QLabel(), "calibrate.title", tr("Step"))
@@ -91,7 +98,9 @@ class StepPanel(QScrollArea):
             self._column.addWidget(widget)
 
     def _build_capture(self) -> None:
-        self.live = named(_wrapped(lines=3), "calibrate.live", tr("What the live picture shows"))
+        self.live = named(
+            _wrapped(lines=LIVE_LINES), "calibrate.live", tr("What the live picture shows")
+        )
         self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.radius_row = QWidget()
         row = QHBoxLayout(self.radius_row)
@@ -120,8 +129,8 @@ class StepPanel(QScrollArea):
             QCheckBox(tr("When still and &good")),
             "calibrate.automatic",
             tr("Capture by itself when the picture is still and good"),
+            tr("Hands free: after each capture it waits until you have moved something"),
         )
-        self.automatic.toggled.connect(self.automatic_changed)
         self.import_files = named(
             QPushButton(tr("&Import…")), "calibrate.import", tr("Import picture files")
         )
@@ -139,6 +148,11 @@ class StepPanel(QScrollArea):
         column.addWidget(self.radius_row)
         column.addLayout(buttons)
         column.addWidget(self.automatic)
+        self.notice = named(
+            _wrapped(lines=NOTICE_LINES), "calibrate.notice", tr("What became of it")
+        )
+        self.notice.setAlignment(Qt.AlignmentFlag.AlignTop)
+        column.addWidget(self.notice)
         self._column.addWidget(self.capturing)
 
     def _build_state(self) -> None:
@@ -166,7 +180,9 @@ class StepPanel(QScrollArea):
         self._column.addWidget(self.sentence)
         self._column.addWidget(self.quality)
 
-    def _build_foot(self) -> None:
+    def _build_foot(self) -> QVBoxLayout:
+        foot = QVBoxLayout()
+        foot.setContentsMargins(12, 4, 12, 10)
         row = QHBoxLayout()
         self.progress = named(QProgressBar(), "calibrate.progress", tr("Progress"))
         self.progress.setRange(0, 100)
@@ -181,22 +197,52 @@ class StepPanel(QScrollArea):
         self.cancel.clicked.connect(self.cancel_wanted)
         row.addWidget(self.progress, 1)
         row.addWidget(self.cancel)
-        self._column.addLayout(row)
+        foot.addLayout(row)
         self.next = named(QPushButton(tr("&Next step")), "calibrate.next", tr("Next step"))
-        self.next.setMinimumHeight(34)
+        self.next.setMinimumHeight(38)
         self.next.clicked.connect(self.next_wanted)
-        self._column.addWidget(self.next)
+        foot.addWidget(self.next)
         self.show_work("", 0.0)
+        return foot
 
-    def show_step(self, step: Step, *, last: bool) -> None:
-        """Show another step's task."""
+    def show_step(self, step: Step, *, following: str) -> None:
+        """Show another step's task; `following`: the title of the step after it, if any."""
+        self._step, self.finished = step, False
         self.title.setText(step.title)
         self.task.setText(step.task)
         self.assembly.show_assembly(step.assembly)
         self.capturing.setVisible(step.stage is not None and step.key != "refraction")
         self.radius_row.setVisible(step.stage is Stage.BALLS)
-        self.next.setVisible(not last)
-        self.verticalScrollBar().setValue(0)
+        self.show_notice("", "pass")
+        self.next.setVisible(bool(following))
+        self.next.setText(tr("&Next: {title}").format(title=following))
+        self._scroll.verticalScrollBar().setValue(0)
+
+    def show_count(self, count: int) -> None:
+        """Say on the button how many captures there are, and how many make a good stage."""
+        wanted = 1 if self._step is None else self._step.wanted
+        text = tr("&Capture")
+        if wanted > 1:
+            text = tr("&Capture  ({n} of {m})").format(n=count, m=max(wanted, count))
+        elif count:
+            text = tr("&Capture again")
+        self.capture.setText(text)
+
+    def show_notice(self, sentence: str, role: str) -> None:
+        """Say what became of the last capture, import or correction."""
+        self.notice.setText(sentence)
+        self.notice.setStyleSheet(f"color: {theme.colour(role).name()};" if sentence else "")
+
+    def show_running(self) -> None:
+        """Say that the step is being computed; its figures stay until there are others."""
+        self._show_sign(RUNNING)
+        self.sentence.setText(tr("Computing from the captures."))
+        self.recompute.hide()
+
+    def _show_sign(self, state: str) -> None:
+        self._sign.setPixmap(state_icon(state).pixmap(18, 18))
+        self._word.setText(state_word(state).capitalize())
+        self._word.setStyleSheet(f"color: {state_colour(state).name()};")
 
     def show_live(self, sentence: str, *, ready: bool) -> None:
         """Say what the live picture shows."""
@@ -205,19 +251,37 @@ class StepPanel(QScrollArea):
         self.live.setStyleSheet(f"color: {theme.colour(role).name()};" if sentence else "")
 
     def show_state(
-        self, state: str, sentence: str, quality: QualityTable, *, stale: bool, done: bool
+        self,
+        state: str,
+        sentence: str,
+        tables: Sequence[QualityTable],
+        *,
+        recompute: bool,
+        finished: bool,
     ) -> None:
-        """Show how the step stands."""
-        self._sign.setPixmap(state_icon(state).pixmap(18, 18))
-        self._word.setText(state_word(state).capitalize())
-        self._word.setStyleSheet(f"color: {state_colour(state).name()};")
+        """Show how the step stands.
+
+        Parameters
+        ----------
+        state, sentence : str
+            Its state, and what to say of it.
+        tables : sequence of QualityTable
+            Of its stages.
+        recompute : bool
+            Whether to offer to compute it.
+        finished : bool
+            Whether it needs nothing more, so that the next step comes next.
+        """
+        self._show_sign(state)
+        if recompute:
+            sentence = tr("{sentence}. Press Recompute.").format(sentence=sentence.rstrip("."))
         self.sentence.setText(sentence)
-        self.quality.set_table(quality)
-        self.quality.setVisible(bool(quality.figures))
-        self.recompute.setVisible(stale)
-        self.next.setDefault(done)
-        weight = "font-weight: bold;" if done else ""
-        self.next.setStyleSheet(weight)
+        figures = tuple(figure for table in tables for figure in table.figures)
+        self.quality.set_table(QualityTable(figures))
+        self.quality.setVisible(bool(figures))
+        self.recompute.setVisible(recompute)
+        self.finished = finished
+        self.next.setStyleSheet("font-weight: bold;" if finished else "")
 
     def show_work(self, title: str, share: float) -> None:
         """Show the work that runs; an empty title when there is none."""
@@ -226,6 +290,18 @@ class StepPanel(QScrollArea):
         self.progress.setFormat(f"{title}  %p %" if title else "")
         self.progress.setRange(0, 100 if share > 0.0 else 0)
         self.progress.setValue(round(100 * share))
+
+
+def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
+    """Return an area for a side panel that scrolls up and down only, and the widget in it."""
+    scroll = named(QScrollArea(), name, accessible)
+    scroll.setWidgetResizable(True)
+    scroll.setFrameShape(QFrame.Shape.NoFrame)
+    scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    inside = QWidget()
+    scroll.setWidget(inside)
+    return scroll, inside
 
 
 def lay_button(name: str) -> QPushButton:

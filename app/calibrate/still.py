@@ -80,6 +80,7 @@ class Still:
         self._quiet = self._quiet + 1 if self.moving <= MOVING_SHARE else 0
         return self._quiet >= self._needed
 
-    def reset(self) -> None:
-        """Forget, so that the same quiet is not taken twice for a new capture."""
-        self._quiet = 0
+    @property
+    def moves(self) -> bool:
+        """Whether something moved between the last two frames; not where there are none."""
+        return self.moving > MOVING_SHARE

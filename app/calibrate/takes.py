@@ -9,7 +9,8 @@ from pathlib import Path
 from app.calibrate.film_strip import Take
 from app.calibrate.steps import Step
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject, StageState, StageStatus
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.optics.lens_views import LensView
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.translation import tr

@@ -37,7 +37,7 @@ class Validating(QObject):
         self._controller, self._panel, self._context = controller, panel, context
         self._path: Path | None = None
         self._reconstructor: Reconstructor | None = None
-        self._trial: Trial | None = None
+        self._trial: tuple[Trial, str] | None = None
         self._capture: Future[list[Frame]] | None = None
         self._shown: Callable[[Panel], None] = lambda _panel: None
         self._poll = QTimer(self)
@@ -49,6 +49,7 @@ class Validating(QObject):
         panel.trial_wanted.connect(self.measure)
         panel.keep_wanted.connect(self.keep)
         panel.show_calibration("")
+        self._find_earlier()
 
     def show_pictures_in(self, shown: Callable[[Panel], None]) -> None:
         """Hand the shaded depth of every trial to `shown`."""
@@ -71,13 +72,34 @@ class Validating(QObject):
         self._panel.show_trial(None)
         self._show_verdict()
 
+    def _find_earlier(self) -> None:
+        """Go on with the newest calibration that was saved from this session."""
+        session = self._controller.project.session
+        try:
+            entries = self._context.workspace.entries()
+        except InputError as error:
+            self._context.toasts.show(str(error), "warn")
+            return
+        for entry in entries:
+            of_session = entry.summary is not None and entry.summary.session == session.folder.name
+            if of_session and entry.serial == session.sensor.serial:
+                self.take(str(entry.path))
+                return
+
+    def refresh(self) -> None:
+        """Follow the camera."""
+        self._panel.show_camera(self._controller.watching.stream is not None)
+
+    def close(self) -> None:
+        """Wait for nothing any more."""
+        self._poll.stop()
+        self._capture = None
+
     def measure(self) -> None:
         """Capture the press, then measure it."""
-        stream = self._controller.stream
-        if stream is None:
-            self._context.toasts.show(tr("There is no camera. Choose a source first."), "warn")
-            return
-        if self._capture is None and self._path is not None:
+        stream = self._controller.watching.stream
+        if stream is not None and self._capture is None and self._path is not None:
+            self._panel.result.setText(tr("Capturing: hold the object still."))
             self._capture = stream.capture(FRAMES)
             self._panel.show_work(0.0)
             self._poll.start()
@@ -109,15 +131,24 @@ class Validating(QObject):
                 tell=tell,
             )
 
-        self._controller.jobs.submit(Job(tr("Measuring the press"), work, self._show, self._refuse))
+        text = tr("{shape}, {size:g} mm").format(
+            shape=panel.shape.currentText(), size=known.size_mm
+        )
 
-    def _show(self, trial: Trial) -> None:
-        self._trial = trial
+        def done(trial: Trial) -> None:
+            self._show(trial, text)
+
+        self._panel.result.setText(tr("Measuring."))
+        self._controller.jobs.submit(Job(tr("Measuring the press"), work, done, self._refuse))
+
+    def _show(self, trial: Trial, text: str) -> None:
+        self._trial = trial, text
         self._panel.show_work(None)
         self._panel.show_trial(trial)
         self._shown(Panel(tr("Depth as measured"), trial.shaded))
 
     def _refuse(self, sentence: str) -> None:
+        self._trial = None
         self._panel.show_work(None)
         self._panel.show_trial(None)
         self._panel.result.setText(sentence)
@@ -126,16 +157,13 @@ class Validating(QObject):
         """Record the trial beside the calibration."""
         if self._trial is None or self._path is None or self._reconstructor is None:
             return
-        known = self._panel.known()
-        text = tr("{shape}, {size:g} mm").format(
-            shape=self._panel.shape.currentText(), size=known.size_mm
-        )
+        trial, text = self._trial
         validation = Validation(
             self._reconstructor.calibration.identity,
             datetime.now(UTC).isoformat(timespec="seconds"),
             _who(),
             text,
-            self._trial.comparisons,
+            trial.comparisons,
         )
         try:
             write_validation(validation, self._path)

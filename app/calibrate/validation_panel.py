@@ -8,25 +8,23 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
-    QFrame,
     QLabel,
     QProgressBar,
     QPushButton,
-    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
 
 from app.calibrate.assembly import AssemblyPicture
 from app.calibrate.states import state_colour
-from app.calibrate.step_panel import WIDTH, lay_button
+from app.calibrate.step_panel import WIDTH, lay_button, side_scroll
 from app.calibrate.steps import Step
 from app.calibrate.trial import KnownObject, Trial
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 
-class ValidationPanel(QScrollArea):
+class ValidationPanel(QWidget):
     """Asks for the known object, and shows how the trial went.
 
     Signals
@@ -46,13 +44,12 @@ class ValidationPanel(QScrollArea):
     def __init__(self, step: Step, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         named(self, "validation", tr("Validation"))
-        self.setWidgetResizable(True)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setMinimumWidth(WIDTH)
-        self.setMaximumWidth(WIDTH + 60)
-        inside = QWidget()
-        self.setWidget(inside)
+        self.setFixedWidth(WIDTH)
+        self._has_calibration = self._has_camera = False
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(0, 0, 0, 0)
+        scroll, inside = side_scroll("validation.scroll", tr("Validation"))
+        outer.addWidget(scroll)
         column = QVBoxLayout(inside)
         column.setContentsMargins(12, 10, 12, 10)
         title = QLabel(step.title)
@@ -80,6 +77,9 @@ class ValidationPanel(QScrollArea):
         self.measure.setMinimumHeight(38)
         self.measure.clicked.connect(self.trial_wanted)
         column.addWidget(self.measure)
+        self.blocked = named(QLabel(), "validation.blocked", tr("Why nothing can be measured"))
+        self.blocked.setWordWrap(True)
+        column.addWidget(self.blocked)
         self.progress = named(QProgressBar(), "validation.progress", tr("Progress"))
         self.progress.setRange(0, 100)
         keep = self.progress.sizePolicy()
@@ -152,7 +152,21 @@ class ValidationPanel(QScrollArea):
             if name
             else tr("Save the calibration first: a validation belongs to a saved one.")
         )
-        self.measure.setEnabled(bool(name))
+        self._has_calibration = bool(name)
+        self._allow()
+
+    def show_camera(self, there: bool) -> None:
+        """Offer to measure only where there is a camera."""
+        self._has_camera = there
+        self._allow()
+
+    def _allow(self) -> None:
+        self.measure.setEnabled(self._has_calibration and self._has_camera)
+        why = ""
+        if self._has_calibration and not self._has_camera:
+            why = tr("No camera: choose one in the bar above.")
+        self.blocked.setText(why)
+        self.blocked.setVisible(bool(why))
 
     def show_work(self, share: float | None) -> None:
         """Show progress; None when nothing runs."""

@@ -18,5 +18,6 @@ def without_menus(plot: pg.PlotWidget) -> pg.PlotWidget:
     """
     item = plot.getPlotItem()
     item.setMenuEnabled(False)
-    item.ctrlMenu.setParent(plot)
+    # With its flags: without them it would lie on the plot as a part of it.
+    item.ctrlMenu.setParent(plot, item.ctrlMenu.windowFlags())
     return plot

@@ -10,9 +10,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -25,13 +25,15 @@ from gelpolight_core.calibration.inputs import (
     changes_between,
     inputs_of,
 )
-from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, judge_joint, stages_of
+from gelpolight_core.calibration.intake import read_bytes, refuse_other_size, refuse_unfit
+from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, stages_of
 from gelpolight_core.calibration.stages import StageResults, run_stage
+from gelpolight_core.calibration.status import StageState, StageStatus, judged
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.capture import average_frames, write_picture
-from gelpolight_core.session.copies import file_hash
+from gelpolight_core.session.copies import file_hash, refuse_copies
 from gelpolight_core.session.decisions import (
     Decisions,
     PlacedCircle,
@@ -41,48 +43,12 @@ from gelpolight_core.session.decisions import (
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import (
     ONE_IMAGE_STAGES,
-    SensorData,
     Session,
-    read_picture,
     read_session,
 )
 from gelpolight_core.translation import tr
 
 Frame = NDArray[Any]
-
-
-class StageState(StrEnum):
-    """How a stage stands."""
-
-    EMPTY = "empty"
-    WAITING = "waiting"
-    STALE = "stale"
-    PASS = "pass"
-    WARN = "warn"
-    FAIL = "fail"
-
-
-@dataclass(frozen=True, slots=True)
-class StageStatus:
-    """How a stage stands, and why.
-
-    Attributes
-    ----------
-    stage : Stage
-        Which.
-    state : StageState
-        ``waiting``: its pictures are there, a result is not; ``stale``: there is a result, but not
-        of the present pictures.
-    sentence : str
-        What to say to a person.
-    quality : QualityTable
-        The figures of the present result.
-    """
-
-    stage: Stage
-    state: StageState
-    sentence: str
-    quality: QualityTable
 
 
 class Cancelled(Exception):
@@ -128,7 +94,9 @@ class CalibrationProject:
 
     # What a person captures and decides -------------------------------------------------------
 
-    def add_capture(self, stage: Stage, frames: Sequence[Frame]) -> str:
+    def add_capture(
+        self, stage: Stage, frames: Sequence[Frame], *, radius_mm: float | None = None
+    ) -> str:
         """Keep frames of one view as one picture, their average; return its name.
 
         A new capture takes the place of the earlier ones where a stage has a single view; those
@@ -140,40 +108,65 @@ class CalibrationProject:
             One with pictures of its own.
         frames : sequence of (rows, columns, 3) uint8 or uint16
             RGB.
+        radius_mm : float, optional
+            Of the ball, for a press.
 
         Raises
         ------
         InputError
-            If it cannot be written.
+            If it cannot be written, or has another size than the session's pictures.
         """
+        refuse_other_size(self._session, (frames[0].shape[1], frames[0].shape[0]))
         folder = FOLDERS[stage]
         with self._lock:
             name = self._next_name(folder)
-            write_picture(average_frames(frames), self._session.folder / folder / name)
+            path = self._session.folder / folder / name
+            self._keep(name, radius_mm, lambda: write_picture(average_frames(frames), path))
             self._replace_views(folder, {name})
         return name
 
-    def import_files(self, stage: Stage, files: Sequence[Path]) -> tuple[str, ...]:
+    def import_files(
+        self, stage: Stage, files: Sequence[Path], *, radius_mm: float | None = None
+    ) -> tuple[str, ...]:
         """Copy picture files into a stage; return their new names.
+
+        Parameters
+        ----------
+        stage : Stage
+            One with pictures of its own.
+        files : sequence of Path
+            PNG or TIFF.
+        radius_mm : float, optional
+            Of the ball in them, for presses.
 
         Raises
         ------
         InputError
-            If a file is no picture; then none is taken.
+            If a file is no picture that fits into the session; then none is taken.
         """
         folder = FOLDERS[stage]
-        for path in files:
-            read_picture(path)
-        names = []
+        refuse_unfit(self._session, stage, files)
+        names: list[str] = []
         with self._lock:
             for path in files:
                 name = self._next_name(folder, path.suffix.lower())
-                data = path.read_bytes()
-                make_folder(self._session.folder / folder)
-                write_atomically(self._session.folder / folder / name, _writer(data))
+                target = self._session.folder / folder / name
+                self._keep(name, radius_mm, partial(_copy, path, target))
                 names.append(name)
             self._replace_views(folder, set(names))
         return tuple(names)
+
+    def _keep(self, name: str, radius_mm: float | None, write: Callable[[], None]) -> None:
+        """Write a picture; its radius first, so that no press ever stands with another's."""
+        before = self._session.ball_radii_mm.get(name)
+        if radius_mm is not None:
+            self.set_ball_radius(name, radius_mm)
+        try:
+            write()
+        except InputError:
+            if radius_mm is not None:
+                self.set_ball_radius(name, before)
+            raise
 
     def decide(self, decisions: Decisions) -> None:
         """Take new decisions in the place of the present ones, on disk first."""
@@ -201,28 +194,29 @@ class CalibrationProject:
             balls = _with(self._session.decisions.balls, name, circle)
             self.decide(replace(self._session.decisions, balls=balls))
 
-    def edit_curve(self, channel: int, nodes: tuple[Point, ...] | None) -> None:
-        """Set a channel's reflectance curve by hand; None goes back to the fitted one."""
+    def edit_curves(self, curves: Mapping[int, tuple[Point, ...]]) -> None:
+        """Set the reflectance curves that are drawn by hand; the others are as fitted."""
         with self._lock:
-            curves = _with(self._session.decisions.curves, channel, nodes)
-            self.decide(replace(self._session.decisions, curves=curves))
+            self.decide(replace(self._session.decisions, curves=dict(curves)))
 
     def describe(self, session: Session) -> None:
-        """Take a new description of sensor, boards and balls, on disk first."""
-        with self._lock:
-            kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
-            write_description(kept)
-            self._session = kept
+        """Take what is stated of the sensor, its boards and the usual ball, on disk first.
 
-    def set_sensor(self, sensor: SensorData) -> None:
-        """Take what is stated of the sensor."""
-        self.describe(replace(self._session, sensor=sensor))
-
-    def set_ball_radius(self, name: str, radius_mm: float) -> None:
-        """State the radius of the ball in one picture."""
+        Folder, decisions and the radii stated for single presses stay.
+        """
         with self._lock:
-            radii = {**self._session.ball_radii_mm, name: radius_mm}
-            self.describe(replace(self._session, ball_radii_mm=radii))
+            self._describe(replace(session, ball_radii_mm=self._session.ball_radii_mm))
+
+    def set_ball_radius(self, name: str, radius_mm: float | None) -> None:
+        """State the radius of the ball in one picture; None goes back to the usual one."""
+        with self._lock:
+            radii = _with(self._session.ball_radii_mm, name, radius_mm)
+            self._describe(replace(self._session, ball_radii_mm=radii))
+
+    def _describe(self, session: Session) -> None:
+        kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
+        write_description(kept)
+        self._session = kept
 
     def _next_name(self, folder: str, suffix: str = ".png") -> str:
         taken = [p.stem for p in self._session.captured(folder)]
@@ -237,9 +231,11 @@ class CalibrationProject:
                 for path in self._session.found(folder)
                 if path.name not in names
             }
-            excluded = self._session.decisions.excluded | former
+            now = self._session.decisions
+            # A spot was placed in the picture that goes.
+            spots = {} if folder == FOLDERS[Stage.LIGHTS] else now.spots_px
             if former:
-                self.decide(replace(self._session.decisions, excluded=excluded))
+                self.decide(replace(now, excluded=now.excluded | former, spots_px=spots))
 
     # What is computed -------------------------------------------------------------------------
 
@@ -325,7 +321,9 @@ class CalibrationProject:
                 fault = self._outcomes[stage].fault
                 if fault is not None:
                     raise fault
-            return assemble(self._session, self._results, model=model)
+            session, results = self._session, self._results
+        refuse_copies(path for folder in FOLDERS.values() for path in session.files(folder))
+        return assemble(session, results, model=model)
 
     def _status(self, stage: Stage, inputs: Mapping[Stage, StageInputs]) -> StageStatus:
         outcome = self._outcomes.get(stage)
@@ -347,61 +345,7 @@ class CalibrationProject:
             return StageStatus(stage, StageState.STALE, said, nothing)
         if outcome.fault is not None:
             return StageStatus(stage, StageState.FAIL, str(outcome.fault), nothing)
-        return self._judged(stage)
-
-    def _judged(self, stage: Stage) -> StageStatus:
-        if stage is Stage.BALLS:
-            for ball in self._results.balls:
-                if ball.fault is not None:
-                    return StageStatus(stage, StageState.FAIL, str(ball.fault), QualityTable())
-        table = quality_of(stage, self._results)
-        state = {
-            Verdict.PASS: StageState.PASS,
-            Verdict.WARN: StageState.WARN,
-            Verdict.FAIL: StageState.FAIL,
-        }[table.verdict]
-        said = (
-            ". ".join(table.advice) + "."
-            if table.advice
-            else tr("Everything is within its limits.")
-        )
-        return StageStatus(stage, state, said, table)
-
-
-def quality_of(stage: Stage, results: StageResults) -> QualityTable:
-    """Return the quality table of a stage's result; an empty one where there is none."""
-    figures: list[Any] = []
-    parts: tuple[Any, ...] = {
-        Stage.RESPONSE: (results.response,),
-        Stage.LENS: (results.lens,),
-        Stage.TOP_POSE: (results.top_pose,),
-        Stage.LIGHTS: (results.lights, results.crosstalk),
-        Stage.RADIANCE: (results.radiance,),
-        Stage.BACKGROUND: (),
-        Stage.BALLS: (),
-        Stage.REFLECTANCE: (results.reflectance, results.factors),
-        Stage.JOINT: (),
-    }[stage]
-    for part in parts:
-        if part is not None:
-            figures += part.quality.figures
-    if stage is Stage.JOINT and results.full is not None:
-        figures += judge_joint(results.full).figures
-    if stage is Stage.BALLS:
-        figures += worst_figures([press.quality for press in results.presses])
-    return QualityTable(tuple(figures))
-
-
-def worst_figures(tables: Sequence[QualityTable]) -> list[Any]:
-    """Return each figure of several tables where it is judged worst, in the tables' order."""
-    order = list(Verdict)
-    worst: dict[str, Any] = {}
-    for table in tables:
-        for figure in table.figures:
-            known = worst.get(figure.key)
-            if known is None or order.index(figure.verdict) > order.index(known.verdict):
-                worst[figure.key] = figure
-    return list(worst.values())
+        return judged(stage, self._results)
 
 
 _STEMS = {
@@ -414,8 +358,10 @@ _STEMS = {
 }
 
 
-def _writer(data: bytes) -> Callable[[BinaryIO], object]:
-    return lambda stream: stream.write(data)
+def _copy(source: Path, target: Path) -> None:
+    data = read_bytes(source)
+    make_folder(target.parent)
+    write_atomically(target, lambda stream: stream.write(data))
 
 
 def _with(mapping: Mapping[Any, Any], key: Any, value: Any) -> dict[Any, Any]:

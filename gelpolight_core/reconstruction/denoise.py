@@ -43,9 +43,9 @@ def quiet_even_parts(
     ratio, sigma : (rows, columns, 3) float32
         Averaged, and its standard deviation.
     """
-    ratio = light / background
+    ratio = np.asarray(light / background, np.float32)
     if not usable.any():
-        return ratio, sigma
+        return np.asarray(ratio, np.float32), np.asarray(sigma, np.float32)
     noise = sigma
     seen = usable[..., None].astype(np.float32)
     light, background = light * seen, background * seen
@@ -72,7 +72,7 @@ def _quieted(
     least = np.float32(1e-6)
     below = np.maximum(_average(background, width_px), least)
     average = _average(light, width_px)
-    quiet = average / below
+    quiet = np.asarray(average / below, np.float32)
     wide = _average(light, wide_px) / np.maximum(_average(background, wide_px), least)
     seen = light[usable]
     level = np.maximum(np.median(seen, axis=0), least)
@@ -86,7 +86,8 @@ def _quieted(
     edge = np.where(usable, np.clip(excess, 0.0, 1.0), 0.0).astype(np.float32)
     reach = 2 * round(2.0 * width_px / QUIET_PX) + 1
     grown = cv2.dilate(edge, np.ones((reach, reach), np.uint8))
-    return quiet, np.asarray(cv2.GaussianBlur(grown, (0, 0), 1.5 * width_px / QUIET_PX))
+    edge = np.asarray(cv2.GaussianBlur(grown, (0, 0), 1.5 * width_px / QUIET_PX), np.float32)
+    return quiet, edge
 
 
 def _average(light: Map, width_px: float) -> Map:

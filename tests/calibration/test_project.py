@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,51 +12,37 @@ import pytest
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.project import CalibrationProject, Cancelled, StageState
+from gelpolight_core.calibration.project import CalibrationProject, Cancelled
+from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
 
 
-@pytest.fixture(scope="module")
-def computed(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> CalibrationProject:
-    """Return a project on a copy of the virtual session with every stage computed."""
-    folder = tmp_path_factory.mktemp("project") / "session"
-    shutil.copytree(virtual_session, folder)
-    project = CalibrationProject(folder)
-    while project.stale():
-        project.compute(project.stale()[0])
-    return project
-
-
 @pytest.fixture
-def project(computed: CalibrationProject, tmp_path: Path) -> CalibrationProject:
-    """Return a copy of the computed project in a folder of its own."""
-    folder = tmp_path / "session"
-    shutil.copytree(computed.session.folder, folder)
-    copied = CalibrationProject(folder)
-    copied._results, copied._outcomes = computed._results, dict(computed._outcomes)
-    return copied
+def project(computed_project: Callable[[], CalibrationProject]) -> CalibrationProject:
+    """Return a computed project in a folder of its own."""
+    return computed_project()
 
 
 def test_step_by_step_gives_the_same_calibration_as_all_at_once(
-    computed: CalibrationProject, virtual_calibration: Calibration
+    small_project: CalibrationProject, small_calibration: Calibration
 ) -> None:
-    made = computed.finish().calibration
-    np.testing.assert_array_equal(made.radiance, virtual_calibration.radiance)
-    np.testing.assert_array_equal(made.factors, virtual_calibration.factors)
-    np.testing.assert_array_equal(made.led_positions_mm, virtual_calibration.led_positions_mm)
+    made = small_project.finish().calibration
+    np.testing.assert_array_equal(made.radiance, small_calibration.radiance)
+    np.testing.assert_array_equal(made.factors, small_calibration.factors)
+    np.testing.assert_array_equal(made.led_positions_mm, small_calibration.led_positions_mm)
     assert made.full is not None
-    assert virtual_calibration.full is not None
+    assert small_calibration.full is not None
     np.testing.assert_array_equal(
-        made.full.led_positions_mm, virtual_calibration.full.led_positions_mm
+        made.full.led_positions_mm, small_calibration.full.led_positions_mm
     )
-    assert made.full.membrane == virtual_calibration.full.membrane
+    assert made.full.membrane == small_calibration.full.membrane
 
 
-def test_everything_passes_or_says_what_to_do(computed: CalibrationProject) -> None:
-    for status in computed.statuses().values():
+def test_everything_passes_or_says_what_to_do(small_project: CalibrationProject) -> None:
+    for status in small_project.statuses().values():
         assert status.state in (StageState.PASS, StageState.WARN)
         assert status.sentence
 
@@ -81,7 +67,7 @@ def test_taking_a_change_back_makes_the_result_present_again(project: Calibratio
 
 def test_another_led_height_makes_all_after_the_lights_stale(project: CalibrationProject) -> None:
     sensor = replace(project.session.sensor, led_height_mm=15.0)
-    project.set_sensor(sensor)
+    project.describe(replace(project.session, sensor=sensor))
     stale = set(project.stale())
     assert Stage.LIGHTS in stale
     assert Stage.JOINT in stale
@@ -90,7 +76,7 @@ def test_another_led_height_makes_all_after_the_lights_stale(project: Calibratio
 
 
 def test_captures_and_decisions_are_on_disk_at_once(project: CalibrationProject) -> None:
-    frames = [np.full((480, 640, 3), value, np.uint8) for value in (10, 13)]
+    frames = [np.full((240, 320, 3), value, np.uint8) for value in (10, 13)]
     name = project.add_capture(Stage.BALLS, frames)
     project.set_ball_radius(name, 2.5)
     project.place_ball(name, PlacedCircle(320.5, 200.25, 40.0))
@@ -106,13 +92,13 @@ def test_a_new_capture_of_a_single_view_takes_the_place_of_the_former(
     project: CalibrationProject,
 ) -> None:
     before = project.session.captured("mirror")
-    name = project.add_capture(Stage.LIGHTS, [np.zeros((480, 640, 3), np.uint8)])
+    name = project.add_capture(Stage.LIGHTS, [np.zeros((240, 320, 3), np.uint8)])
     assert [p.name for p in project.session.found("mirror")] == [name]
     assert all(path.is_file() for path in before)
 
 
 def test_a_name_is_never_given_twice(project: CalibrationProject) -> None:
-    frame = [np.zeros((480, 640, 3), np.uint8)]
+    frame = [np.zeros((240, 320, 3), np.uint8)]
     first = project.add_capture(Stage.LENS, frame)
     project.exclude(Stage.LENS, first)
     assert project.add_capture(Stage.LENS, frame) != first
@@ -135,7 +121,7 @@ def test_a_picture_without_a_ball_fails_and_can_be_left_out(project: Calibration
 def test_a_failing_stage_keeps_its_reason_and_the_results_of_others(
     project: CalibrationProject,
 ) -> None:
-    project.add_capture(Stage.LIGHTS, [np.zeros((480, 640, 3), np.uint8)])
+    project.add_capture(Stage.LIGHTS, [np.zeros((240, 320, 3), np.uint8)])
     status = project.compute(Stage.LIGHTS)
     assert status.state is StageState.FAIL
     assert "black" in status.sentence
@@ -192,9 +178,9 @@ def test_a_computation_can_be_stopped_and_leaves_all_as_it_was(
 
 
 def test_an_unfinished_session_says_which_stage_is_open(
-    virtual_session: Path, tmp_path: Path
+    small_session: Path, tmp_path: Path
 ) -> None:
-    session = read_session(virtual_session)
+    session = read_session(small_session)
     create_session(replace(session, folder=tmp_path / "new"))
     project = CalibrationProject(tmp_path / "new")
     assert project.stale() == ()

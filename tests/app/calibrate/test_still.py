@@ -66,11 +66,13 @@ def test_stillness_must_last_and_begins_anew_after_a_movement() -> None:
     ]
 
 
-def test_one_quiet_moment_is_not_taken_twice() -> None:
+def test_a_movement_is_told_while_it_lasts() -> None:
     watch = Still(2)
-    assert [watch.update(shot(scene(), i, noise=0.005)) for i in range(3)][-1]
-    watch.reset()
-    assert not watch.update(shot(scene(), 7, noise=0.005))
+    told = []
+    for number, place in enumerate((0.0, 0.0, 20.0, 20.0)):
+        watch.update(shot(scene(place), number, noise=0.005))
+        told.append(watch.moves)
+    assert told == [False, False, True, False]
 
 
 def test_another_picture_size_starts_the_watch_again() -> None:

@@ -1,0 +1,118 @@
+"""The camera of a wizard: what the detection sees in its pictures, and captures of some frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from app.calibrate.detection import Detection
+from app.calibrate.look import Looker
+from app.calibrate.still import Still
+from app.sources.mailbox import Mailbox
+from app.sources.processor import Failure, Outcome, Processor
+from app.sources.source import Frame
+from app.sources.stream import Stream
+from gelpolight_core.translation import tr
+
+POLL_MS = 30
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What the detection made of a live frame, whether it is still and whether anything moved."""
+
+    detection: Detection
+    still: bool
+    moved: bool
+
+
+class Watching(QObject):
+    """Looks at a stream with a step's detection, and takes frames from it.
+
+    Signals
+    -------
+    detected(object)
+        An Outcome or Failure of the detection on the live picture.
+    refused(str)
+        A sentence: why a capture came to nothing.
+    """
+
+    detected = Signal(object)
+    refused = Signal(str)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.stream: Stream | None = None
+        self._capture: Future[list[Frame]] | None = None
+        self._take: Callable[[list[Any]], None] = lambda _frames: None
+        self._inbox: Mailbox[Frame] = Mailbox()
+        self._outbox: Mailbox[Outcome[Any] | Failure] = Mailbox()
+        self._processor: Processor[Any] = Processor(
+            self._inbox, lambda _frame: None, self._outbox, name="detection"
+        )
+        self._tick = QTimer(self)
+        self._tick.setInterval(POLL_MS)
+        self._tick.timeout.connect(self._poll)
+
+    def set_stream(self, stream: Stream | None) -> None:
+        """Look at another stream; the owner starts and stops it."""
+        if self.stream is not None:
+            self.stream.remove_tap(self._inbox.put)
+            self._processor.stop()
+            self._tick.stop()
+            self._capture = None
+        self.stream = stream
+        if stream is not None:
+            stream.add_tap(self._inbox.put)
+            self._processor.start()
+            self._tick.start()
+
+    def look_with(self, detect: Looker | None) -> None:
+        """Use a detection from the next frame on; None: look for nothing."""
+        still = Still()
+        moved = False
+
+        def look(frame: Frame) -> Seen | None:
+            nonlocal moved
+            if detect is None:
+                return None
+            quiet = still.update(frame.rgb)
+            moved = moved or still.moves
+            return Seen(detect(frame.rgb), quiet, moved)
+
+        self._processor.replace(look)
+
+    @property
+    def detection_ms(self) -> float:
+        """Typical time of a detection."""
+        return self._processor.figures().median_ms
+
+    @property
+    def capturing(self) -> bool:
+        """Whether a capture is under way."""
+        return self._capture is not None
+
+    def capture(self, frames: int, take: Callable[[list[Any]], None]) -> None:
+        """Hand the next frames' pictures to `take`; one capture at a time."""
+        if self._capture is not None:
+            return
+        if self.stream is None:
+            self.refused.emit(tr("There is no camera. Choose a source first."))
+            return
+        self._capture, self._take = self.stream.capture(frames), take
+
+    def _poll(self) -> None:
+        item = self._outbox.take()
+        if item is not None:
+            self.detected.emit(item)
+        if self._capture is not None and self._capture.done():
+            future, self._capture = self._capture, None
+            error = future.exception()
+            if error is not None:
+                self.refused.emit(str(error))
+            else:
+                self._take([frame.rgb for frame in future.result()])
