@@ -22,7 +22,6 @@ from app.shell.faults import Faults
 from app.shell.icons import application_icon
 from app.shell.log import Log
 from app.shell.main_window import MainWindow
-from app.shell.preload import Preload
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
@@ -73,10 +72,9 @@ def run(arguments: Sequence[str] = ()) -> int:
                 with_log=True,
             )
         stop_listening = _close_on_signals(window)
-        preload = Preload([*(e.module for e in window.entries.values()), "app.sources.virtual"])
-        QTimer.singleShot(FIRST_LOOK_MS, preload.start)
+        modules = [name for entry in window.entries.values() for name in entry.modules]
+        QTimer.singleShot(FIRST_LOOK_MS, window.loader, lambda: window.loader.load(modules))
         status = application.exec()
-        preload.stop()
         stop_listening()
     finally:
         faults.uninstall()

@@ -360,7 +360,11 @@ class CalibrationProject:
             Verdict.WARN: StageState.WARN,
             Verdict.FAIL: StageState.FAIL,
         }[table.verdict]
-        said = ". ".join(table.advice) + "." if table.advice else tr("Everything is within its limits.")
+        said = (
+            ". ".join(table.advice) + "."
+            if table.advice
+            else tr("Everything is within its limits.")
+        )
         return StageStatus(stage, state, said, table)
 
 

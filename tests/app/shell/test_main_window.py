@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -107,6 +108,37 @@ def test_the_keyboard_reaches_every_page(window: MainWindow, qtbot: QtBot) -> No
     assert window.page_name == "bare"
     qtbot.keyClick(window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
     assert window.page_name == "sensors"
+
+
+def test_a_page_that_takes_long_to_load_comes_when_it_is_there(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slow_page.py").write_text(
+        f"import time\ntime.sleep(0.2)\nfrom {__name__} import Page\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    window.entries["calibrate"] = PageEntry("calibrate", "C", "calibrate", "slow_page:Page")
+    window.begin_demo()
+    assert window.page_name == ""
+    assert window.findChild(QWidget, "main.loading").isVisible()
+    qtbot.waitUntil(lambda: window.page_name == "calibrate")
+    assert window.page("calibrate").events == ["enter", "begin demo"]
+    del sys.modules["slow_page"]
+
+
+def test_a_person_who_goes_elsewhere_while_a_page_is_loaded_stays_there(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slower_page.py").write_text("import time\ntime.sleep(0.2)\nPage = None\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    window.entries["calibrate"] = PageEntry("calibrate", "C", "calibrate", "slower_page:Page")
+    window.show_page("calibrate")
+    window.show_page("sensors")
+    qtbot.waitUntil(lambda: window.loader._thread is None)
+    qtbot.wait(20)
+    assert window.page_name == "sensors"
+    assert "calibrate" not in window._made
+    del sys.modules["slower_page"]
 
 
 def test_every_registered_page_of_the_program_can_be_made(
