@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPalette
 from PySide6.QtWidgets import QApplication
@@ -104,10 +108,29 @@ def apply(application: QApplication, choice: str) -> None:
         dark = QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
     else:
         dark = choice == "dark"
-    if application.style().name() != "fusion":
-        application.setStyle("Fusion")
-    application.setPalette(palette_for(dark))
-    application.setStyleSheet(STYLE.format(**{name: p[dark] for name, p in COLOURS.items()}))
+    with _no_widget_vanishes():
+        if application.style().name() != "fusion":
+            application.setStyle("Fusion")
+        application.setPalette(palette_for(dark))
+        application.setStyleSheet(STYLE.format(**{name: p[dark] for name, p in COLOURS.items()}))
+
+
+@contextmanager
+def _no_widget_vanishes() -> Iterator[None]:
+    """Collect garbage now, and none meanwhile.
+
+    Qt goes through a list of all widgets and tells each of the new style. A widget that is
+    garbage, such as a menu that only refers to itself, must not be collected out of that list by
+    what the others do when they are told: Qt would then speak to where it was.
+    """
+    gc.collect()
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def contrast(one: QColor, other: QColor) -> float:
