@@ -25,6 +25,7 @@ from app.shell.main_window import MainWindow
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
+from app.sources.stopping import join_left_behind
 from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
@@ -32,6 +33,8 @@ from gelpolight_core.translation import tr
 
 # The first page is drawn and answers before anything heavy is loaded beside it.
 FIRST_LOOK_MS = 300
+# Longer than any single call of a stage or a renderer takes.
+LAST_JOIN_S = 10.0
 
 
 def run(arguments: Sequence[str] = ()) -> int:
@@ -76,9 +79,13 @@ def run(arguments: Sequence[str] = ()) -> int:
         QTimer.singleShot(FIRST_LOOK_MS, window.loader, lambda: window.loader.load(modules))
         status = application.exec()
         stop_listening()
+        ended = join_left_behind(LAST_JOIN_S)
     finally:
         faults.uninstall()
         context.log.stop()
+    if not ended:
+        sys.stdout.flush()
+        os._exit(status)
     return status
 
 
