@@ -40,6 +40,7 @@ def build_parser() -> argparse.ArgumentParser:
     # Not above: they load for seconds, and Ctrl-C shall be answered in that time too.
     from app.command_line import (
         benchmark,
+        board,
         calibrate,
         design,
         evaluate,
@@ -73,6 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
         report,
         benchmark,
         design,
+        board,
     ):
         command.add_parser(commands)
     return parser

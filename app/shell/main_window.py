@@ -6,11 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
     QCloseEvent,
+    QDesktopServices,
     QDragEnterEvent,
     QDropEvent,
     QGuiApplication,
@@ -43,6 +44,7 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
+BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 FIRST_SIZE = QSize(1280, 800)
 # Raised when toolbars change, so that an older layout is not forced onto a newer window.
 LAYOUT_VERSION = 1
@@ -267,6 +269,14 @@ class MainWindow(QMainWindow):
     def show_about(self) -> None:
         """Show what this program is made of."""
         _show(AboutDialog(self))
+
+    def open_board(self, square_mm: int) -> None:
+        """Show a checkerboard to print, in what the desktop shows PDF with."""
+        path = BOARDS / f"checkerboard-9x6-{square_mm}mm.pdf"
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
+            self.context.toasts.show(
+                tr("Nothing here shows PDF; print this file: {path}").format(path=path), "warn"
+            )
 
     def set_theme(self, choice: str) -> None:
         """Show a theme and remember it."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QAction, QDesktopServices, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -384,3 +384,21 @@ def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
     assert "not validated" in said["main.status.calibration"]
     with pytest.raises(TypeError):
         window.context.status.update(speed=1)
+
+
+@pytest.mark.parametrize("shows", [True, False], ids=["with a viewer", "without"])
+def test_a_checkerboard_to_print_is_in_the_help_menu(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch, shows: bool
+) -> None:
+    opened = []
+    monkeypatch.setattr(
+        QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()) or shows
+    )
+    for square in (2, 3):
+        window.findChild(QAction, f"help.board_{square}mm").trigger()
+        assert Path(opened[-1]).name == f"checkerboard-9x6-{square}mm.pdf"
+        assert Path(opened[-1]).is_file()
+    told = [toast.text for toast in window.context.toasts.shown()]
+    assert [path for path in opened if any(path in text for text in told)] == (
+        [] if shows else opened
+    )
