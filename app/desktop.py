@@ -22,10 +22,10 @@ from app.shell.faults import Faults
 from app.shell.icons import application_icon
 from app.shell.log import Log
 from app.shell.main_window import MainWindow
-from app.shell.preload import Preload
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
+from app.sources.stopping import join_left_behind
 from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
@@ -33,6 +33,8 @@ from gelpolight_core.translation import tr
 
 # The first page is drawn and answers before anything heavy is loaded beside it.
 FIRST_LOOK_MS = 300
+# Longer than any single call of a stage or a renderer takes.
+LAST_JOIN_S = 10.0
 
 
 def run(arguments: Sequence[str] = ()) -> int:
@@ -73,14 +75,17 @@ def run(arguments: Sequence[str] = ()) -> int:
                 with_log=True,
             )
         stop_listening = _close_on_signals(window)
-        preload = Preload([*(e.module for e in window.entries.values()), "app.sources.virtual"])
-        QTimer.singleShot(FIRST_LOOK_MS, preload.start)
+        modules = [name for entry in window.entries.values() for name in entry.modules]
+        QTimer.singleShot(FIRST_LOOK_MS, window.loader, lambda: window.loader.load(modules))
         status = application.exec()
-        preload.stop()
         stop_listening()
+        ended = join_left_behind(LAST_JOIN_S)
     finally:
         faults.uninstall()
         context.log.stop()
+    if not ended:
+        sys.stdout.flush()
+        os._exit(status)
     return status
 
 

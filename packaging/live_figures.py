@@ -2,10 +2,12 @@
 
     xvfb-run -a -s "-screen 0 1920x1200x24" python packaging/live_figures.py --minutes 5
     ... --calibration sensor.gplcal    with the depth map of every frame, as when measuring
+    ... --wizard SESSION               the wizard on a copy of a session, at the steps of --steps
+    ... --wizard SESSION --rounds 20   the wizard is opened and closed so often
 
-The object on the sensor is dragged about for half of the time. Printed are the frames per second
-made, processed and shown; how late timers of the user interface are; how old a frame is when it is
-painted; and how the memory grows.
+Without the wizard the object on the sensor is dragged about for half of the time. Printed are
+the frames per second made, processed and shown; how late timers of the user interface are; how old
+a frame is when it is painted; and how the memory grows.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from probes import Lateness, PaintWatch, Spent, WatchedStream, resident_mb, told
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QGraphicsView, QHBoxLayout, QWidget
+from wizard_figures import show_wizard
 
 from app.bench.bench_panel import BenchPanel
 from app.live.live_view import LiveView
@@ -28,82 +31,11 @@ from app.sources.bench import Bench
 from app.sources.mailbox import Mailbox
 from app.sources.processor import Failure, Outcome, Processor
 from app.sources.source import Frame
-from app.sources.stream import Stream, StreamFigures
+from app.sources.stream import Stream
 from app.sources.virtual import VirtualSource
 
-TICK_MS = 10
 DRAG_MS = 33
 ROUND_S = 8.0  # half of it the object is dragged, then it lies still
-
-
-class WatchedBox:
-    """The stream's mailbox; notes which frame the view has taken."""
-
-    def __init__(self, box: Mailbox[Frame]) -> None:
-        self._box = box
-        self.fresh: Frame | None = None
-
-    def take(self) -> Frame | None:
-        """Return the newest frame."""
-        frame = self._box.take()
-        if frame is not None:
-            self.fresh = frame
-        return frame
-
-
-class WatchedStream:
-    """The stream as the view sees it."""
-
-    def __init__(self, stream: Stream) -> None:
-        self._stream = stream
-        self.newest = WatchedBox(stream.newest)
-
-    def figures(self) -> StreamFigures:
-        """Return the stream's figures."""
-        return self._stream.figures()
-
-
-class PaintWatch(QObject):
-    """Notes how old each frame is when the view begins to paint it."""
-
-    def __init__(self, box: WatchedBox) -> None:
-        super().__init__()
-        self._box = box
-        self.ages_ms: list[float] = []
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Look at paint events, and let all pass."""
-        if event.type() == QEvent.Type.Paint and self._box.fresh is not None:
-            self.ages_ms.append(1e3 * (time.monotonic() - self._box.fresh.time_s))
-            self._box.fresh = None
-        return False
-
-
-class Lateness:
-    """A timer of the user interface that notes how late it is."""
-
-    def __init__(self) -> None:
-        self.late_ms: list[float] = []
-        self._due_s = math.nan
-        self.timer = QTimer()
-        self.timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self.timer.setSingleShot(True)
-        self.timer.timeout.connect(self._note)
-        self._again()
-
-    def _again(self) -> None:
-        self._due_s = time.monotonic() + 1e-3 * TICK_MS
-        self.timer.start(TICK_MS)
-
-    def _note(self) -> None:
-        self.late_ms.append(max(0.0, 1e3 * (time.monotonic() - self._due_s)))
-        self._again()
-
-
-def resident_mb() -> float:
-    """Return the memory of this process."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * 4096 / 1e6
 
 
 def dragger(bench: Bench) -> Callable[[], None]:
@@ -146,14 +78,6 @@ def processor_for(
     return Processor(inbox, lambda frame: reconstructor.depth(frame.rgb), outbox)
 
 
-def told(name: str, values: list[float], unit: str) -> str:
-    """Return a line with the median, the 99th percentile and the largest of some values."""
-    if not values:
-        return f"{name}: nothing was measured"
-    middle, high = np.percentile(values, [50, 99])
-    return f"{name}: p50 {middle:.1f}, p99 {high:.1f}, largest {max(values):.1f} {unit}"
-
-
 class Measurement:
     """The live path in a window, and what is measured on it."""
 
@@ -193,12 +117,12 @@ class Measurement:
         self._lateness.late_ms.clear()
         self._before = self.stream.figures()
         self._memory_mb = resident_mb()
-        self._spent_s, self._since_s = time.process_time(), time.monotonic()
+        self._spent = Spent()
 
     def tell(self) -> None:
         """Print what was measured."""
         figures, camera = self.stream.figures(), self.bench.design.camera
-        span_s = time.monotonic() - self._since_s
+        span_s = self._spent.wall_s
         made = figures.made - self._before.made
         dropped = figures.dropped - self._before.dropped
         print(f"{camera.width_px} x {camera.height_px} pixels, {span_s:.0f} s")
@@ -212,7 +136,7 @@ class Measurement:
         print(told("lateness of the user interface", self._lateness.late_ms, "ms"))
         print(told("age of a frame when its painting begins", self._paints.ages_ms, "ms"))
         print(f"memory: {self._memory_mb:.0f} MB, at the end {resident_mb():.0f} MB")
-        print(f"processor: {(time.process_time() - self._spent_s) / span_s:.2f} cores")
+        print(self._spent.told())
 
     def stop(self) -> None:
         """End all threads."""
@@ -233,11 +157,18 @@ def main() -> None:
     parser.add_argument("--warm-up", type=float, default=10.0, help="seconds not measured")
     parser.add_argument("--calibration", type=Path, help="make depth maps with it")
     parser.add_argument("--still", action="store_true", help="nothing is dragged")
+    parser.add_argument("--wizard", type=Path, metavar="SESSION", help="open the wizard on it")
+    parser.add_argument("--steps", default="lens,lights,balls", help="of the wizard")
+    parser.add_argument("--rounds", type=int, default=0, help="open and close the wizard so often")
     parser.add_argument("--picture", type=Path, help="file for a picture of the window at the end")
     options = parser.parse_args()
 
     application = QApplication([])
     theme.apply(application, "light")
+    if options.wizard is not None:
+        seconds = 60.0 * options.minutes
+        show_wizard(options.wizard, options.steps.split(","), seconds, rounds=options.rounds)
+        return
     measurement = Measurement(options.calibration, drag=not options.still)
     measurement.start()
     QTimer.singleShot(int(1e3 * options.warm_up), measurement.begin)

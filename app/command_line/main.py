@@ -41,6 +41,7 @@ def build_parser() -> argparse.ArgumentParser:
     from app.command_line import (
         ablation,
         benchmark,
+        board,
         calibrate,
         design,
         evaluate,
@@ -75,6 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
         benchmark,
         ablation,
         design,
+        board,
     ):
         command.add_parser(commands)
     return parser

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
@@ -62,7 +63,7 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         super().__init__()
         self._overlay = Overlay()
         self._size = (1, 1)
-        self._masks: list[QImage] = []
+        self._masks: list[tuple[QRectF, QImage]] = []
         self._held: tuple[Handle, Grip] | None = None
         self._dragged: Handle | None = None
         self.selected = ""
@@ -73,7 +74,7 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
             self.prepareGeometryChange()
             self._size = size
         if overlay.masks != self._overlay.masks:
-            self._masks = [_mask_picture(mask) for mask in overlay.masks]
+            self._masks = [_mask_picture(mask) for mask in overlay.masks if mask.area.any()]
         # A result that comes in while a person drags must not tear the handle away.
         self._overlay = overlay if self._dragged is None else with_handle(overlay, self._dragged)
         self.update()
@@ -160,22 +161,25 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         painter.restore()
 
     def _paint_masks(self, painter: QPainter) -> None:
-        for picture in self._masks:
-            target = QRectF(-0.5, -0.5, picture.width(), picture.height())
-            painter.drawImage(target, picture)
+        for place, picture in self._masks:
+            painter.drawImage(place, picture)
 
 
-def _mask_picture(mask: Mask) -> QImage:
-    """Return a tint for the true pixels: one byte a pixel, coloured by a table."""
-    rows, columns = mask.area.shape
+def _mask_picture(mask: Mask) -> tuple[QRectF, QImage]:
+    """Return a tint for the true pixels, one byte a pixel, coloured by a table, and its place.
+
+    No more than these pixels: a few small spots would otherwise cost as much at each frame as the
+    whole picture does, several times over.
+    """
+    left, top, columns, rows = cv2.boundingRect(np.ascontiguousarray(mask.area).view(np.uint8))
     # Qt wants every line to begin at a multiple of four bytes.
     padded = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
-    padded[:, :columns] = mask.area
+    padded[:, :columns] = mask.area[top : top + rows, left : left + columns]
     picture = QImage(padded.data, columns, rows, padded.shape[1], QImage.Format.Format_Indexed8)
     tint = QColor(ROLE_COLOURS[mask.role])
     tint.setAlpha(MASK_ALPHA)
     picture.setColorTable([0, tint.rgba()])
-    return picture.copy()
+    return QRectF(left - 0.5, top - 0.5, columns, rows), picture.copy()
 
 
 def _stroke(painter: QPainter, role: Role, draw: Any, *, width: float = 1.6) -> None:

@@ -140,6 +140,11 @@ class LiveView(QWidget):
         self._nudge_end.setInterval(NUDGE_END_MS)
         self._nudge_end.timeout.connect(self._end_nudge)
 
+    @property
+    def shown_frames(self) -> int:
+        """How many pictures were shown since it was made."""
+        return self._shown_frames
+
     # What pages ask of it
 
     def set_stream(self, stream: StreamLike | None) -> None:

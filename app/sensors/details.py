@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QLabel,
+    QProgressBar,
     QScrollArea,
     QToolButton,
     QVBoxLayout,
@@ -18,7 +19,7 @@ from app.sensors.model import made_cell
 from app.shell.icons import icon
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget, verdict_word
-from app.workspace.library import Entry
+from app.workspace.library import Entry, parse_time
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
@@ -50,9 +51,13 @@ class Details(QWidget):
         self._area.setFrameShape(QFrame.Shape.NoFrame)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(12, 0, 0, 0)
+        self.busy = named(QProgressBar(self), "sensors.busy", tr("The report is being written"))
+        self.busy.setRange(0, 0)
+        self.busy.hide()
         layout.addWidget(self._title)
         layout.addWidget(self._facts)
         layout.addLayout(buttons)
+        layout.addWidget(self.busy)
         layout.addWidget(self._area, 1)
 
     def show_entry(self, entry: Entry | None) -> None:
@@ -114,15 +119,23 @@ def facts(entry: Entry, summary: CalibrationSummary) -> str:
             version=summary.program_version,
         ),
     ]
+    return "\n".join((*lines, *trial_lines(entry)))
+
+
+def trial_lines(entry: Entry) -> list[str]:
+    """Return whether a calibration was tried on an object of known size, and what came out."""
     trial = entry.validation
     if trial is None or entry.validation_note:
         note = entry.validation_note or tr("press an object of known size before you trust it")
-        lines.append(tr("Not validated: {note}.").format(note=note))
-    else:
-        word = tr("Validated") if trial.passed else tr("Validation failed")
-        lines.append(f"{word}: {trial.indenter}, {trial.when} {trial.who}".rstrip())
-        said = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
-        lines += [
+        return [tr("Not validated: {note}").format(note=note)]
+    word = tr("Validated") if trial.passed else tr("Validation failed")
+    when = parse_time(trial.when)
+    day = trial.when if when is None else f"{when.astimezone():%Y-%m-%d %H:%M}"
+    who = tr("by {name}").format(name=trial.who) if trial.who else ""
+    said = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
+    return [
+        f"{word}: {trial.indenter}, {day} {who}".rstrip(),
+        *(
             said.format(
                 what=c.quantity,
                 a=c.measured_mm,
@@ -131,5 +144,5 @@ def facts(entry: Entry, summary: CalibrationSummary) -> str:
                 l=c.limit_percent,
             )
             for c in trial.comparisons
-        ]
-    return "\n".join(lines)
+        ),
+    ]

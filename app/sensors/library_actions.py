@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app.shell.context import AppContext
 from app.workspace.library import Entry
+from app.workspace.sessions import SessionEntry
 from app.workspace.workspace import Removal
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -22,6 +23,14 @@ class LibraryActions:
         """Return all calibrations; none where the workspace cannot be read, which is told."""
         try:
             return self._context.workspace.entries()
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+            return ()
+
+    def sessions(self) -> tuple[SessionEntry, ...]:
+        """Return all sessions; none where the workspace cannot be read, which is told."""
+        try:
+            return self._context.workspace.sessions()
         except InputError as error:
             self._context.toasts.show(str(error), "fail")
             return ()

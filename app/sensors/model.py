@@ -1,4 +1,4 @@
-"""The list of calibrations as a table."""
+"""The lists of calibrations and of sessions as tables."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from app.shell import theme
 from app.shell.icons import icon
 from app.widgets.quality_table import verdict_word
 from app.workspace.library import Entry
+from app.workspace.sessions import SessionEntry
 from gelpolight_core.translation import tr
 
 Index = QModelIndex | QPersistentModelIndex
@@ -29,38 +30,18 @@ class Cell:
     key: Any = ""
 
 
-class LibraryModel(QAbstractTableModel):
-    """One row for each calibration.
+class CellsModel(QAbstractTableModel):
+    """Rows of cells under titles."""
 
-    Parameters
-    ----------
-    oldest_days : callable
-        Returns the age beyond which a calibration is marked.
-    """
+    TITLES: tuple[str, ...] = ()
 
-    TITLES = ("", "Sensor", "Made", "Age", "Verdict", "Validated", "Model", "Identity")
-
-    def __init__(self, oldest_days: Callable[[], float]) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._oldest_days = oldest_days
-        self._entries: tuple[Entry, ...] = ()
         self._cells: list[tuple[Cell, ...]] = []
 
-    def set_entries(self, entries: tuple[Entry, ...]) -> None:
-        """Show other calibrations."""
-        now = datetime.now(UTC)
-        self.beginResetModel()
-        self._entries = entries
-        self._cells = [cells_of(entry, now, self._oldest_days()) for entry in entries]
-        self.endResetModel()
-
-    def entry(self, row: int) -> Entry:
-        """Return the calibration of a row."""
-        return self._entries[row]
-
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008
-        """Return the number of calibrations."""
-        return 0 if parent.isValid() else len(self._entries)
+        """Return the number of rows."""
+        return 0 if parent.isValid() else len(self._cells)
 
     def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008
         """Return the number of columns."""
@@ -91,6 +72,66 @@ class LibraryModel(QAbstractTableModel):
             case Qt.ItemDataRole.UserRole:
                 return cell.key or cell.text
         return None
+
+
+class LibraryModel(CellsModel):
+    """One row for each calibration.
+
+    Parameters
+    ----------
+    oldest_days : callable
+        Returns the age beyond which a calibration is marked.
+    """
+
+    TITLES = ("", "Sensor", "Made", "Age", "Verdict", "Validation", "Model", "Identity")
+
+    def __init__(self, oldest_days: Callable[[], float]) -> None:
+        super().__init__()
+        self._oldest_days = oldest_days
+        self._entries: tuple[Entry, ...] = ()
+
+    def set_entries(self, entries: tuple[Entry, ...]) -> None:
+        """Show other calibrations."""
+        now = datetime.now(UTC)
+        self.beginResetModel()
+        self._entries = entries
+        self._cells = [cells_of(entry, now, self._oldest_days()) for entry in entries]
+        self.endResetModel()
+
+    def entry(self, row: int) -> Entry:
+        """Return the calibration of a row."""
+        return self._entries[row]
+
+
+class SessionsModel(CellsModel):
+    """One row for each session."""
+
+    TITLES = ("Sensor", "Session", "Pictures", "Last worked at")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._entries: tuple[SessionEntry, ...] = ()
+
+    def set_entries(self, entries: tuple[SessionEntry, ...]) -> None:
+        """Show other sessions."""
+        self.beginResetModel()
+        self._entries = entries
+        self._cells = [session_cells(entry) for entry in entries]
+        self.endResetModel()
+
+    def entry(self, row: int) -> SessionEntry:
+        """Return the session of a row."""
+        return self._entries[row]
+
+
+def session_cells(entry: SessionEntry) -> tuple[Cell, ...]:
+    """Return what a session's row shows."""
+    return (
+        Cell(entry.serial),
+        Cell(entry.folder.name, tip=str(entry.folder)),
+        Cell(str(entry.pictures), key=entry.pictures),
+        Cell(f"{entry.changed.astimezone():%Y-%m-%d %H:%M}", key=entry.changed.timestamp()),
+    )
 
 
 def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...]:
@@ -153,10 +194,10 @@ def validated_cell(entry: Entry) -> Cell:
     trial = entry.validation
     if entry.validated and trial is not None:
         tip = tr("{what}, {when}").format(what=trial.indenter, when=trial.when)
-        return Cell(tr("Yes"), "validated", "pass", tip, key=2)
+        return Cell(tr("validated"), "validated", "pass", tip, key=2)
     if trial is not None and not entry.validation_note:
-        return Cell(tr("Failed"), "fail", "fail", trial.indenter, key=1)
-    return Cell(tr("No"), "", "muted", entry.validation_note, key=0)
+        return Cell(tr("failed"), "fail", "fail", trial.indenter, key=1)
+    return Cell(tr("not validated"), "", "muted", entry.validation_note, key=0)
 
 
 def _in_use(entry: Entry) -> Cell:

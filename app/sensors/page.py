@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QItemSelectionModel, QSortFilterProxyModel, Qt, QUrl
+from PySide6.QtCore import QItemSelectionModel, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QFileDialog,
-    QHeaderView,
     QSplitter,
     QStackedWidget,
-    QTableView,
     QToolBar,
     QVBoxLayout,
     QWidget,
@@ -22,6 +19,9 @@ from PySide6.QtWidgets import (
 from app.sensors.details import Details
 from app.sensors.library_actions import LibraryActions, show_in_use
 from app.sensors.model import LibraryModel
+from app.sensors.report_writer import ReportWriter
+from app.sensors.sessions_box import SessionsBox
+from app.sensors.tables import CellsTable
 from app.sensors.welcome import Welcome
 from app.shell.actions import make_action
 from app.shell.context import AppContext
@@ -39,17 +39,24 @@ class SensorsPage(QWidget):
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
         self._context = context
+        self._writing = False
         self._library = LibraryActions(context)
         named(self, "sensors", tr("Sensors"))
         self._make_actions()
         self._model = LibraryModel(lambda: context.settings.limits.age_days)
-        self._sorted = QSortFilterProxyModel(self)
-        self._sorted.setSourceModel(self._model)
-        self._sorted.setSortRole(Qt.ItemDataRole.UserRole)
-        self._table = self._build_table()
-        self._details = Details((self.use, self.reveal, self.remove))
+        self._table = CellsTable(self._model, "sensors.table", tr("Calibrations"), self)
+        self._table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
+        self._table.selectionModel().selectionChanged.connect(self._show_chosen)
+        self._table.doubleClicked.connect(lambda _: self.use.trigger())
+        self._sessions = SessionsBox(self)
+        self._sessions.wanted.connect(context.requests.session)
+        self._reports = ReportWriter(self)
+        self._reports.busy_changed.connect(self._show_busy)
+        self._reports.written.connect(self._tell_written)
+        self._reports.refused.connect(lambda text: context.toasts.show(text, "fail"))
+        self._details = Details((self.use, self.report, self.reveal, self.remove))
         split = QSplitter(Qt.Orientation.Horizontal, self)
-        split.addWidget(self._table)
+        split.addWidget(self._build_lists())
         split.addWidget(self._details)
         split.setStretchFactor(0, 3)
         split.setStretchFactor(1, 2)
@@ -108,6 +115,14 @@ class SensorsPage(QWidget):
             icon_name="use",
             tip=tr("Measure with this calibration"),
         )
+        self.report = make_action(
+            self,
+            "sensors.report",
+            tr("Re&port…"),
+            self.choose_report,
+            icon_name="report",
+            tip=tr("Write all there is to know of this calibration, as web page or PDF"),
+        )
         self.reveal = make_action(
             self,
             "sensors.reveal",
@@ -133,27 +148,14 @@ class SensorsPage(QWidget):
         ways = (self.demo, self.new, self.session, self.import_)
         return tuple(action for action in ways if action.isEnabled())
 
-    def _build_table(self) -> QTableView:
-        table = named(QTableView(self), "sensors.table", tr("Calibrations"))
-        table.setModel(self._sorted)
-        table.setSortingEnabled(True)
-        table.sortByColumn(1, Qt.SortOrder.AscendingOrder)
-        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        table.setAlternatingRowColors(True)
-        table.setShowGrid(False)
-        table.setWordWrap(False)
-        table.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        table.setTabKeyNavigation(False)
-        table.verticalHeader().hide()
-        table.verticalHeader().setDefaultSectionSize(30)
-        header = table.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setStretchLastSection(True)
-        header.setHighlightSections(False)
-        table.selectionModel().selectionChanged.connect(self._show_chosen)
-        table.doubleClicked.connect(lambda _: self.use.trigger())
-        return table
+    def _build_lists(self) -> QSplitter:
+        lists = QSplitter(Qt.Orientation.Vertical, self)
+        lists.addWidget(self._table)
+        lists.addWidget(self._sessions)
+        lists.setStretchFactor(0, 3)
+        lists.setStretchFactor(1, 2)
+        lists.setChildrenCollapsible(False)
+        return lists
 
     def _build_library(self, split: QSplitter) -> QWidget:
         bar = named(QToolBar(self), "sensors.bar", tr("Library"))
@@ -193,17 +195,51 @@ class SensorsPage(QWidget):
             if place is not None:
                 self._choose(place)
 
+    def choose_report(self) -> None:
+        """Ask for a place, and write the report of the chosen calibration there."""
+        entry, settings = self.chosen(), self._context.settings
+        if entry is None:
+            return
+        name, _ = QFileDialog.getSaveFileName(
+            self,
+            tr("Write the report"),
+            str(settings.last_folder / f"{entry.path.stem}-report.html"),
+            tr("Web page (*.html);;PDF (*.pdf)"),
+        )
+        if name:
+            settings.last_folder = Path(name).parent
+            self._reports.write(entry, Path(name))
+
+    def may_close(self) -> bool:
+        """Wait a little for a report that is being written."""
+        self._reports.stop()
+        return True
+
+    def _show_busy(self, busy: bool) -> None:
+        self._writing = busy
+        self._details.busy.setVisible(busy)
+        self._show_chosen()
+
+    def _tell_written(self, path: str) -> None:
+        self._context.toasts.show(
+            tr("The report is written to {path}.").format(path=path),
+            "pass",
+            actions=((tr("Open"), lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(path))),),
+        )
+
     def chosen(self) -> Entry | None:
         """Return the calibration that is chosen."""
-        rows = self._table.selectionModel().selectedRows()
-        return self._model.entry(self._sorted.mapToSource(rows[0]).row()) if rows else None
+        row = self._table.chosen_row()
+        return None if row is None else self._model.entry(row)
 
     def refresh(self) -> None:
         """Show what is in the workspace now; what was chosen stays chosen."""
         chosen = self.chosen()
         entries = self._library.entries()
         self._model.set_entries(entries)
-        self._stack.setCurrentIndex(1 if entries else 0)
+        sessions = self._library.sessions()
+        self._sessions.set_entries(sessions)
+        self._stack.setCurrentIndex(1 if entries or sessions else 0)
         show_in_use(self._context, entries)
         used = next((entry for entry in entries if entry.in_use), None)
         known = {entry.path for entry in entries}
@@ -215,9 +251,10 @@ class SensorsPage(QWidget):
             self._show_chosen()
 
     def _choose(self, path: Path) -> None:
-        for row in range(self._sorted.rowCount()):
-            index = self._sorted.index(row, 0)
-            if self._model.entry(self._sorted.mapToSource(index).row()).path == path:
+        rows = self._table.sorted
+        for row in range(rows.rowCount()):
+            index = rows.index(row, 0)
+            if self._model.entry(rows.mapToSource(index).row()).path == path:
                 self._table.selectionModel().setCurrentIndex(
                     index,
                     QItemSelectionModel.SelectionFlag.ClearAndSelect
@@ -228,6 +265,7 @@ class SensorsPage(QWidget):
         entry = self.chosen()
         self._details.show_entry(entry)
         self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
+        self.report.setEnabled(entry is not None and not entry.broken and not self._writing)
         self.reveal.setEnabled(entry is not None)
         self.remove.setEnabled(entry is not None)
 

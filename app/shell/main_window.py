@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
     QCloseEvent,
+    QDesktopServices,
     QDragEnterEvent,
     QDropEvent,
     QGuiApplication,
@@ -30,6 +32,8 @@ from app.shell.about import AboutDialog
 from app.shell.context import AppContext
 from app.shell.dropping import dropped_paths, is_session, sort_dropped
 from app.shell.icons import icon
+from app.shell.loader import Loader
+from app.shell.loading_view import LoadingView
 from app.shell.log_window import LogWindow
 from app.shell.menus import Menus
 from app.shell.pages import PageEntry, all_pages
@@ -40,6 +44,7 @@ from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
+BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 FIRST_SIZE = QSize(1280, 800)
 # Raised when toolbars change, so that an older layout is not forced onto a newer window.
 LAYOUT_VERSION = 1
@@ -64,10 +69,14 @@ class MainWindow(QMainWindow):
         self.setAcceptDrops(True)
         self.context = context
         self.entries = {entry.name: entry for entry in pages or all_pages()}
+        self.loader = Loader(self)
         self._made: dict[str, QWidget] = {}
+        self._asked_for = ""
         self._log_window: LogWindow | None = None
         self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
         self.setCentralWidget(self._stack)
+        self._loading = LoadingView()
+        self._stack.addWidget(self._loading)
         self.page_actions = self._build_navigation()
         self.menus = Menus(self)
         self.setStatusBar(StatusLine(context.status))
@@ -130,27 +139,48 @@ class MainWindow(QMainWindow):
         return self._made[name]
 
     def show_page(self, name: str) -> None:
-        """Show a page; a name that is not registered is the first page's."""
-        if name not in self.entries:
-            name = next(iter(self.entries))
-        before = self._stack.currentWidget() if self._made else None
-        after = self.page(name)
+        """Show a page; a name that is not registered is the first page's.
+
+        One whose modules are not loaded yet is shown as soon as they are.
+        """
+        self._with_page(name if name in self.entries else next(iter(self.entries)), lambda _: None)
+
+    def _with_page(self, name: str, act: Callable[[QWidget], object]) -> None:
+        """Show a page and do something with it, unless another is asked for meanwhile."""
+        self._asked_for = name
         self.page_actions[name].setChecked(True)
+
+        def go_on() -> None:
+            if self._asked_for == name:
+                page = self.page(name)
+                self._switch_to(page)
+                self.context.settings.last_page = name
+                act(page)
+
+        if name not in self._made:
+            self._loading.say(self.entries[name].title)
+            self.loader.when_loaded(self.entries[name].modules, go_on)
+            if name not in self._made:
+                self._switch_to(self._loading)
+            return
+        go_on()
+
+    def _switch_to(self, after: QWidget) -> None:
+        before = self._stack.currentWidget()
         if after is before:
             return
-        if before is not None:
-            _call(before, "leave")
+        _call(before, "leave")
         self._stack.setCurrentWidget(after)
-        self.context.settings.last_page = name
         _call(after, "enter")
 
     def open_path_in(self, name: str, path: str) -> None:
         """Show a page and let it open a folder or file."""
-        if name not in self.entries:
-            return
-        self.show_page(name)
+        if name in self.entries:
+            self._with_page(name, lambda page: self._open_path(page, Path(path)))
+
+    def _open_path(self, page: QWidget, path: Path) -> None:
         try:
-            _call(self.page(name), "open_path", Path(path))
+            _call(page, "open_path", path)
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
 
@@ -159,11 +189,15 @@ class MainWindow(QMainWindow):
 
         A page that knows how to begin on it (``begin_demo``) is asked to.
         """
-        self.context.requests.demo.emit()
         if "calibrate" not in self.entries:
+            self.context.source.choose_virtual_sensor()
             return
-        self.show_page("calibrate")
-        _call(self.page("calibrate"), "begin_demo")
+
+        def begin(page: QWidget) -> None:
+            self.context.source.choose_virtual_sensor()
+            _call(page, "begin_demo")
+
+        self._with_page("calibrate", begin)
 
     # Sessions and files
 
@@ -236,6 +270,14 @@ class MainWindow(QMainWindow):
         """Show what this program is made of."""
         _show(AboutDialog(self))
 
+    def open_board(self, square_mm: int) -> None:
+        """Show a checkerboard to print, in what the desktop shows PDF with."""
+        path = BOARDS / f"checkerboard-9x6-{square_mm}mm.pdf"
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
+            self.context.toasts.show(
+                tr("Nothing here shows PDF; print this file: {path}").format(path=path), "warn"
+            )
+
     def set_theme(self, choice: str) -> None:
         """Show a theme and remember it."""
         self.context.settings.theme = choice
@@ -267,6 +309,7 @@ class MainWindow(QMainWindow):
         settings = self.context.settings
         settings.keep_window_state(self.saveGeometry(), self.saveState(LAYOUT_VERSION))
         settings.save()
+        self.loader.stop()
         self.context.toasts.clear()
         for page in self._made.values():
             page.close()

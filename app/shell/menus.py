@@ -93,6 +93,16 @@ class Menus:
                 keys=("F1", "?"),
             )
         )
+        boards = menu.addMenu(tr("&Printable checkerboards"))
+        for square, use in ((3, tr("lens views")), (2, tr("top surface"))):
+            boards.addAction(
+                make_action(
+                    window,
+                    f"help.board_{square}mm",
+                    tr("Squares of {s} mm ({use})").format(s=square, use=use),
+                    lambda square=square: window.open_board(square),
+                )
+            )
         menu.addAction(make_action(window, "help.about", tr("&About"), window.show_about))
 
     def _build_themes(self) -> dict[str, QAction]:

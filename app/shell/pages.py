@@ -34,12 +34,20 @@ class PageEntry:
         A name of :mod:`app.shell.icons`.
     factory : str
         ``module:class``; the module is imported when the page is first opened.
+    also : tuple of str, optional
+        Further modules that the page imports only when it needs them.
     """
 
     name: str
     title: str
     icon: str
     factory: str
+    also: tuple[str, ...] = ()
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Names of all modules that are loaded before the page is made."""
+        return self.module, *self.also
 
     @property
     def module(self) -> str:
@@ -66,7 +74,19 @@ def all_pages() -> tuple[PageEntry, ...]:
     """Return the pages of this program, in the order of the work."""
     table = (
         PageEntry("sensors", tr("Sensors"), "sensors", "app.sensors.page:SensorsPage"),
-        PageEntry("calibrate", tr("Calibrate"), "calibrate", "app.calibrate.page:CalibratePage"),
+        PageEntry(
+            "calibrate",
+            tr("Calibrate"),
+            "calibrate",
+            "app.calibrate.page:CalibratePage",
+            also=(
+                "app.sources.virtual",
+                "app.sources.listing",
+                "app.bench.stated",
+                "app.bench.bench_panel",
+                "app.calibrate.curve_step",
+            ),
+        ),
         PageEntry("inspect", tr("Inspect"), "inspect", "app.inspect.page:InspectPage"),
         PageEntry("measure", tr("Measure"), "measure", "app.measure.page:MeasurePage"),
     )

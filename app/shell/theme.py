@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPalette
 from PySide6.QtWidgets import QApplication
+
+CHECK = Path(__file__).resolve().parents[2] / "resources" / "icons" / "check.svg"
 
 # name: (light, dark). Every text colour has at least 4.5:1 on window, base and alternate base.
 COLOURS = {
@@ -47,6 +54,15 @@ QToolButton:hover {{ background: {alternate}; border-color: {line}; }}
 QToolButton:pressed, QToolButton:checked {{ background: {line}; }}
 QToolButton:disabled {{ color: {disabled}; }}
 QToolButton:focus {{ border: 2px solid {accent}; padding: 3px 4px; }}
+QCheckBox::indicator, QGroupBox::indicator, QAbstractItemView::indicator {{
+    width: 14px; height: 14px; border: 1px solid {muted}; border-radius: 3px; background: {base}; }}
+QCheckBox::indicator:hover, QCheckBox::indicator:focus, QGroupBox::indicator:hover {{
+    border-color: {accent}; }}
+QCheckBox::indicator:checked, QGroupBox::indicator:checked, QAbstractItemView::indicator:checked {{
+    background: {highlight}; border-color: {highlight}; image: url("{check}"); }}
+QCheckBox::indicator:disabled, QGroupBox::indicator:disabled {{
+    border-color: {disabled}; background: {window}; }}
+QCheckBox::indicator:checked:disabled {{ background: {disabled}; }}
 QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
 """
 
@@ -98,16 +114,41 @@ def palette_for(dark: bool) -> QPalette:
     return palette
 
 
+def style_sheet(dark: bool) -> str:
+    """Return what Fusion cannot take from a palette, such as the frame of a check box."""
+    colours = {name: pair[dark] for name, pair in COLOURS.items()}
+    return STYLE.format(**colours, check=CHECK.as_posix())
+
+
 def apply(application: QApplication, choice: str) -> None:
     """Show a theme: ``light``, ``dark``, or ``system``, what the desktop says."""
     if choice == "system":
         dark = QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
     else:
         dark = choice == "dark"
-    if application.style().name() != "fusion":
-        application.setStyle("Fusion")
-    application.setPalette(palette_for(dark))
-    application.setStyleSheet(STYLE.format(**{name: p[dark] for name, p in COLOURS.items()}))
+    with _no_widget_vanishes():
+        if application.style().name() != "fusion":
+            application.setStyle("Fusion")
+        application.setPalette(palette_for(dark))
+        application.setStyleSheet(style_sheet(dark))
+
+
+@contextmanager
+def _no_widget_vanishes() -> Iterator[None]:
+    """Collect garbage now, and none meanwhile.
+
+    Qt goes through a list of all widgets and tells each of the new style. A widget that is
+    garbage, such as a menu that only refers to itself, must not be collected out of that list by
+    what the others do when they are told: Qt would then speak to where it was.
+    """
+    gc.collect()
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def contrast(one: QColor, other: QColor) -> float:

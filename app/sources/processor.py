@@ -13,13 +13,13 @@ from typing import Generic, TypeVar
 
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame
+from app.sources.stopping import join
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
 _POLL_S = 0.1
-_STOP_S = 1.0
 _KEPT_TIMES = 60
 
 T = TypeVar("T")
@@ -130,9 +130,7 @@ class Processor(Generic[T]):
         """End after the frame that is being processed; harmless when it is stopped."""
         self._end.set()
         if self._thread is not None:
-            self._thread.join(_STOP_S)
-            if self._thread.is_alive():
-                _LOG.warning("The thread %s did not stop within %s s", self._name, _STOP_S)
+            join(self._thread)
             self._thread = None
 
     def figures(self) -> ProcessorFigures:

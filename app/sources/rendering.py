@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import threading
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.bench import BOARDS, PRESSED, Bench, Scene
+from app.sources.stopping import join
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.boards import BoardPose, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never
@@ -28,13 +28,10 @@ from gelpolight_core.simulation.virtual_sensor import (
     Whiteboard,
 )
 
-_LOG = logging.getLogger(__name__)
-
 Array = NDArray[np.float64]
 
 _PREVIEW_WIDTH_PX = 480
 _DARK = 1e-6  # far below one count of any camera
-_STOP_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,9 +101,7 @@ class Renderer:
         with self._changed:
             self._closing = True
             self._changed.notify_all()
-        self._thread.join(_STOP_S)
-        if self._thread.is_alive():
-            _LOG.warning("The virtual sensor is still busy; it ends with the picture at hand")
+        join(self._thread)
 
     def _run(self) -> None:
         try:

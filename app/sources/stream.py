@@ -12,13 +12,11 @@ from dataclasses import dataclass, field
 
 from app.sources.mailbox import Mailbox
 from app.sources.source import Frame, Source, SourceLost
+from app.sources.stopping import join
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
-
-STOP_S = 1.0
-"""How long a thread is waited for before it is left behind."""
 
 _POLL_S = 0.1
 _RATE_WINDOW_S = 2.0
@@ -104,7 +102,7 @@ class Stream:
         """End capturing and close the source; harmless when it is stopped."""
         self._end.set()
         if self._thread is not None:
-            _join(self._thread)
+            join(self._thread)
             self._thread = None
 
     def reopen(self) -> None:
@@ -239,10 +237,3 @@ class Stream:
             where=self.source.name,
             advice=tr("Start them and capture again"),
         )
-
-
-def _join(thread: threading.Thread) -> None:
-    thread.join(STOP_S)
-    if thread.is_alive():
-        # It is a daemon, so that a hanging driver cannot keep the program from ending.
-        _LOG.warning("The thread %s did not stop within %s s", thread.name, STOP_S)

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from app.workspace.library import Entry, read_entry
+from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
@@ -94,12 +95,23 @@ class Workspace:
         try:
             files = sorted(self.sensors_folder.glob(f"*/[!.]*{ENDING}"))
         except OSError as error:
-            raise InputError(
-                tr("the workspace cannot be read ({reason})").format(reason=error.strerror),
-                where=str(self.folder),
-                advice=tr("Check its permissions, or choose another folder in the preferences"),
-            ) from error
+            raise self._unreadable(error) from error
         return _in_order(read_entry(path, in_use=path == in_use) for path in files)
+
+    def sessions(self) -> tuple[SessionEntry, ...]:
+        """Return every session, by sensor, the one last worked at first.
+
+        Raises
+        ------
+        InputError
+            If the workspace is there but cannot be read.
+        """
+        try:
+            found = self.sensors_folder.glob(f"*/sessions/[!.]*/{DESCRIPTION}")
+            entries = [read_session_entry(path.parent) for path in found]
+        except OSError as error:
+            raise self._unreadable(error) from error
+        return tuple(sorted(entries, key=lambda e: (e.serial, -e.changed.timestamp())))
 
     @property
     def in_use(self) -> Path | None:
@@ -201,6 +213,13 @@ class Workspace:
                 folder.rmdir()
         if removal.was_in_use:
             self.use(removal.place)
+
+    def _unreadable(self, error: OSError) -> InputError:
+        return InputError(
+            tr("the workspace cannot be read ({reason})").format(reason=error.strerror),
+            where=str(self.folder),
+            advice=tr("Check its permissions, or choose another folder in the preferences"),
+        )
 
     def _refuse_outside(self, path: Path) -> None:
         if not path.is_relative_to(self.sensors_folder):

@@ -8,11 +8,19 @@ from pathlib import Path
 
 import pytest
 import scene
-from PySide6.QtWidgets import QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QLabel,
+    QProgressBar,
+    QTableView,
+    QToolButton,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
 from app.sensors.model import cells_of
 from app.sensors.page import SensorsPage
+from app.sensors.report_writer import write_entry_report
 from app.shell.context import AppContext
 from app.shell.settings import Limits
 from app.widgets.quality_table import QualityTableWidget
@@ -165,3 +173,73 @@ def test_every_column_of_every_row_has_a_text_or_a_tip(source: Path, tmp_path: P
     for path in (source, tmp_path / "x.gplcal"):
         cells = cells_of(read_entry(path, in_use=True), datetime.now(UTC), 90.0)
         assert all(cell.text or cell.tip for cell in cells if cell.icon)
+
+
+def session_of(context: AppContext, serial: str) -> Path:
+    folder = context.workspace.sessions_folder(serial) / "2026-01-02"
+    folder.mkdir(parents=True)
+    (folder / "session.toml").write_text(f'[sensor]\nserial = "{serial}"\n')
+    return folder
+
+
+def test_a_session_is_gone_on_with_also_before_there_is_a_calibration(
+    page: SensorsPage, context: AppContext, qtbot: QtBot
+) -> None:
+    folder = session_of(context, "S-1")
+    page.enter()
+    assert "No sensor yet" not in words(page)
+    button = page.findChild(QToolButton, "sensors.go_on.button")
+    table = page.findChild(QTableView, "sensors.sessions.table")
+    assert not button.isEnabled()
+    table.selectRow(0)
+    page.enter()  # what was chosen stays chosen
+    with qtbot.waitSignal(context.requests.session) as asked:
+        button.click()
+    assert asked.args == [str(folder)]
+
+
+@pytest.mark.parametrize("ending", ["html", "pdf"])
+def test_a_report_is_written_beside_the_windows_work(
+    page: SensorsPage, source: Path, context: AppContext, tmp_path: Path, qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch, ending: str,
+) -> None:  # fmt: skip
+    place = tmp_path / f"report.{ending}"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(place), ""))
+    page.open_path(source)
+    bar = page.findChild(QProgressBar, "sensors.busy")
+    page.report.trigger()
+    assert bar.isVisible()
+    assert not page.report.isEnabled()
+    qtbot.waitUntil(lambda: page.report.isEnabled(), timeout=20000)
+    assert not bar.isVisible()
+    assert place.stat().st_size > 1000
+    assert str(place) in context.toasts.shown()[-1].text
+
+
+def test_a_report_that_cannot_be_written_is_told(
+    page: SensorsPage, source: Path, context: AppContext, tmp_path: Path, qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    place = tmp_path / "nowhere" / "report.html"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(place), ""))
+    page.open_path(source)
+    page.report.trigger()
+    qtbot.waitUntil(lambda: page.report.isEnabled(), timeout=20000)
+    assert context.toasts.shown()[-1].kind == "fail"
+    assert str(place.parent) in context.toasts.shown()[-1].text
+
+
+def test_the_report_says_what_a_trial_came_to(source: Path, tmp_path: Path) -> None:
+    place = tmp_path / "c.gplcal"
+    place.write_bytes(source.read_bytes())
+    write_entry_report(read_entry(place), tmp_path / "before.html")
+    trial = Validation(
+        read_entry(place).summary.identity, "2026-01-02T03:04:05+00:00", "M", "cylinder",
+        (Comparison("height", 1.01, 1.0, 8.0),),
+    )  # fmt: skip
+    write_validation(trial, place)
+    write_entry_report(read_entry(place), tmp_path / "after.html")
+    said = [(tmp_path / f"{name}.html").read_text() for name in ("before", "after")]
+    assert "1.010 mm measured" not in said[0]
+    assert "Validated: cylinder" in said[1]
+    assert "1.010 mm measured" in said[1]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QAction, QDesktopServices, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -107,6 +108,37 @@ def test_the_keyboard_reaches_every_page(window: MainWindow, qtbot: QtBot) -> No
     assert window.page_name == "bare"
     qtbot.keyClick(window, Qt.Key.Key_1, Qt.KeyboardModifier.ControlModifier)
     assert window.page_name == "sensors"
+
+
+def test_a_page_that_takes_long_to_load_comes_when_it_is_there(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slow_page.py").write_text(
+        f"import time\ntime.sleep(0.2)\nfrom {__name__} import Page\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    window.entries["calibrate"] = PageEntry("calibrate", "C", "calibrate", "slow_page:Page")
+    window.begin_demo()
+    assert window.page_name == ""
+    assert window.findChild(QWidget, "main.loading").isVisible()
+    qtbot.waitUntil(lambda: window.page_name == "calibrate")
+    assert window.page("calibrate").events == ["enter", "begin demo"]
+    del sys.modules["slow_page"]
+
+
+def test_a_person_who_goes_elsewhere_while_a_page_is_loaded_stays_there(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "slower_page.py").write_text("import time\ntime.sleep(0.2)\nPage = None\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    window.entries["calibrate"] = PageEntry("calibrate", "C", "calibrate", "slower_page:Page")
+    window.show_page("calibrate")
+    window.show_page("sensors")
+    qtbot.waitUntil(lambda: window.loader._thread is None)
+    qtbot.wait(20)
+    assert window.page_name == "sensors"
+    assert "calibrate" not in window._made
+    del sys.modules["slower_page"]
 
 
 def test_every_registered_page_of_the_program_can_be_made(
@@ -352,3 +384,21 @@ def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
     assert "not validated" in said["main.status.calibration"]
     with pytest.raises(TypeError):
         window.context.status.update(speed=1)
+
+
+@pytest.mark.parametrize("shows", [True, False], ids=["with a viewer", "without"])
+def test_a_checkerboard_to_print_is_in_the_help_menu(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch, shows: bool
+) -> None:
+    opened = []
+    monkeypatch.setattr(
+        QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()) or shows
+    )
+    for square in (2, 3):
+        window.findChild(QAction, f"help.board_{square}mm").trigger()
+        assert Path(opened[-1]).name == f"checkerboard-9x6-{square}mm.pdf"
+        assert Path(opened[-1]).is_file()
+    told = [toast.text for toast in window.context.toasts.shown()]
+    assert [path for path in opened if any(path in text for text in told)] == (
+        [] if shows else opened
+    )

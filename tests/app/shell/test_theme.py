@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from itertools import product
+from pathlib import Path
 
 import pytest
 from PySide6.QtGui import QColor, QPalette
@@ -11,6 +14,7 @@ from PySide6.QtWidgets import QApplication
 from app.shell import theme
 from app.shell.icons import FOLDER, icon
 
+ROOT = Path(__file__).resolve().parents[3]
 READABLE = 4.5  # WCAG 2, level AA, for texts of ordinary size
 MARK = 3.0  # the same for what is no text: frames of focus, icons
 THEMES = pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
@@ -92,3 +96,40 @@ def test_disabled_text_differs_from_enabled(qapp: QApplication) -> None:
         assert palette.color(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Text) != (
             palette.color(QPalette.ColorGroup.Active, QPalette.ColorRole.Text)
         )
+
+
+SWITCHING = """
+import gc
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QMenu, QWidget
+from app.desktop import make_application
+from app.shell import theme
+
+class Busy(QWidget):
+    def changeEvent(self, event):
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.StyleChange:
+            self.made = [[{}] for _ in range(2000)]  # enough for a collection
+
+application = make_application()
+shown = [Busy() for _ in range(20)]
+for widget in shown:
+    widget.show()
+for number in range(50):
+    gc.disable()
+    for _ in range(20):
+        menu = QMenu()
+        menu.itself = menu
+    del menu
+    gc.enable()
+    gc.set_threshold(700, 1, 1)
+    theme.apply(application, ("dark", "light")[number % 2])
+assert gc.isenabled()
+"""
+
+
+def test_switching_survives_widgets_that_are_garbage() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SWITCHING], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr

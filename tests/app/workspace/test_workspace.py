@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -71,7 +72,11 @@ def test_another_of_the_same_name_takes_no_place(
 ) -> None:
     first = workspace.import_calibration(source)
     old = scene.calibration()
-    other = replace(old, provenance=replace(old.provenance, created="2020-01-01T00:00:00+00:00"))
+    other = replace(
+        old,
+        led_positions_mm=old.led_positions_mm + 0.01,
+        provenance=replace(old.provenance, created="2020-01-01T00:00:00+00:00"),
+    )
     write_calibration(other, tmp_path / source.name)
     second = workspace.import_calibration(tmp_path / source.name)
     assert second != first
@@ -272,3 +277,32 @@ def test_age_is_counted_in_days(workspace: Workspace, source: Path) -> None:
 def test_times_without_a_zone_are_utc_and_nonsense_is_unknown() -> None:
     assert parse_time("2026-01-02T03:04:05") == datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
     assert parse_time("yesterday") is None
+
+
+def test_sessions_are_listed_by_sensor_the_last_worked_at_first(workspace: Workspace) -> None:
+    for number, (serial, name) in enumerate((("B-1", "old"), ("B-1", "new"), ("A-1", "x"))):
+        folder = workspace.sessions_folder(serial) / name
+        (folder / "mirror").mkdir(parents=True)
+        for picture in range(number):
+            (folder / "mirror" / f"{picture}.png").write_bytes(b"")
+        (folder / "mirror" / ".half.png").write_bytes(b"")
+        (folder / "session.toml").write_text(f'[sensor]\nserial = "{serial}"\n')
+        for path in (folder / "session.toml", folder / "mirror"):
+            os.utime(path, (number, number))
+    found = workspace.sessions()
+    assert [(e.serial, e.folder.name, e.pictures) for e in found] == [
+        ("A-1", "x", 2),
+        ("B-1", "new", 1),
+        ("B-1", "old", 0),
+    ]
+
+
+def test_a_session_that_cannot_be_read_is_listed_under_its_folder(workspace: Workspace) -> None:
+    folder = workspace.sessions_folder("C-1") / "spoilt"
+    folder.mkdir(parents=True)
+    (folder / "session.toml").write_text("sensor = [")
+    assert [e.serial for e in workspace.sessions()] == ["C-1"]
+
+
+def test_a_workspace_that_is_not_there_has_no_sessions(workspace: Workspace) -> None:
+    assert workspace.sessions() == ()

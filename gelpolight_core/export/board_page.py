@@ -1,0 +1,136 @@
+"""A checkerboard to print: an A4 page at true scale, with a ruler that shows what a printer did."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.translation import tr
+
+A4_MM = (210.0, 297.0)
+MM_PER_INCH = 25.4
+ENDING = ".pdf"
+RULER_MM = 50.0
+# Printers leave this much white; ruler and text stand in a strip of this height at the foot.
+MARGIN_MM = 10.0
+FOOT_MM = 38.0
+# The detector needs light around the board: cut no closer than this many squares.
+QUIET_SQUARES = 1.5
+CUT_MM = 4.0
+
+
+def write_board(board: BoardSpec, path: Path) -> None:
+    """Write a checkerboard as a PDF page at true scale, whole or not at all.
+
+    Parameters
+    ----------
+    board : BoardSpec
+        Corners and squares.
+    path : Path
+        Its name ends in ``.pdf``.
+
+    Raises
+    ------
+    InputError
+        If the board does not fit the paper, the name ends otherwise, or the file cannot be
+        written.
+    """
+    if path.suffix.lower() != ENDING:
+        raise InputError(
+            tr("a board is written as PDF"),
+            where=str(path),
+            advice=tr("Let the file's name end in .pdf"),
+        )
+    stream = io.BytesIO()
+    information = {"Title": caption(board), "Creator": "GelPoLight Studio", "CreationDate": None}
+    with rc_context({"pdf.fonttype": 42}):
+        draw_board(board).savefig(stream, format="pdf", metadata=information)
+    write_atomically(path, lambda file: file.write(stream.getvalue()))
+
+
+def caption(board: BoardSpec) -> str:
+    """Return what a board is, in words."""
+    return tr("Checkerboard: {w} x {h} inner corners, squares of {s:g} mm").format(
+        w=board.inner_corners[0], h=board.inner_corners[1], s=board.square_mm
+    )
+
+
+def draw_board(board: BoardSpec) -> Figure:
+    """Return the page as a figure of the paper's size.
+
+    Raises
+    ------
+    InputError
+        If the board does not fit the paper.
+    """
+    across, down = (n + 1 for n in board.inner_corners)
+    width, height = across * board.square_mm, down * board.square_mm
+    page = _paper(width, height, board)
+    figure = Figure(figsize=(page[0] / MM_PER_INCH, page[1] / MM_PER_INCH))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_xlim(0.0, page[0])
+    axes.set_ylim(page[1], 0.0)
+    axes.axis("off")
+    left, top = 0.5 * (page[0] - width), 0.5 * (page[1] - FOOT_MM - height)
+    for row in range(down):
+        for column in range(row % 2, across, 2):
+            corner = left + column * board.square_mm, top + row * board.square_mm
+            side = board.square_mm
+            # Snapped to a raster's pixels, squares would differ in size.
+            axes.add_patch(Rectangle(corner, side, side, color="black", linewidth=0, snap=False))
+    quiet = QUIET_SQUARES * board.square_mm
+    _cut_marks(axes, (left - quiet, top - quiet), (left + width + quiet, top + height + quiet))
+    _foot(axes, page, board)
+    return figure
+
+
+def _paper(width_mm: float, height_mm: float, board: BoardSpec) -> tuple[float, float]:
+    """Return the size of the page, upright where the board fits it so."""
+    around = 2.0 * (MARGIN_MM + QUIET_SQUARES * board.square_mm)
+    for page in (A4_MM, A4_MM[::-1]):
+        if width_mm + around <= page[0] and height_mm + around + FOOT_MM <= page[1]:
+            return page
+    raise InputError(
+        tr("a board of {w:.0f} x {h:.0f} mm does not fit an A4 page").format(
+            w=width_mm, h=height_mm
+        ),
+        where=caption(board),
+        advice=tr("Choose fewer corners or smaller squares"),
+    )
+
+
+def _cut_marks(axes: Axes, first: tuple[float, float], last: tuple[float, float]) -> None:
+    """Mark the corners of what is to be cut out, with nothing dark near the squares."""
+    for x, outward_x in ((first[0], -CUT_MM), (last[0], CUT_MM)):
+        for y, outward_y in ((first[1], -CUT_MM), (last[1], CUT_MM)):
+            for ends in (((x, x + outward_x), (y, y)), ((x, x), (y, y + outward_y))):
+                axes.add_line(Line2D(*ends, color="0.45", linewidth=0.4))
+
+
+def _foot(axes: Axes, page: tuple[float, float], board: BoardSpec) -> None:
+    """Draw the ruler and say how to print."""
+    left, y = 0.5 * (page[0] - RULER_MM), page[1] - FOOT_MM + 8.0
+    axes.add_line(
+        Line2D((left, left + RULER_MM), (y, y), color="black", linewidth=0.6, solid_capstyle="butt")
+    )
+    for number in range(int(RULER_MM / 10.0) + 1):
+        x = left + 10.0 * number
+        tick = 3.0 if number in (0, int(RULER_MM / 10.0)) else 1.8
+        axes.add_line(Line2D((x, x), (y - tick, y), color="black", linewidth=0.3))
+    lines = (
+        tr("{mm:.0f} mm").format(mm=RULER_MM),
+        caption(board),
+        tr("Print at 100 %, without fitting it to the page: the line above must be 50.0 mm long."),
+        tr("Glue it onto something flat, measure all its squares together, and state one's size."),
+    )
+    for number, text in enumerate(lines):
+        axes.text(0.5 * page[0], y + 5.0 + 5.0 * number, text, ha="center", va="center", fontsize=8)

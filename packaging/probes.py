@@ -1,0 +1,113 @@
+"""What the live figures are measured with."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+
+from app.sources.mailbox import Mailbox
+from app.sources.source import Frame
+from app.sources.stream import Stream, StreamFigures
+
+TICK_MS = 5
+
+
+class WatchedBox:
+    """The stream's mailbox; notes which frame the view has taken."""
+
+    def __init__(self, box: Mailbox[Frame]) -> None:
+        self._box = box
+        self.fresh: Frame | None = None
+
+    def take(self) -> Frame | None:
+        """Return the newest frame."""
+        frame = self._box.take()
+        if frame is not None:
+            self.fresh = frame
+        return frame
+
+
+class WatchedStream:
+    """The stream as the view sees it."""
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
+        self.newest = WatchedBox(stream.newest)
+
+    def figures(self) -> StreamFigures:
+        """Return the stream's figures."""
+        return self._stream.figures()
+
+
+class PaintWatch(QObject):
+    """Notes how old each frame is when the view begins to paint it."""
+
+    def __init__(self, box: WatchedBox) -> None:
+        super().__init__()
+        self._box = box
+        self.ages_ms: list[float] = []
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Look at paint events, and let all pass."""
+        if event.type() == QEvent.Type.Paint and self._box.fresh is not None:
+            self.ages_ms.append(1e3 * (time.monotonic() - self._box.fresh.time_s))
+            self._box.fresh = None
+        return False
+
+
+class Lateness:
+    """A timer of the user interface that notes how late it is."""
+
+    def __init__(self) -> None:
+        self.late_ms: list[float] = []
+        self._due_s = math.nan
+        self.timer = QTimer()
+        self.timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self.timer.setSingleShot(True)
+        self.timer.timeout.connect(self._note)
+        self._again()
+
+    def _again(self) -> None:
+        self._due_s = time.monotonic() + 1e-3 * TICK_MS
+        self.timer.start(TICK_MS)
+
+    def _note(self) -> None:
+        self.late_ms.append(max(0.0, 1e3 * (time.monotonic() - self._due_s)))
+        self._again()
+
+
+def resident_mb() -> float:
+    """Return the memory of this process."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
+def told(name: str, values: list[float], unit: str) -> str:
+    """Return a line with the median, the 99th percentile and the largest of some values."""
+    if not values:
+        return f"{name}: nothing was measured"
+    middle, high = np.percentile(values, [50, 99])
+    return f"{name}: p50 {middle:.1f}, p99 {high:.1f}, largest {max(values):.1f} {unit}"
+
+
+class Spent:
+    """Wall and processor time since it was made, and how busy the machine was."""
+
+    def __init__(self) -> None:
+        self._wall_s, self._cpu_s = time.monotonic(), time.process_time()
+
+    @property
+    def wall_s(self) -> float:
+        """Time that has passed."""
+        return time.monotonic() - self._wall_s
+
+    def told(self) -> str:
+        """Return a line."""
+        cores = (time.process_time() - self._cpu_s) / self.wall_s
+        load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
+        return f"processor: {cores:.2f} cores of {os.cpu_count()}; load of the machine: {load}"

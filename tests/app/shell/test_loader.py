@@ -1,0 +1,96 @@
+"""Slow modules are loaded in the background, and closing the window does not wait for all."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.shell.loader import Loader
+
+
+@pytest.fixture
+def slow_modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the names of two modules, the first of which waits until it is let go."""
+    (tmp_path / "loader_first.py").write_text(
+        "import threading\nimport loader_gate\nloader_gate.begun.set()\nloader_gate.go.wait(5)\n"
+    )
+    (tmp_path / "loader_second.py").write_text("")
+    gate = type(sys)("loader_gate")
+    gate.begun, gate.go = threading.Event(), threading.Event()
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, "loader_gate", gate)
+    names = ["loader_first", "loader_second"]
+    for name in names:
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    return names
+
+
+def test_modules_are_there_before_anybody_is_called(slow_modules: list[str], qtbot: QtBot) -> None:
+    loader, called = Loader(), []
+    loader.when_loaded(slow_modules, lambda: called.append(set(sys.modules)))
+    assert not called
+    sys.modules["loader_gate"].go.set()
+    qtbot.waitUntil(lambda: bool(called))
+    assert set(slow_modules) <= called[0]
+    loader.when_loaded(slow_modules, lambda: called.append("at once"))
+    assert called[1] == "at once"
+
+
+def test_half_a_module_does_not_count_as_loaded(slow_modules: list[str], qtbot: QtBot) -> None:
+    loader, called = Loader(), []
+    loader.load(slow_modules)
+    gate = sys.modules["loader_gate"]
+    assert gate.begun.wait(5)
+    assert slow_modules[0] in sys.modules
+    loader.when_loaded(slow_modules[:1], lambda: called.append(1))
+    assert not called
+    gate.go.set()
+    qtbot.waitUntil(lambda: bool(called))
+
+
+def test_what_is_asked_for_is_loaded_before_the_rest(
+    slow_modules: list[str], tmp_path: Path, qtbot: QtBot
+) -> None:
+    (tmp_path / "loader_third.py").write_text(
+        "import sys\nassert 'loader_second' not in sys.modules"
+    )
+    loader, called = Loader(), []
+    loader.load(slow_modules)
+    gate = sys.modules["loader_gate"]
+    assert gate.begun.wait(5)
+    loader.when_loaded(["loader_third"], lambda: called.append("loader_third" in sys.modules))
+    gate.go.set()
+    qtbot.waitUntil(lambda: called == [True])
+    loader.stop()
+    del sys.modules["loader_third"]
+
+
+def test_what_is_not_begun_is_left_out_and_nobody_is_called(
+    slow_modules: list[str], qtbot: QtBot
+) -> None:
+    loader, called = Loader(), []
+    loader.when_loaded(slow_modules, lambda: called.append(1))
+    gate = sys.modules["loader_gate"]
+    assert gate.begun.wait(5)
+    threading.Timer(0.05, gate.go.set).start()
+    loader.stop()
+    qtbot.wait(50)
+    assert "loader_second" not in sys.modules
+    assert not called
+
+
+def test_a_module_that_cannot_be_loaded_is_told_of_and_keeps_nobody_waiting(
+    qtbot: QtBot, caplog: pytest.LogCaptureFixture
+) -> None:
+    loader, called = Loader(), []
+    loader.when_loaded(["no_such_module_anywhere"], lambda: called.append(1))
+    qtbot.waitUntil(lambda: called == [1])
+    assert "no_such_module_anywhere" in caplog.text
+
+
+def test_one_that_was_never_started_can_be_stopped(qtbot: QtBot) -> None:
+    Loader().stop()

@@ -1,0 +1,82 @@
+"""Threads end before the program does, also those that are inside a library's long call."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from app.sources.stopping import join, join_left_behind
+
+ROOT = Path(__file__).resolve().parents[3]
+
+CLOSING = """
+import sys, time
+import numpy as np
+from PySide6.QtCore import QTimer
+from app import desktop
+from app.shell.main_window import MainWindow
+from app.sources.mailbox import Mailbox
+from app.sources.processor import Processor
+from app.sources.source import Frame
+import cv2
+
+picture = np.zeros((1200, 1600, 3), np.uint8)
+inbox = Mailbox()
+processor = Processor(inbox, lambda _: cv2.fastNlMeansDenoisingColored(picture), Mailbox())
+
+def end_while_it_works(window):
+    processor.start()
+    inbox.put(Frame(picture, 0, 0.0))
+    def close():
+        began = time.monotonic()
+        processor.stop()
+        print("left behind" if time.monotonic() - began > 0.9 else "ended in time")
+        window.close()
+    QTimer.singleShot(300, close)
+
+shown = MainWindow.showEvent
+MainWindow.showEvent = lambda self, event: (shown(self, event), end_while_it_works(self))
+desktop.LAST_JOIN_S = float(sys.argv[1])
+sys.exit(desktop.run([]))
+"""
+
+
+@pytest.fixture
+def hanging() -> threading.Event:
+    return threading.Event()
+
+
+def test_a_thread_that_ends_is_not_left_behind() -> None:
+    thread = threading.Thread(target=lambda: None)
+    thread.start()
+    assert join(thread)
+    assert join_left_behind(0.0)
+
+
+def test_a_thread_that_hangs_is_named_and_waited_for_again(
+    hanging: threading.Event, caplog: pytest.LogCaptureFixture
+) -> None:
+    thread = threading.Thread(target=hanging.wait, name="capture somewhere", daemon=True)
+    thread.start()
+    assert not join(thread, 0.01)
+    assert not join_left_behind(0.01)
+    assert caplog.text.count("capture somewhere") == 2
+    threading.Timer(0.05, hanging.set).start()
+    assert join_left_behind(5.0)
+
+
+@pytest.mark.parametrize("patience_s", [60.0, 0.1], ids=["it is waited for", "it takes too long"])
+def test_the_program_ends_well_while_a_library_is_at_work(patience_s: float) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CLOSING, str(patience_s)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, "left behind"), done.stderr
+    assert "terminate" not in done.stderr

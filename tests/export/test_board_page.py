@@ -1,0 +1,87 @@
+"""A printed board has the size that it says, and our own detector finds it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.board_page import A4_MM, RULER_MM, draw_board, write_board
+from gelpolight_core.optics.checkerboard import BoardSpec, find_board
+from gelpolight_core.session.picture import Picture
+
+DPI = 400
+PX_PER_MM = DPI / 25.4
+BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
+
+
+def printed(board: BoardSpec) -> np.ndarray:
+    """Return the page (rows, columns, 3) as a printer of 400 dpi would make it."""
+    figure = draw_board(board)
+    canvas = FigureCanvasAgg(figure)
+    figure.set_dpi(DPI)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].astype(np.float32) / 255.0
+
+
+@pytest.mark.parametrize(
+    "board",
+    [BoardSpec((9, 6), 3.0), BoardSpec((9, 6), 2.0), BoardSpec((14, 8), 12.0)],
+    ids=["lens views", "top surface", "across the paper"],
+)
+def test_squares_have_their_size_on_the_paper(board: BoardSpec) -> None:
+    page = printed(board)
+    around = round(1.2 * board.square_mm * PX_PER_MM)
+    rows = np.flatnonzero((page[..., 0] < 0.2).any(axis=1))
+    rows = rows[rows < len(page) - 38.0 * PX_PER_MM]
+    columns = np.flatnonzero((page[rows[0] : rows[-1], :, 0] < 0.2).any(axis=0))
+    cut = page[rows[0] - around : rows[-1] + around, columns[0] - around : columns[-1] + around]
+    view = find_board(Picture("page", 0.1 + 0.8 * cut, bit_depth=8), board)
+    corners = view.corners_px.reshape(board.inner_corners[1], board.inner_corners[0], 2)
+    across = np.linalg.norm(corners[:, -1] - corners[:, 0], axis=-1) / PX_PER_MM
+    down = np.linalg.norm(corners[-1] - corners[0], axis=-1) / PX_PER_MM
+    # A tenth of a pixel of this printer.
+    assert np.allclose(across, (board.inner_corners[0] - 1) * board.square_mm, atol=0.007)
+    assert np.allclose(down, (board.inner_corners[1] - 1) * board.square_mm, atol=0.007)
+
+
+def test_the_ruler_is_as_long_as_it_says() -> None:
+    foot = printed(BoardSpec())[-round(38.0 * PX_PER_MM) :].mean(axis=2)
+    runs = [0]
+    for row in foot:
+        dark = np.flatnonzero(row < 0.5)
+        runs += map(len, np.split(dark, np.flatnonzero(np.diff(dark) > 1) + 1))
+    # From the outer edges of two ticks, each 0.1 mm wide.
+    assert max(runs) / PX_PER_MM == pytest.approx(RULER_MM + 0.1, abs=0.07)
+
+
+def test_the_page_is_a4(tmp_path: Path) -> None:
+    write_board(BoardSpec(), tmp_path / "board.pdf")
+    box = re.search(rb"/MediaBox \[([\d. ]+)\]", (tmp_path / "board.pdf").read_bytes())
+    assert box is not None
+    size_mm = [float(value) * 25.4 / 72.0 for value in box[1].split()[2:]]
+    assert size_mm == pytest.approx(A4_MM, abs=0.01)
+
+
+def test_the_boards_that_come_with_the_program_are_those_of_the_command(tmp_path: Path) -> None:
+    for square in (2, 3):
+        kept = BOARDS / f"checkerboard-9x6-{square}mm.pdf"
+        write_board(BoardSpec((9, 6), float(square)), tmp_path / kept.name)
+        sizes = [path.stat().st_size for path in (kept, tmp_path / kept.name)]
+        assert sizes[0] == pytest.approx(sizes[1], rel=0.1)  # another matplotlib writes a bit else
+        assert kept.read_bytes().startswith(b"%PDF")
+
+
+def test_a_board_that_does_not_fit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="does not fit an A4 page"):
+        write_board(BoardSpec((20, 20), 15.0), tmp_path / "board.pdf")
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_ending_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="PDF"):
+        write_board(BoardSpec(), tmp_path / "board.png")
