@@ -34,6 +34,11 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--pictures", action="store_true", help=tr("also a picture of each depth map (PNG)")
     )
+    parser.add_argument(
+        "--uncertainty",
+        action="store_true",
+        help=tr("also standard deviations, in npz; takes several times as long"),
+    )
     add_model(parser)
     parser.set_defaults(run=run)
 
@@ -47,6 +52,12 @@ def run(options: argparse.Namespace) -> int:
             tr("unknown format {name}").format(name=", ".join(unknown) or '""'),
             where="--format",
             advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
+        )
+    if options.uncertainty and "npz" not in formats:
+        raise InputError(
+            tr("only npz has room for standard deviations"),
+            where="--uncertainty",
+            advice=tr("Add npz to --format, or leave it out"),
         )
     names = Counter(path.stem.casefold() for path in options.images)  # some disks ignore the case
     twins = [path.stem for path in options.images if names[path.stem.casefold()] > 1]
@@ -64,8 +75,9 @@ def run(options: argparse.Namespace) -> int:
     for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):
         picture = read_picture(path, response=reconstructor.calibration.response)
         require_colour(picture, where=str(path))
-        # Only this format has room for standard deviations.
-        heightmap = reconstructor.depth(picture.rgb, name=path.name, uncertainty="npz" in formats)
+        heightmap = reconstructor.depth(
+            picture.rgb, name=path.name, uncertainty=options.uncertainty
+        )
         write_heightmap(heightmap, options.output, formats=formats)
         for note in heightmap.notes:
             tqdm.write(f"{path}: {note}", file=sys.stderr)

@@ -141,7 +141,7 @@ def test_the_full_model_says_how_sure_it_is(
     assert set(m["noise_sd"]) == set(m["calibration_sd"]) == set(m["sd"])
     for key in ("height_mm", "diameter_mm"):
         assert m["sd"][key] >= np.hypot(m["noise_sd"][key], m["calibration_sd"][key]) * 0.999
-    assert main(["reconstruct", str(file), picture, "-o", str(tmp_path)]) == 0
+    assert main(["reconstruct", str(file), picture, "-o", str(tmp_path), "--uncertainty"]) == 0
     with np.load(tmp_path / f"{name}.npz", allow_pickle=False) as data:
         for key in ("depth_sd_mm", "slope_sd", "depth_model_sd_mm", "slope_model_sd"):
             assert data[key].shape == data["depth_mm"].shape
