@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 Map = NDArray[np.float32]
 QUIET_PX = 1.2
 WIDER_PX = (2.4, 4.8, 9.6)
+THIN = 3
+LEAST = np.float32(1e-6)
 # Relative noise below which the curvature of normals over brightness tilts nothing that shows.
 CALM = 0.01
 SIGNIFICANT = 4.0
@@ -49,6 +51,7 @@ def quiet_even_parts(
     noise = sigma
     seen = usable[..., None].astype(np.float32)
     light, background = light * seen, background * seen
+    shot = _noise(light, usable)
     for width_px in (QUIET_PX, *WIDER_PX):
         need = np.float32(1.0)
         if width_px > QUIET_PX:
@@ -56,7 +59,7 @@ def quiet_even_parts(
             need[~usable] = 0.0
             if not need.any():
                 break
-        quiet, edge = _quieted(light, background, usable, width_px)
+        quiet, edge = _quieted(light, background, usable, width_px, shot)
         share = (np.float32(1.0) - edge)[..., None] * need
         ratio = ratio + share * (quiet - ratio)
         left = np.float32(1.0 / (2.0 * np.sqrt(np.pi) * width_px))
@@ -64,30 +67,39 @@ def quiet_even_parts(
     return np.asarray(ratio, np.float32), np.asarray(noise, np.float32)
 
 
+def _noise(light: Map, usable: NDArray[np.bool_]) -> tuple[Map, Map]:
+    """Return the noise (3,) of a pixel, and the brightness (3,) at which it is that."""
+    thin = usable[::THIN, ::THIN]
+    level = np.median(light[::THIN, ::THIN][thin], axis=0) if thin.any() else np.ones(3)
+    off = (light - _average(light, QUIET_PX))[::THIN, ::THIN][thin]
+    noise = 1.4826 * np.median(np.abs(off), axis=0) if thin.any() else np.zeros(3)
+    return np.asarray(noise + LEAST, np.float32), np.asarray(np.maximum(level, LEAST), np.float32)
+
+
 def _quieted(
-    light: Map, background: Map, usable: NDArray[np.bool_], width_px: float
+    light: Map,
+    background: Map,
+    usable: NDArray[np.bool_],
+    width_px: float,
+    shot: tuple[Map, Map],
 ) -> tuple[Map, Map]:
     """Return the averaged ratio, and how far (rows, columns) it is to be left as it is, 0..1."""
     wide_px = 2.0 * width_px
-    least = np.float32(1e-6)
-    below = np.maximum(_average(background, width_px), least)
+    below = np.maximum(_average(background, width_px), LEAST)
     average = _average(light, width_px)
     quiet = np.asarray(average / below, np.float32)
-    wide = _average(light, wide_px) / np.maximum(_average(background, wide_px), least)
-    seen = light[usable]
-    level = np.maximum(np.median(seen, axis=0), least)
-    noise = 1.4826 * np.median(np.abs(seen - average[usable]), axis=0) + least
+    wide = _average(light, wide_px) / np.maximum(_average(background, wide_px), LEAST)
+    noise, level = shot
     # Shot noise grows as the root of the light.
-    local = noise * np.sqrt(np.maximum(average / level, 0.2)) / below
+    local = noise * np.sqrt(np.maximum(average / level, np.float32(0.2))) / below
     # White noise of sd 1 leaves this much between the two averages.
     left = np.sqrt(1.0 / width_px**2 + 1.0 / wide_px**2 - 4.0 / (width_px**2 + wide_px**2))
-    limit = SIGNIFICANT * local * left / np.sqrt(4.0 * np.pi)
+    limit = np.float32(SIGNIFICANT * left / np.sqrt(4.0 * np.pi)) * local
     excess = (np.abs(quiet - wide) / limit).max(axis=2) - 1.0
     edge = np.where(usable, np.clip(excess, 0.0, 1.0), 0.0).astype(np.float32)
     reach = 2 * round(2.0 * width_px / QUIET_PX) + 1
     grown = cv2.dilate(edge, np.ones((reach, reach), np.uint8))
-    edge = np.asarray(cv2.GaussianBlur(grown, (0, 0), 1.5 * width_px / QUIET_PX), np.float32)
-    return quiet, edge
+    return quiet, _average(np.asarray(grown, np.float32), 1.5 * width_px / QUIET_PX)
 
 
 def _average(light: Map, width_px: float) -> Map:
@@ -131,7 +143,8 @@ def noise_left(
     if not usable.any():
         return np.ones(usable.shape, np.float32)
     seen = usable[..., None].astype(np.float32)
-    _, edge = _quieted(light * seen, background * seen, usable, QUIET_PX)
+    light = light * seen
+    _, edge = _quieted(light, background * seen, usable, QUIET_PX, _noise(light, usable))
     tent = resampled / (3.0 * pixels_per_node)
     bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2
 
