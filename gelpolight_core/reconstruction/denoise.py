@@ -16,7 +16,7 @@ Map = NDArray[np.float32]
 QUIET_PX = 1.2
 WIDER_PX = (2.4, 4.8, 9.6)
 THIN = 3
-LEAST = np.float32(1e-6)
+LEAST = np.float32(1e-9)
 # Relative noise below which the curvature of normals over brightness tilts nothing that shows.
 CALM = 0.01
 SIGNIFICANT = 4.0
@@ -51,7 +51,7 @@ def quiet_even_parts(
     noise = sigma
     seen = usable[..., None].astype(np.float32)
     light, background = light * seen, background * seen
-    shot = _noise(light, usable)
+    own = _noise(light, usable)
     for width_px in (QUIET_PX, *WIDER_PX):
         need = np.float32(1.0)
         if width_px > QUIET_PX:
@@ -59,7 +59,7 @@ def quiet_even_parts(
             need[~usable] = 0.0
             if not need.any():
                 break
-        quiet, edge = _quieted(light, background, usable, width_px, shot)
+        quiet, edge = _quieted(light, background, usable, width_px, own)
         share = (np.float32(1.0) - edge)[..., None] * need
         ratio = ratio + share * (quiet - ratio)
         left = np.float32(1.0 / (2.0 * np.sqrt(np.pi) * width_px))
@@ -68,12 +68,24 @@ def quiet_even_parts(
 
 
 def _noise(light: Map, usable: NDArray[np.bool_]) -> tuple[Map, Map]:
-    """Return the noise (3,) of a pixel, and the brightness (3,) at which it is that."""
+    """Return a pixel's noise as variance without light, and per unit of light, (3,) each.
+
+    Robust, from the darker and the brighter third of what is usable.
+    """
     thin = usable[::THIN, ::THIN]
-    level = np.median(light[::THIN, ::THIN][thin], axis=0) if thin.any() else np.ones(3)
-    off = (light - _average(light, QUIET_PX))[::THIN, ::THIN][thin]
-    noise = 1.4826 * np.median(np.abs(off), axis=0) if thin.any() else np.zeros(3)
-    return np.asarray(noise + LEAST, np.float32), np.asarray(np.maximum(level, LEAST), np.float32)
+    if not thin.any():
+        return np.full(3, LEAST, np.float32), np.zeros(3, np.float32)
+    seen = light[::THIN, ::THIN][thin]
+    off = np.abs(seen - _average(light, QUIET_PX)[::THIN, ::THIN][thin])
+    dark, bright = np.percentile(seen, [33.0, 67.0], axis=0)
+    read, shot = np.zeros(3, np.float32), np.zeros(3, np.float32)
+    for k in range(3):
+        low, high = seen[:, k] <= dark[k], seen[:, k] >= bright[k]
+        variance = [(1.4826 * np.median(off[part, k])) ** 2 for part in (low, high)]
+        level = [np.median(seen[part, k]) for part in (low, high)]
+        shot[k] = max((variance[1] - variance[0]) / max(level[1] - level[0], LEAST), 0.0)
+        read[k] = max(variance[0] - shot[k] * level[0], LEAST)
+    return read, shot
 
 
 def _quieted(
@@ -81,7 +93,7 @@ def _quieted(
     background: Map,
     usable: NDArray[np.bool_],
     width_px: float,
-    shot: tuple[Map, Map],
+    noise: tuple[Map, Map],
 ) -> tuple[Map, Map]:
     """Return the averaged ratio, and how far (rows, columns) it is to be left as it is, 0..1."""
     wide_px = 2.0 * width_px
@@ -89,9 +101,8 @@ def _quieted(
     average = _average(light, width_px)
     quiet = np.asarray(average / below, np.float32)
     wide = _average(light, wide_px) / np.maximum(_average(background, wide_px), LEAST)
-    noise, level = shot
-    # Shot noise grows as the root of the light.
-    local = noise * np.sqrt(np.maximum(average / level, np.float32(0.2))) / below
+    read, per_light = noise
+    local = np.sqrt(read + per_light * np.maximum(average, np.float32(0.0))) / below
     # White noise of sd 1 leaves this much between the two averages.
     left = np.sqrt(1.0 / width_px**2 + 1.0 / wide_px**2 - 4.0 / (width_px**2 + wide_px**2))
     limit = np.float32(SIGNIFICANT * left / np.sqrt(4.0 * np.pi)) * local
