@@ -240,6 +240,7 @@ def test_curves_and_other_corrections_share_one_history(
     step = technician.wizard.curves
     assert step is not None
     technician.until(lambda: step.editor is not None)
+    technician.until(step.editor.isVisible)
     editor, undo = step.editor, technician.wizard.controller.undo
     fitted = editor.state
     technician.click("lut.smooth.button")

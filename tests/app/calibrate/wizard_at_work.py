@@ -1,7 +1,7 @@
 """A wizard at work until it is killed: ``python wizard_at_work.py SESSION PICTURES SEED``.
 
 Captures and corrects by turns on a session, and writes one JSON line for everything that the
-technician has been told is done.
+technician has been told is done; of what replaces something older, also that it is begun.
 """
 
 from __future__ import annotations
@@ -42,9 +42,8 @@ class Work:
     def _on_step(self, key: str) -> None:
         self._wizard.go_to(key)
         folder = self._wizard.step.folder
-        self._camera.show(
-            read_rgb(self._random.choice(sorted((self._pictures / folder).glob("*.png"))))
-        )
+        files = sorted((self._pictures / folder).glob("*.png"))
+        self._camera.show(read_rgb(self._random.choice(files)))
 
     def _on_captured(self, stage: str, name: str) -> None:
         session = self._wizard.project.session
@@ -67,13 +66,15 @@ class Work:
         elif chance < 0.5 and (balls := session.found("balls")):
             name = self._random.choice(balls).name
             place = [float(self._random.randrange(20, 220)) for _ in range(3)]
+            tell(begun=name, value=place)
             controller.place_ball(name, PlacedCircle(*place))
-            tell(ball=name, place=place)
+            tell(decided=name, value=place)
         elif chance < 0.6:
             nodes = [[0.0, 0.0], [0.5, 0.25 + 0.01 * self._random.randrange(20)], [1.0, 1.0]]
             project = self._wizard.project
+            tell(begun="curve", value=nodes)
             project.edit_curves({0: tuple((c, v) for c, v in nodes)})
-            tell(curve=nodes)
+            tell(decided="curve", value=nodes)
         else:
             self._wizard.panel.radius.setValue(2.0 + 0.1 * self._random.randrange(10))
             self._wizard.panel.capture.click()
