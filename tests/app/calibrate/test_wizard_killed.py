@@ -75,7 +75,7 @@ def test_what_was_told_is_there_after_a_kill(
 
 
 def may_be_there(told: list[dict[str, Any]]) -> dict[str, list[Any]]:
-    """Return, for all that was decided, what may be there: the last decision, or one begun since."""
+    """Return of all that was decided what may be there: the last decision, or one since begun."""
     allowed: dict[str, list[Any]] = {}
     for item in told:
         if "decided" in item:
