@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from operator import is_
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
@@ -42,7 +43,7 @@ class CurveStep(QWidget):
         self._controller = controller
         self.editor: LutEditor | None = None
         self._fitted: CurveEdit | None = None
-        self._made_of: object = None
+        self._made_of: tuple[object, object] | None = None
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
         self._said = named(QLabel(), "curves.said", tr("Why there is no curve"))
@@ -64,9 +65,10 @@ class CurveStep(QWidget):
                 else tr("The curves come with the ball presses: complete the earlier steps first.")
             )
             return
-        if present is self._made_of:
+        made_of = present, project.results.balls
+        if self._made_of is not None and all(map(is_, made_of, self._made_of)):
             return
-        self._made_of = present
+        self._made_of = made_of
         self.close_editor()
         self._say(tr("Gathering the pixels of the ball presses."))
         self._controller.jobs.submit(

@@ -218,9 +218,9 @@ class LutEditor(QWidget):
     def _groups(self) -> tuple[list[str], ...]:
         return (
             [f"channel.{name}" for name in CHANNELS],
+            ["lasso", "reset"],
             ["compare", "view"],
             ["add", "remove", "thin", "snap", "smooth"],
-            ["lasso", "reset"],
             ["undo", "redo"] if self._history is None else [],
         )
 
@@ -238,8 +238,8 @@ class LutEditor(QWidget):
         if self._history is None:
             self._add_undo()
         rows = (
-            ("lut.tools", tr("Tools of the reflectance curve"), self._groups()[:2]),
-            ("lut.more_tools", tr("More tools of the reflectance curve"), self._groups()[2:]),
+            ("lut.tools", tr("Tools of the reflectance curve"), self._groups()[:3]),
+            ("lut.more_tools", tr("More tools of the reflectance curve"), self._groups()[3:]),
         )
         layout = QVBoxLayout(self)
         for name, accessible, groups in rows:

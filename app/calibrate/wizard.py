@@ -306,7 +306,8 @@ class Wizard(QMainWindow):
             return
         last = self.step.stages[-1]
         ready = self.project.stale(upto=last)
-        if not any(self._statuses[stage].state is StageState.STALE for stage in ready):
+        statuses = self.controller.statuses()
+        if not any(statuses[stage].state is StageState.STALE for stage in ready):
             self.controller.compute(last)
 
     def _focus_on_what_comes_next(self) -> None:

@@ -1,0 +1,344 @@
+"""What a technician relies on in the wizard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+from technician import Technician, ToldCamera, read_rgb
+
+from app.calibrate.steps import all_steps
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.session.description import create_session
+from gelpolight_core.session.session import read_session
+
+Made = Callable[[], CalibrationProject]
+
+
+@pytest.fixture
+def fresh(small_session: Path, tmp_path: Path) -> CalibrationProject:
+    """Return a new session of the small sensor, without a picture."""
+    folder = tmp_path / "fresh"
+    create_session(replace(read_session(small_session), folder=folder))
+    return CalibrationProject(folder)
+
+
+def test_a_capture_is_on_disk_when_it_is_told_with_the_radius_stated(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
+) -> None:
+    technician.begin(computed_project(), "balls")
+    camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
+    technician.wizard.panel.radius.setValue(2.5)
+    name = technician.capture()
+    kept = read_session(technician.session)
+    assert kept.ball_radii_mm[name] == 2.5
+    assert kept.picture(technician.session / "balls" / name).size == (320, 240)
+    assert name in technician.wizard.panel.notice.text()
+
+
+def test_captures_do_not_wait_for_a_computation(
+    technician: Technician, camera: ToldCamera, fresh: CalibrationProject, small_session: Path
+) -> None:
+    technician.begin(fresh, "lens")
+    views = sorted((small_session / "checkerboard").glob("*.png"))[:3]
+    release: list[bool] = []
+    from app.calibrate.jobs import Job
+
+    def work(_tell: object) -> None:
+        technician_waits.wait(20.0)
+
+    import threading
+
+    technician_waits = threading.Event()
+    technician.wizard.controller.jobs.submit(Job("Long work", work, lambda _: release.append(True)))
+    for number, view in enumerate(views, start=1):
+        camera.show(read_rgb(view))
+        technician.capture()
+        assert len(fresh.session.captured("checkerboard")) == number
+    assert not release
+    technician_waits.set()
+    technician.rest()
+
+
+def test_capturing_again_marks_what_follows_as_stale_and_recompute_is_offered(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
+) -> None:
+    technician.begin(computed_project(), "radiance")
+    assert technician.state("result") in ("pass", "warning")
+    camera.show(read_rgb(small_session / "whiteboard" / "whiteboard.png"))
+    technician.capture()
+    technician.rest()
+    assert technician.state("radiance") in ("pass", "warning")
+    assert {technician.state(key) for key in ("balls", "reflectance", "result")} == {"stale"}
+    assert technician.state("lights") == "pass"
+    technician.wizard.go_to("balls")
+    assert "Recompute" in technician.wizard.panel.sentence.text()
+    technician.click("calibrate.recompute")
+    technician.rest()
+    assert technician.state("balls") in ("pass", "warning")
+
+
+def test_leaving_a_picture_out_greys_it_and_undo_brings_it_back(
+    technician: Technician, computed_project: Made, qtbot: QtBot
+) -> None:
+    technician.begin(computed_project(), "balls")
+    strip = technician.wizard.pictures.strip
+    name = strip.item(0).text().split("\n")[0] + ".png"
+    strip.choose(name)
+    qtbot.keyClick(strip, Qt.Key.Key_Delete)
+    assert f"balls/{name}" in read_session(technician.session).decisions.excluded
+    assert "left out" in strip.item(0).text()
+    qtbot.keyClick(technician.wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    technician.rest()
+    assert read_session(technician.session).decisions.excluded == frozenset()
+    assert technician.wizard.project.stale() == ()
+
+
+def test_undo_takes_back_one_correction_and_leaves_what_came_between(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
+) -> None:
+    """Capturing again is no correction: undoing an older one must not bring the old view back."""
+    technician.begin(computed_project(), "lights")
+    controller = technician.wizard.controller
+    controller.exclude(technician.wizard.steps[6].stage, "ball_02.png", True)
+    camera.show(read_rgb(small_session / "mirror" / "mirror.png"))
+    name = technician.capture()
+    technician.rest()
+    controller.undo.undo()
+    technician.rest()
+    session = technician.wizard.project.session
+    assert [path.name for path in session.found("mirror")] == [name]
+    assert "balls/ball_02.png" not in session.decisions.excluded
+
+
+def test_a_spot_moved_by_hand_stays_until_it_is_undone(
+    technician: Technician, computed_project: Made
+) -> None:
+    project = computed_project()
+    technician.begin(project, "lights")
+    panel, view = technician.wizard.panel, technician.wizard.pictures.view
+    technician.wizard.look_at(project.session.found("mirror")[0].name)
+    technician.until(lambda: "found" in panel.live.text())
+    assert project.results.lights is not None
+    u, v = project.results.lights.spots.spots[1].centre_px
+    view.moved.emit("mirror.1", u + 30.0, v + 20.0, 0.0)
+    technician.until(lambda: "by hand" in panel.live.text())
+    assert read_session(technician.session).decisions.spots_px[1] == (u + 30.0, v + 20.0)
+    technician.wizard.controller.undo.undo()
+    technician.until(lambda: "by hand" not in panel.live.text())
+    assert read_session(technician.session).decisions.spots_px == {}
+
+
+def test_a_contact_moved_by_hand_acts_and_the_sentence_follows(
+    technician: Technician, computed_project: Made
+) -> None:
+    project = computed_project()
+    technician.begin(project, "balls")
+    panel = technician.wizard.panel
+    name = project.session.found("balls")[0].name
+    technician.wizard.look_at(name)
+    technician.until(lambda: "Ball found" in panel.live.text())
+    technician.wizard.pictures.view.moved.emit("ball", 160.0, 120.0, 14.0)
+    technician.until(lambda: "by hand" in panel.live.text())
+    placed = read_session(technician.session).decisions.balls[name]
+    assert (placed.u_px, placed.v_px, placed.radius_px) == (160.0, 120.0, 14.0)
+    technician.wizard.controller.undo.undo()
+    technician.until(lambda: "Ball found" in panel.live.text())
+
+
+def test_a_radius_corrected_on_a_capture_can_be_undone(
+    technician: Technician, computed_project: Made
+) -> None:
+    project = computed_project()
+    technician.begin(project, "balls")
+    name = project.session.found("balls")[0].name
+    before = project.session.ball_radius_mm(name)
+    technician.wizard.look_at(name)
+    technician.wizard.panel.radius.setValue(before + 0.5)
+    assert read_session(technician.session).ball_radius_mm(name) == before + 0.5
+    technician.wizard.controller.undo.undo()
+    assert read_session(technician.session).ball_radius_mm(name) == before
+    assert technician.wizard.panel.radius.value() == before
+
+
+def test_capturing_by_itself_waits_for_still_and_good_and_takes_no_view_twice(
+    technician: Technician, camera: ToldCamera, fresh: CalibrationProject, small_session: Path,
+    qtbot: QtBot,
+) -> None:  # fmt: skip
+    first, second = sorted((small_session / "checkerboard").glob("*.png"))[:2]
+    camera.show(np.full_like(read_rgb(first), 60))
+    technician.begin(fresh, "lens")
+    technician.wizard.panel.automatic.setChecked(True)
+    qtbot.wait(700)
+    assert not fresh.session.captured("checkerboard")
+    camera.show(read_rgb(first))
+    technician.until(lambda: len(fresh.session.captured("checkerboard")) == 1)
+    qtbot.wait(2500)
+    assert len(fresh.session.captured("checkerboard")) == 1
+    camera.show(read_rgb(second))
+    technician.until(lambda: len(fresh.session.captured("checkerboard")) == 2)
+    technician.rest()
+
+
+def test_the_calibration_that_is_saved_is_that_of_the_command_line(
+    technician: Technician, computed_project: Made, small_calibration: Calibration,
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    technician.begin(computed_project(), "result")
+    technician.click("result.save")
+    technician.rest()
+    assert "Saved as" in technician.wizard.result.saved.text()
+    (path,) = (tmp_path / "workspace" / "sensors").rglob("*.gplcal")
+    made, theirs = read_calibration(path), small_calibration
+    assert made.identity == theirs.identity
+    assert made.full is not None
+    assert theirs.full is not None
+    for ours, others in (
+        (made.radiance, theirs.radiance),
+        (made.factors, theirs.factors),
+        (made.led_positions_mm, theirs.led_positions_mm),
+        (made.full.led_positions_mm, theirs.full.led_positions_mm),
+        (made.full.background, theirs.full.background),
+    ):
+        np.testing.assert_array_equal(ours, others)
+
+
+def test_a_recorded_trial_validates_and_is_found_when_the_session_is_opened_again(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
+) -> None:
+    technician.begin(computed_project(), "result")
+    technician.click("result.save")
+    technician.rest()
+    technician.click("calibrate.next")
+    camera.show(read_rgb(small_session / "presses" / "cylinder_s5_d100.png"))
+    panel = technician.wizard.validation
+    technician.until(panel.measure.isEnabled)
+    technician.click("validation.measure")
+    technician.until(lambda: "Diameter" in panel.result.text())
+    technician.click("validation.keep")
+    assert technician.state("validation") == "pass"
+    folder = technician.session
+    technician.page._leave_session()
+    technician.page.open_path(folder)
+    technician.rest()
+    assert technician.state("validation") == "pass"
+
+
+def test_curves_and_other_corrections_share_one_history(
+    technician: Technician, computed_project: Made, qtbot: QtBot
+) -> None:
+    technician.begin(computed_project(), "reflectance")
+    step = technician.wizard.curves
+    assert step is not None
+    technician.until(lambda: step.editor is not None)
+    technician.until(step.editor.isVisible)
+    editor, undo = step.editor, technician.wizard.controller.undo
+    fitted = editor.state
+    technician.click("lut.smooth.button")
+    smoothed = editor.state
+    assert smoothed != fitted
+    assert set(read_session(technician.session).decisions.curves) == {0}
+    technician.wizard.controller.exclude(technician.wizard.steps[6].stage, "ball_01.png", True)
+    assert undo.count() == 2
+    undo.undo()
+    assert set(read_session(technician.session).decisions.curves) == {0}
+    assert read_session(technician.session).decisions.excluded == frozenset()
+    technician.rest()
+    qtbot.keyClick(technician.wizard, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert read_session(technician.session).decisions.curves == {}
+    technician.rest()
+    technician.until(lambda: step.editor is not None)
+    assert step.editor.state.curves == fitted.curves
+    technician.rest()
+
+
+def test_points_left_out_with_the_lasso_count_in_the_calibration(
+    technician: Technician, computed_project: Made
+) -> None:
+    """The refit differs from the session's fit, so that it has to be decided on like a drawing."""
+    technician.begin(computed_project(), "reflectance")
+    step = technician.wizard.curves
+    assert step is not None
+    technician.until(lambda: step.editor is not None)
+    step.editor._on_outlined(((0.5, 0.0), (0.6, 0.0), (0.6, 5.0), (0.5, 5.0)))
+    state = step.editor.state
+    assert state.left_out[0]
+    assert set(read_session(technician.session).decisions.curves) == {0}
+    technician.rest()
+
+
+def test_next_is_bold_and_has_the_focus_once_a_step_is_done(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
+) -> None:
+    project = computed_project()
+    technician.begin(project, "lights")
+    assert technician.wizard.panel.finished
+    camera.show(read_rgb(small_session / "mirror" / "mirror.png"))
+    technician.wizard.panel.capture.setFocus()
+    technician.capture()
+    technician.rest()
+    technician.until(lambda: QApplication.focusWidget() is technician.wizard.panel.next)
+    assert "Light intensity" in technician.wizard.panel.next.text()
+
+
+def test_escape_and_the_capture_key_lead_from_a_capture_back_to_the_live_picture(
+    technician: Technician, computed_project: Made, camera: ToldCamera, qtbot: QtBot
+) -> None:
+    project = computed_project()
+    technician.begin(project, "balls")
+    names = [path.name for path in project.session.found("balls")]
+    for key in (Qt.Key.Key_Escape, Qt.Key.Key_F5):
+        technician.wizard.look_at(names[0])
+        assert names[0] in technician.wizard.pictures.looking.text()
+        qtbot.keyClick(technician.wizard, key)
+        assert technician.wizard.looking.name == ""
+        assert not technician.wizard.pictures.looking.isVisible()
+    technician.rest()
+
+
+def test_no_key_means_two_things_in_the_editor(
+    technician: Technician, computed_project: Made
+) -> None:
+    technician.begin(computed_project(), "reflectance")
+    technician.until(lambda: technician.wizard.curves.editor is not None)
+    wide = {
+        key.toString()
+        for action in technician.wizard.actions()
+        if action.isEnabled()
+        for key in action.shortcuts()
+    }
+    editor = technician.wizard.curves.editor
+    narrow = {k.toString() for a in editor.findChildren(QAction) for k in a.shortcuts()}
+    assert narrow
+    assert not wide & narrow
+    technician.rest()
+
+
+@pytest.mark.parametrize("key", [step.key for step in all_steps()])
+def test_nothing_is_cut_off_and_no_sentence_moves_what_is_below(
+    technician: Technician, computed_project: Made, key: str
+) -> None:
+    technician.begin(computed_project(), key)
+    panel = technician.wizard.panel
+    if key != "validation":
+        area = panel._scroll
+        assert area.widget().minimumSizeHint().width() <= area.viewport().width()
+        foot = panel.next if panel.next.isVisible() else panel.progress
+        assert panel.rect().contains(foot.geometry())
+        heights = set()
+        for words in (1, 8, 24):
+            panel.show_live("Something is said. " * (words // 4 + 1), ready=True)
+            panel.show_notice("Captured. " * (words // 8 + 1), "pass")
+            QApplication.processEvents()
+            heights.add(panel.sentence.mapTo(panel, panel.sentence.rect().topLeft()).y())
+        assert len(heights) == 1
+    technician.rest()

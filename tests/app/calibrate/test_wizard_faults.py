@@ -1,0 +1,239 @@
+"""What a technician does wrong, and what goes wrong by itself: the page says what to do."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from technician import Technician, ToldCamera, read_rgb
+
+from app.shell.context import AppContext
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.session.session import read_session
+
+Made = Callable[[], CalibrationProject]
+
+
+def test_without_a_camera_the_page_says_where_to_get_pictures(
+    technician: Technician, computed_project: Made
+) -> None:
+    technician.begin(computed_project(), "balls")
+    panel = technician.wizard.panel
+    assert "choose one" in panel.live.text()
+    assert "import" in panel.live.text()
+    assert not panel.capture.isEnabled()
+    technician.wizard.go_to("validation")
+    assert not technician.wizard.validation.measure.isEnabled()
+
+
+def test_a_camera_that_stops_is_named_and_can_be_connected_again(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
+) -> None:
+    technician.begin(computed_project(), "balls")
+    camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
+    technician.until(lambda: "Ball found" in technician.wizard.panel.live.text())
+    camera.broken = True
+    technician.until(technician.wizard.pictures.lost.isVisible)
+    assert "Check its cable" in technician.wizard.pictures.why.text()
+    technician.click("calibrate.capture")
+    technician.until(lambda: "unplugged" in technician.wizard.panel.notice.text())
+    camera.broken = False
+    technician.click("calibrate.reconnect")
+    technician.until(lambda: not technician.wizard.pictures.lost.isVisible())
+    technician.capture()
+    technician.rest()
+
+
+@pytest.mark.parametrize(
+    ("step", "shown", "said"),
+    [
+        pytest.param("lights", "background/background.png", "", id="membrane left on"),
+        pytest.param("lights", "black", "black", id="lens cap on"),
+        pytest.param("radiance", "bright", "exposure", id="far too much light"),
+        pytest.param("balls", "background/background.png", "Press", id="nothing pressed in"),
+    ],
+)
+def test_a_wrong_picture_fails_with_advice_and_can_be_captured_again(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path,
+    step: str, shown: str, said: str,
+) -> None:  # fmt: skip
+    technician.begin(computed_project(), step)
+    bare = read_rgb(small_session / "background" / "background.png")
+    full = np.iinfo(bare.dtype).max
+    pictures = {"black": np.zeros_like(bare), "bright": np.full_like(bare, full)}
+    camera.show(pictures[shown] if shown in pictures else read_rgb(small_session / shown))
+    technician.until(lambda: technician.wizard.panel.live.text())
+    technician.capture()
+    technician.rest()
+    panel = technician.wizard.panel
+    assert technician.state(step) == "fail"
+    sentence = panel.sentence.text()
+    assert said.lower() in sentence.lower()
+    assert len(sentence.split(". ")) >= 2, "it says what was found and what to do"
+    assert not panel.finished
+    assert panel.capture.isEnabled()
+
+
+def test_a_wrong_ball_radius_is_seen_in_the_figures(
+    technician: Technician, computed_project: Made
+) -> None:
+    """Half the radius bends twice as much: the shading cannot be explained any more."""
+    project = computed_project()
+    technician.begin(project, "balls")
+    name = project.session.found("balls")[0].name
+    technician.wizard.look_at(name)
+    technician.wizard.panel.radius.setValue(0.5 * project.session.ball_radius_mm(name))
+    technician.rest()
+    assert technician.state("balls") in ("warning", "fail")
+    assert "radius" in technician.wizard.panel.sentence.text().lower()
+
+
+def wrong_files(session: Path, folder: Path) -> dict[str, Path]:
+    """Return picture files that do not belong into the session's balls."""
+    folder.mkdir()
+    ball = read_rgb(session / "balls" / "ball_01.png")
+    files = {name: folder / f"{name}.png" for name in ("grey", "size", "copy", "torn", "text")}
+    cv2.imwrite(str(files["grey"]), ball[..., 1])
+    cv2.imwrite(str(files["size"]), ball[::2, ::2])
+    shutil.copy(session / "balls" / "ball_02.png", files["copy"])
+    files["torn"].write_bytes((session / "balls" / "ball_03.png").read_bytes()[:-300])
+    files["text"].write_text("no picture")
+    return files
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [("grey", "grey"), ("size", "160x120"), ("copy", "already"), ("torn", "whole"),
+     ("text", "whole")],
+)  # fmt: skip
+def test_a_file_that_does_not_belong_there_is_not_imported(
+    technician: Technician, computed_project: Made, tmp_path: Path, kind: str, said: str
+) -> None:
+    project = computed_project()
+    technician.begin(project, "balls")
+    before = project.session.captured("balls")
+    file = wrong_files(project.session.folder, tmp_path / "wrong")[kind]
+    technician.wizard.import_files([file])
+    technician.rest()
+    assert said in technician.wizard.panel.notice.text()
+    assert project.session.captured("balls") == before
+    assert project.stale() == ()
+
+
+def test_good_files_are_imported_with_the_radius_that_is_shown(
+    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path
+) -> None:
+    project = computed_project()
+    technician.begin(project, "balls")
+    shown = read_rgb(small_session / "balls" / "ball_01.png").astype(np.int64)
+    file = tmp_path / "another.png"
+    cv2.imwrite(str(file), np.clip(shown - 1, 0, None).astype(np.uint16)[..., ::-1])
+    if read_rgb(small_session / "balls" / "ball_01.png").dtype == np.uint8:
+        cv2.imwrite(str(file), np.clip(shown - 1, 0, None).astype(np.uint8)[..., ::-1])
+    technician.wizard.panel.radius.setValue(4.0)
+    technician.wizard.import_files([file])
+    technician.rest()
+    name = project.session.captured("balls")[-1].name
+    assert project.session.ball_radii_mm[name] == 4.0
+
+
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every file refuse to take its place, as where the disk is full."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("gelpolight_core.export.atomic.os.replace", refuse)
+
+
+def test_a_full_disk_is_said_and_nothing_half_written_counts(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    project = computed_project()
+    technician.begin(project, "background")
+    camera.show(read_rgb(small_session / "background" / "background.png"))
+    technician.until(lambda: technician.wizard.panel.live.text())
+    before = sorted(project.session.folder.rglob("*"))
+    full_disk(monkeypatch)
+    technician.click("calibrate.capture")
+    technician.until(lambda: "disk is full" in technician.wizard.panel.notice.text())
+    technician.rest()
+    assert sorted(project.session.folder.rglob("*")) == before
+    technician.wizard.controller.exclude(Stage.BALLS, "ball_01.png", True)
+    assert technician.wizard.controller.undo.count() == 0
+    assert "disk is full" in technician.wizard.panel.notice.text()
+    assert project.session.decisions.excluded == frozenset()
+    monkeypatch.undo()
+    technician.capture()
+    technician.rest()
+
+
+def test_a_ball_that_could_not_be_written_leaves_no_radius_behind(
+    computed_project: Made, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project = computed_project()
+    radii = dict(project.session.ball_radii_mm)
+    monkeypatch.setattr(
+        "gelpolight_core.calibration.project.write_picture", lambda *_: full_picture()
+    )
+    with pytest.raises(Exception, match="disk is full"):
+        project.add_capture(Stage.BALLS, [np.zeros((240, 320, 3), np.uint8)], radius_mm=2.0)
+    assert read_session(project.session.folder).ball_radii_mm == radii
+
+
+def full_picture() -> None:
+    """Refuse to write."""
+    from gelpolight_core.errors import InputError
+
+    raise InputError("the disk is full", where="ball", advice="Free some space")
+
+
+@pytest.mark.parametrize("name", ["session.toml", "decisions.toml"])
+def test_a_file_broken_by_hand_is_named_on_the_page_when_the_session_is_opened(
+    technician: Technician, computed_project: Made, context: AppContext, name: str
+) -> None:
+    project = computed_project()
+    folder = project.session.folder
+    (folder / name).write_text("[[[ broken")
+    technician.page.open_path(folder)
+    assert technician.page.wizard is None
+    problem = technician.see("start.problem")
+    assert name in problem.text()
+
+
+@pytest.mark.parametrize("name", ["session.toml", "decisions.toml"])
+def test_a_file_broken_while_the_session_is_open_is_put_right_by_the_next_correction(
+    technician: Technician, computed_project: Made, name: str
+) -> None:
+    project = computed_project()
+    technician.begin(project, "balls")
+    (project.session.folder / name).write_text("[[[ broken")
+    ball = project.session.found("balls")[0].name
+    technician.wizard.controller.exclude(Stage.BALLS, ball, True)
+    technician.wizard.controller.set_ball_radius(ball, 2.75)
+    technician.rest()
+    kept = read_session(project.session.folder)
+    assert kept.ball_radii_mm[ball] == 2.75
+    assert f"balls/{ball}" in kept.decisions.excluded
+
+
+def test_a_picture_removed_by_hand_while_open_is_no_fault_of_the_program(
+    technician: Technician, computed_project: Made
+) -> None:
+    project = computed_project()
+    technician.begin(project, "balls")
+    path = project.session.found("balls")[0]
+    path.unlink()
+    technician.wizard.look_at(path.name)
+    assert path.name in technician.wizard.panel.notice.text()
+    technician.wizard.go_to("balls")
+    assert technician.state("balls") == "stale"
+    technician.rest()

@@ -1,0 +1,104 @@
+"""A wizard at work until it is killed: ``python wizard_at_work.py SESSION PICTURES SEED``.
+
+Captures and corrects by turns on a session, and writes one JSON line for everything that the
+technician has been told is done; of what replaces something older, also that it is begun.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import QTimer
+from technician import ToldCamera, read_rgb
+
+from app.calibrate.page import CalibratePage
+from app.calibrate.wizard import Wizard
+from app.desktop import make_application, make_context
+from app.sources.source import SourceInfo
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.session.decisions import PlacedCircle
+
+TICK_MS = 5
+
+
+def tell(**done: object) -> None:
+    """Write what is done."""
+    sys.stdout.write(json.dumps(done) + "\n")
+    sys.stdout.flush()
+
+
+class Work:
+    """Does the next thing whenever the one before is done."""
+
+    def __init__(self, wizard: Wizard, camera: ToldCamera, pictures: Path, seed: int) -> None:
+        self._wizard, self._camera, self._pictures = wizard, camera, pictures
+        self._random = random.Random(seed)
+        wizard.controller.captured.connect(self._on_captured)
+        self._on_step("lens")
+
+    def _on_step(self, key: str) -> None:
+        self._wizard.go_to(key)
+        folder = self._wizard.step.folder
+        files = sorted((self._pictures / folder).glob("*.png"))
+        self._camera.show(read_rgb(self._random.choice(files)))
+
+    def _on_captured(self, stage: str, name: str) -> None:
+        session = self._wizard.project.session
+        radius = session.ball_radii_mm.get(name) if stage == Stage.BALLS else None
+        tell(captured=f"{FOLDERS[Stage(stage)]}/{name}", radius_mm=radius)
+
+    def go_on(self) -> None:
+        """Do the next thing, at random."""
+        controller = self._wizard.controller
+        if controller.busy_with_pictures:
+            return
+        chance = self._random.random()
+        session = self._wizard.project.session
+        if chance < 0.15:
+            self._on_step(self._random.choice(("lens", "balls", "balls", "lights", "background")))
+        elif chance < 0.3 and (views := session.found("checkerboard")):
+            name = self._random.choice(views).name
+            controller.exclude(Stage.LENS, name, True)
+            tell(excluded=f"checkerboard/{name}")
+        elif chance < 0.5 and (balls := session.found("balls")):
+            name = self._random.choice(balls).name
+            place = [float(self._random.randrange(20, 220)) for _ in range(3)]
+            tell(begun=name, value=place)
+            controller.place_ball(name, PlacedCircle(*place))
+            tell(decided=name, value=place)
+        elif chance < 0.6:
+            nodes = [[0.0, 0.0], [0.5, 0.25 + 0.01 * self._random.randrange(20)], [1.0, 1.0]]
+            project = self._wizard.project
+            tell(begun="curve", value=nodes)
+            project.edit_curves({0: tuple((c, v) for c, v in nodes)})
+            tell(decided="curve", value=nodes)
+        else:
+            self._wizard.panel.radius.setValue(2.0 + 0.1 * self._random.randrange(10))
+            self._wizard.panel.capture.click()
+
+
+def main() -> None:
+    """Work until killed."""
+    session, pictures, seed = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    application = make_application()
+    context = make_context(settings_file=session.parent / "desktop.ini")
+    context.workspace.folder = session.parent / "workspace"
+    camera = ToldCamera()
+    context.source.choose(SourceInfo("camera", camera.name, "", lambda: camera))
+    page = CalibratePage(context=context)
+    page.show()
+    page.enter()
+    page.open_path(session)
+    assert page.wizard is not None
+    work = Work(page.wizard, camera, pictures, seed)
+    timer = QTimer(interval=TICK_MS)
+    timer.timeout.connect(work.go_on)
+    timer.start()
+    application.exec()
+
+
+if __name__ == "__main__":
+    main()
