@@ -24,9 +24,15 @@ from app.sources.processor import Processor
 from app.sources.source import Frame
 import cv2
 
-picture = np.zeros((1200, 1600, 3), np.uint8)
+picture = np.zeros((300, 400, 3), np.uint8)
 inbox = Mailbox()
-processor = Processor(inbox, lambda _: cv2.fastNlMeansDenoisingColored(picture), Mailbox())
+
+def work(_):
+    end = time.monotonic() + 4.0
+    while time.monotonic() < end:
+        cv2.fastNlMeansDenoisingColored(picture)
+
+processor = Processor(inbox, work, Mailbox())
 
 def end_while_it_works(window):
     processor.start()
