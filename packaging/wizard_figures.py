@@ -94,11 +94,11 @@ def watch_step(wizard: Wizard, key: str, lateness: Lateness, seconds: float) -> 
     def note(item: object) -> None:
         said.append(type(item).__name__)
 
-    wizard.controller.detected.connect(note)
+    wizard.controller.watching.detected.connect(note)
     wait(lambda: False, SETTLE_S)
     said.clear()
     lateness.late_ms.clear()
-    paints, spent, memory_mb = Paints(wizard.view), Spent(), [resident_mb()]
+    paints, spent, memory_mb = Paints(wizard.pictures.view), Spent(), [resident_mb()]
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         wait(lambda: False, min(30.0, max(end - time.monotonic(), 0.1)))
@@ -106,12 +106,12 @@ def watch_step(wizard: Wizard, key: str, lateness: Lateness, seconds: float) -> 
     print(f"{key}, {spent.wall_s:.0f} s: {wizard.panel.live.text()}")
     print(f"  shown: {paints.count / spent.wall_s:.1f} frames/s")
     print(f"  detection: {len(said) / spent.wall_s:.1f} a second, median "
-          f"{wizard.controller.detection_ms:.0f} ms")  # fmt: skip
+          f"{wizard.controller.watching.detection_ms:.0f} ms")  # fmt: skip
     print("  " + told("lateness of the user interface", lateness.late_ms, "ms"))
     span = max(memory_mb) - min(memory_mb)
     print(f"  memory: {memory_mb[0]:.0f} MB, at the end {memory_mb[-1]:.0f}, span {span:.0f} MB")
     print("  " + spent.told())
-    wizard.controller.detected.disconnect(note)
+    wizard.controller.watching.detected.disconnect(note)
 
 
 def open_and_close(page: CalibratePage, session: Path, rounds: int) -> None:
@@ -132,7 +132,7 @@ def open_and_close(page: CalibratePage, session: Path, rounds: int) -> None:
 def one_round(wizard: Wizard) -> None:
     """Look until pictures are shown, then leave."""
     wizard.go_to("lens")
-    wait(lambda: wizard.view.shown_frames > 3, 30.0)
+    wait(lambda: wizard.pictures.view.shown_frames > 3, 30.0)
     wizard.left.emit()
 
 

@@ -12,6 +12,7 @@ from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.report.ball_drawings import draw_balls, draw_curves, draw_misfits
+from gelpolight_core.report.crosstalk_drawing import draw_crosstalk
 from gelpolight_core.report.document import (
     MARKS,
     Drawing,
@@ -59,6 +60,7 @@ def calibration_report(calibration: Calibration, *, validation: Validation | Non
     """
     parts: dict[str, _Parts] = {
         "lights": _Parts((draw_led_plan(calibration),)),
+        "crosstalk": _Parts((draw_crosstalk(calibration.crosstalk),)),
         "radiance": _Parts((draw_radiance(calibration),)),
         "reflectance": _Parts((draw_curves(calibration.reflectance),)),
         "factors": _Parts((draw_factors(calibration),)),
@@ -104,6 +106,7 @@ def run_report(
             ),
             _rejected_spots(run),
         ),
+        "crosstalk": _Parts((draw_crosstalk(c.crosstalk),)),
         "radiance": _Parts((draw_radiance(c, run.radiance),)),
         "reflectance": _reflectance_parts(run, session),
         "factors": _Parts((draw_factors(c),)),

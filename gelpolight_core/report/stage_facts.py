@@ -12,7 +12,9 @@ Facts = tuple[tuple[str, str], ...]
 TITLES = {
     "lens": "Lens",
     "top_pose": "Top surface",
+    "response": "Camera response",
     "lights": "LED positions",
+    "crosstalk": "Crosstalk",
     "radiance": "Light intensity",
     "reflectance": "Reflectance",
     "factors": "Reflectance factors",
@@ -22,6 +24,8 @@ INTROS = {
     "lens": "Checkerboard views at several tilts give focal length, principal point and distortion",
     "top_pose": "A checkerboard on the top surface says where that surface is",
     "lights": "A mirror on the top surface shows each LED; the ray back gives its position",
+    "response": "One scene at several exposures shows how the camera's numbers follow the light",
+    "crosstalk": "Each LED's light is seen by the other channels too; that share is taken away",
     "radiance": "A white diffuse board measures the light that each LED sends to the membrane",
     "reflectance": "Balls of known radius show the membrane at known angles to the light",
     "factors": "The bare membrane against theory: where it reflects more or less than on average",
@@ -47,7 +51,9 @@ def stage_facts(c: Calibration, key: str) -> Facts:
         return _plane_facts(c)
     if key == "lights":
         sd = np.sqrt(np.diagonal(c.led_covariance_mm2, axis1=1, axis2=2))
-        return _led_facts(c.led_positions_mm, sd) + _crosstalk_facts(c)
+        return _led_facts(c.led_positions_mm, sd)
+    if key == "crosstalk":
+        return _crosstalk_facts(c)
     if key == "joint" and c.full is not None:
         return _joint_facts(c)
     return ()

@@ -50,13 +50,13 @@ class Rounds:
     def begin(self):
         self.page.open_path(folder)
         self.seen = []
-        self.page.wizard.controller.detected.connect(self.seen.append)
+        self.page.wizard.controller.watching.detected.connect(self.seen.append)
         self.page.wizard.go_to("lens")
         self.look.start(10)
 
     def go_on(self):
         wizard = self.page.wizard
-        if not self.seen or wizard.view.shown_frames < 3:
+        if not self.seen or wizard.pictures.view.shown_frames < 3:
             return
         self.look.stop()
         if len(left) == rounds - 1:  # the last one is still looking when the window closes
