@@ -83,7 +83,7 @@ def small_calibration(small_session: Path) -> Calibration:
 def small_project(
     small_session: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> CalibrationProject:
-    """Return a project computed on a copy of the small session; not to be changed."""
+    """Return a project on the small session, computed stage by stage; not to be changed."""
     from gelpolight_core.calibration.project import CalibrationProject
 
     folder = tmp_path_factory.mktemp("project") / "session"

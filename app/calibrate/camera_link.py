@@ -7,6 +7,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from app.calibrate.watching import Watching
 from app.shell.context import AppContext
 from app.sources.stream import Stream
+from gelpolight_core.translation import tr
 
 STATUS_MS = 500
 
@@ -55,6 +56,8 @@ class CameraLink(QObject):
             self._watching.set_stream(stream)
             self._context.status.update(camera=info.name)
             self._tick.start()
+        elif info is not None and self._shown:
+            self._context.status.update(camera=tr("{name}, at rest").format(name=info.name))
         self.switched.emit()
 
     def enter(self, shown: bool) -> None:
@@ -67,10 +70,9 @@ class CameraLink(QObject):
         self._tick.stop()
         self._say("")
         stream = self.stream
-        if stream is None:
-            return
-        self._watching.set_stream(None)
-        stream.stop()
+        if stream is not None:
+            self._watching.set_stream(None)
+            stream.stop()
         self._context.status.update(camera=None, rate_hz=None, dropped=None, processing_ms=None)
 
     def _look(self) -> None:

@@ -188,6 +188,7 @@ class CurvePlot(pg.PlotWidget):
         self.box.drawn.connect(self.outlined)
         self.scene().sigMouseClicked.connect(self._on_click)
         self.setLabel("bottom", tr("cosine of the angle between normal and light"))
+        self.getAxis("left").enableAutoSIPrefix(False)
         self.setLabel("left", tr("pixel value over light, I / (\N{GREEK SMALL LETTER RHO}|L|)"))
 
     def show_state(

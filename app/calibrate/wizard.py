@@ -4,42 +4,24 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QApplication,
-    QDockWidget,
     QFileDialog,
-    QHBoxLayout,
-    QLabel,
-    QMainWindow,
-    QStackedWidget,
-    QToolBar,
-    QUndoView,
     QWidget,
 )
 
-from app.calibrate.bench_dock import BenchDock
-from app.calibrate.camera_link import CameraLink
-from app.calibrate.controller import CalibrationController
 from app.calibrate.look import read_raw
 from app.calibrate.looking import Looking
 from app.calibrate.maps import Panel, panels_of, refraction_panels
-from app.calibrate.pictures import PICTURE, RESULT, Pictures
-from app.calibrate.result_view import ResultView
+from app.calibrate.pictures import PICTURE, RESULT
 from app.calibrate.saving import Saving
-from app.calibrate.setup_form import SetupForm
-from app.calibrate.source_button import SourceButton
 from app.calibrate.states import RUNNING, is_done, step_state
-from app.calibrate.step_list import StepList
-from app.calibrate.step_panel import StepPanel
-from app.calibrate.steps import all_steps
 from app.calibrate.takes import takes_of
 from app.calibrate.trial import KnownObject
 from app.calibrate.validating import Validating
-from app.calibrate.validation_panel import ValidationPanel
+from app.calibrate.wizard_frame import WizardFrame
 from app.shell.actions import make_action
 from app.shell.context import AppContext
-from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.status import StageState, StageStatus
@@ -48,7 +30,7 @@ from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 
-class Wizard(QMainWindow):
+class Wizard(WizardFrame):
     """One session, from set-up to validation.
 
     Parameters
@@ -57,28 +39,12 @@ class Wizard(QMainWindow):
         The session.
     context : AppContext
         The program's.
-
-    Signals
-    -------
-    left()
-        The person wants another session.
     """
 
-    left = Signal()
-
     def __init__(self, project: CalibrationProject, *, context: AppContext) -> None:
-        super().__init__()
-        self.setWindowFlags(Qt.WindowType.Widget)
-        named(self, "wizard", tr("Calibration wizard"))
-        self.context = context
-        self.controller = CalibrationController(project, self)
-        self.camera = CameraLink(self.controller.watching, context=context, parent=self)
-        self.steps = all_steps()
-        self.step = self.steps[0]
+        super().__init__(project, context=context)
         self._statuses: dict[Stage, StageStatus] = project.statuses()
-        self._build()
-        self._build_docks()
-        self._build_bar()
+        self._build_keys()
         self.looking = Looking(self.controller, self.pictures, self.panel, self.step)
         self.saving = Saving(self.controller, self.result, context=context)
         self.validating = Validating(self.controller, self.validation, context=context)
@@ -86,80 +52,6 @@ class Wizard(QMainWindow):
         self._refresh()
         self.controller.look_for_boards()
         self.controller.compute()
-
-    @property
-    def project(self) -> CalibrationProject:
-        """The session's project."""
-        return self.controller.project
-
-    # Building
-
-    def _build(self) -> None:
-        middle = QWidget()
-        row = QHBoxLayout(middle)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(0)
-        self.step_list = StepList(self.steps)
-        self.pictures = Pictures()
-        self.setup = SetupForm()
-        self.result = ResultView(self.steps)
-        self.curves: QWidget | None = None  # heavy: made when the step is first opened
-        self.centre = QStackedWidget()
-        for widget in (self.pictures, self.setup, self.result):
-            self.centre.addWidget(widget)
-        self.panel = StepPanel()
-        self.validation = ValidationPanel(self.steps[-1])
-        self.side = QStackedWidget()
-        self.side.addWidget(self.panel)
-        self.side.addWidget(self.validation)
-        row.addWidget(self.step_list)
-        row.addWidget(self.centre, 1)
-        row.addWidget(self.side)
-        self.setCentralWidget(middle)
-
-    def _build_docks(self) -> None:
-        self.history = QDockWidget(tr("History"), self)
-        named(self.history, "calibrate.history", tr("History of corrections"))
-        self._undo_view = named(
-            QUndoView(self.controller.undo), "calibrate.history.list", tr("History of corrections")
-        )
-        self._undo_view.setEmptyLabel(tr("As captured"))
-        self.history.setWidget(self._undo_view)
-        self.bench_dock = BenchDock(self.context.source, self)
-        for dock in (self.history, self.bench_dock):
-            self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
-            dock.hide()
-
-    def _build_bar(self) -> None:
-        bar = QToolBar(tr("Session"), self)
-        named(bar, "calibrate.bar", tr("Session"))
-        bar.setMovable(False)
-        bar.toggleViewAction().setEnabled(False)
-        stack = self.controller.undo
-        undo = make_action(self, "calibrate.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",))
-        redo = make_action(
-            self, "calibrate.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y")
-        )
-        for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
-            action.setEnabled(False)
-            can.connect(action.setEnabled)
-        leave = make_action(
-            self, "calibrate.leave", tr("Sessions"), self.left.emit,
-            tip=tr("Leave this session; everything is saved"),
-        )  # fmt: skip
-        bar.addActions([leave, undo, redo])
-        for dock, text in ((self.history, tr("History")), (self.bench_dock, tr("Virtual bench"))):
-            action = dock.toggleViewAction()
-            action.setText(text)
-            bar.addAction(action)
-        bar.addSeparator()
-        bar.addWidget(SourceButton(context=self.context))
-        session = self.project.session
-        caption = QLabel(f"  {session.sensor.serial}  ·  {session.folder.name}  ")
-        caption.setToolTip(str(session.folder))
-        bar.addWidget(caption)
-        self.addToolBar(bar)
-        self._build_keys()
 
     def _build_keys(self) -> None:
         self._capture_key = make_action(
