@@ -55,7 +55,7 @@ def all_steps() -> tuple[Step, ...]:
         Step(
             "setup",
             tr("Set-up"),
-            (),
+            (Stage.RESPONSE,),
             tr(
                 "State what you know of the sensor from its housing and parts. Every length here"
                 " scales the result."

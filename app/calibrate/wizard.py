@@ -231,7 +231,6 @@ class Wizard(WizardFrame):
         self._statuses = self.controller.statuses()
         running = self.controller.running
         states = {s.key: step_state(s, self._statuses, running) for s in self.steps}
-        states["setup"] = ("pass", tr("Stated"))
         states["validation"] = self.validating.state
         self.step_list.show_states(states)
         self._show_state(*states[self.step.key])
