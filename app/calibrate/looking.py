@@ -60,7 +60,6 @@ class Looking(QObject):
         self.step, self.name = step, ""
         self._armed: tuple[Any, ...] = ()
         self._radius_mm: float | None = None
-        self._moved = False
         self._paused_until = 0.0
         controller.watching.detected.connect(self._on_detected)
         panel.radius.valueChanged.connect(self._on_radius)
@@ -78,7 +77,8 @@ class Looking(QObject):
 
     def take_step(self, step: Step) -> None:
         """Show another step's live picture."""
-        self.step, self._moved = step, False
+        self.step = step
+        self._controller.watching.forget_movement()
         self.live()
 
     def live(self) -> None:
@@ -196,17 +196,16 @@ class Looking(QObject):
 
     def _judge(self, frame: Frame, seen: Seen) -> None:
         """Say when the picture may be captured by itself: never the same view twice."""
-        self._moved = self._moved or seen.moved or not frame.settled
         folder = self.step.folder
         enough = self.step.wanted == 1 and self._controller.project.session.found(folder)
-        ready = seen.still and seen.detection.ready and frame.settled and self._moved
+        ready = seen.still and seen.detection.ready and frame.settled and seen.moved
         waiting = self._controller.busy_with_pictures or time.monotonic() < self._paused_until
         if ready and not enough and not waiting:
             self.good.emit()
 
     def captured(self) -> None:
         """Wait for another view before the next capture by itself."""
-        self._moved = False
+        self._controller.watching.forget_movement()
         self._paused_until = time.monotonic() + PAUSE_S
         self.arm(anew=True)
 

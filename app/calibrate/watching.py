@@ -23,7 +23,10 @@ POLL_MS = 30
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the detection made of a live frame, whether it is still and whether anything moved."""
+    """What the detection made of a live frame, whether it is still, and whether anything moved.
+
+    `moved` counts from the last :meth:`Watching.forget_movement`.
+    """
 
     detection: Detection
     still: bool
@@ -48,6 +51,7 @@ class Watching(QObject):
         super().__init__(parent)
         self.stream: Stream | None = None
         self._capture: Future[list[Frame]] | None = None
+        self._still, self._moved = Still(), False
         self._take: Callable[[list[Any]], None] = lambda _frames: None
         self._inbox: Mailbox[Frame] = Mailbox()
         self._outbox: Mailbox[Outcome[Any] | Failure] = Mailbox()
@@ -67,24 +71,27 @@ class Watching(QObject):
             self._capture = None
         self.stream = stream
         if stream is not None:
+            self._still = Still()
             stream.add_tap(self._inbox.put)
             self._processor.start()
             self._tick.start()
 
     def look_with(self, detect: Looker | None) -> None:
         """Use a detection from the next frame on; None: look for nothing."""
-        still = Still()
-        moved = False
 
         def look(frame: Frame) -> Seen | None:
-            nonlocal moved
+            # Watched whatever is looked for: a movement must not be missed for a new detection.
+            quiet = self._still.update(frame.rgb)
+            self._moved = self._moved or self._still.moves
             if detect is None:
                 return None
-            quiet = still.update(frame.rgb)
-            moved = moved or still.moves
-            return Seen(detect(frame.rgb), quiet, moved)
+            return Seen(detect(frame.rgb), quiet, self._moved)
 
         self._processor.replace(look)
+
+    def forget_movement(self) -> None:
+        """Count movements from now on."""
+        self._moved = False
 
     @property
     def detection_ms(self) -> float:
