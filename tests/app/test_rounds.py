@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
+from statistics import median
 
 ROOT = Path(__file__).resolve().parents[2]
 ROUNDS = 20
 # The first rounds load modules and fill caches.
 SETTLED = 5
-# Allocators keep some of what is freed; twenty frames of this size are 5 MB.
-GROWTH_MB = 20.0
+# Allocators keep some of what is freed; a wizard's frames and pictures alone are 3 MB.
+KEPT_MB = 1.0
 
 SCRIPT = """
 import gc, json, sys, threading
@@ -97,4 +99,6 @@ def test_twenty_rounds_leave_no_widget_thread_or_memory(tmp_path: Path) -> None:
     widgets, threads, memory_mb = zip(*left[SETTLED:], strict=True)
     assert len(set(widgets)) == 1
     assert len(set(threads)) == 1
-    assert max(memory_mb) - memory_mb[0] < GROWTH_MB
+    steps_mb = [after - before for before, after in pairwise(memory_mb)]
+    # What is loaded or compiled late shows once; what is kept of a wizard shows every time.
+    assert median(steps_mb) < KEPT_MB
