@@ -54,7 +54,7 @@ class Saving(QObject):
             self._view.show_saved(
                 tr("Saved as {path}, and in use now. Validate it next.").format(path=path)
             )
-            self._context.requests.library_changed.emit()
+            self._context.requests.calibrations_changed.emit()
             self.saved.emit(str(path))
 
         self._submit(tr("Saving the calibration"), work, done)

@@ -170,7 +170,7 @@ class Validating(QObject):
         except InputError as error:
             self._context.toasts.show(str(error), "fail")
             return
-        self._context.requests.library_changed.emit()
+        self._context.requests.calibrations_changed.emit()
         self._show_verdict()
         self._controller.changed.emit()
 

@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.sensors.calibration_actions import CalibrationActions, show_in_use
 from app.sensors.details import Details
-from app.sensors.library_actions import LibraryActions, show_in_use
 from app.sensors.model import LibraryModel
 from app.sensors.report_writer import ReportWriter
 from app.sensors.sessions_box import SessionsBox
@@ -27,7 +27,7 @@ from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.pages import all_pages
 from app.widgets.naming import named
-from app.workspace.library import Entry
+from app.workspace.entries import Entry
 from app.workspace.workspace import ENDING
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.translation import tr
@@ -40,7 +40,7 @@ class SensorsPage(QWidget):
         super().__init__()
         self._context = context
         self._writing = False
-        self._library = LibraryActions(context)
+        self._library = CalibrationActions(context)
         named(self, "sensors", tr("Sensors"))
         self._make_actions()
         self._model = LibraryModel(lambda: context.settings.limits.age_days)
@@ -67,7 +67,7 @@ class SensorsPage(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
-        context.requests.library_changed.connect(self.refresh)
+        context.requests.calibrations_changed.connect(self.refresh)
         self.refresh()
 
     def _make_actions(self) -> None:

@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 
 from app.sensors.details import trial_lines
 from app.sources.stopping import join
-from app.workspace.library import Entry
+from app.workspace.entries import Entry
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 

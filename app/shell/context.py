@@ -62,7 +62,7 @@ class Requests(QObject):
     choose_session = Signal()  # the same, with the folder still to be chosen by the person
     demo = Signal()  # put the virtual sensor in as the source
     begin_demo = Signal()  # that, and begin to calibrate it
-    library_changed = Signal()  # calibrations were added, removed, validated or put into use
+    calibrations_changed = Signal()  # calibrations were added, removed, validated or put into use
 
 
 @dataclass(frozen=True, slots=True)

@@ -259,7 +259,7 @@ class MainWindow(QMainWindow):
         dialog = PreferencesDialog(self.context.settings, self)
         dialog.theme_changed.connect(self.set_theme)
         dialog.workspace_changed.connect(self._set_workspace)
-        dialog.limits_changed.connect(self.context.requests.library_changed)
+        dialog.limits_changed.connect(self.context.requests.calibrations_changed)
         _show(dialog)
 
     def show_shortcuts(self) -> None:
@@ -292,7 +292,7 @@ class MainWindow(QMainWindow):
 
     def _set_workspace(self, folder: str) -> None:
         self.context.workspace.folder = Path(folder)
-        self.context.requests.library_changed.emit()
+        self.context.requests.calibrations_changed.emit()
 
     def toggle_full_screen(self) -> None:
         """Fill the screen, or go back."""

@@ -20,7 +20,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO
 
-from app.workspace.library import Entry, read_entry
+from app.workspace.entries import Entry, read_entry
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays

@@ -24,7 +24,7 @@ from app.sensors.report_writer import write_entry_report
 from app.shell.context import AppContext
 from app.shell.settings import Limits
 from app.widgets.quality_table import QualityTableWidget
-from app.workspace.library import read_entry
+from app.workspace.entries import read_entry
 from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
 
@@ -96,7 +96,7 @@ def test_a_validated_one_says_so(page: SensorsPage, source: Path, context: AppCo
         Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder 5 mm", (passed,)),
         chosen.path,
     )
-    context.requests.library_changed.emit()
+    context.requests.calibrations_changed.emit()
     assert "Validated: cylinder 5 mm" in words(page)
     assert "+2.0 %" in words(page)
     count = len(context.toasts.shown())

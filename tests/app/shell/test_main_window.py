@@ -318,7 +318,7 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     window.show_preferences()
     dialog = dialog_of(window, PreferencesDialog)
     asked = []
-    window.context.requests.library_changed.connect(lambda: asked.append(1))
+    window.context.requests.calibrations_changed.connect(lambda: asked.append(1))
     dialog._limits["age_days"].setValue(7)
     assert window.context.settings.limits.age_days == 7.0
     dialog._folder.setText(str(tmp_path / "elsewhere"))

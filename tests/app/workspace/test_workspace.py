@@ -14,7 +14,7 @@ import scene
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.workspace.library import parse_time, read_entry
+from app.workspace.entries import parse_time, read_entry
 from app.workspace.validation import (
     Comparison,
     Validation,

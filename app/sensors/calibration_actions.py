@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from app.shell.context import AppContext
-from app.workspace.library import Entry
+from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from app.workspace.workspace import Removal
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
-class LibraryActions:
+class CalibrationActions:
     """Changes the workspace; every refusal becomes a message."""
 
     def __init__(self, context: AppContext) -> None:
@@ -51,7 +51,7 @@ class LibraryActions:
                 "pass",
             )
         if place is not None:
-            self._context.requests.library_changed.emit()
+            self._context.requests.calibrations_changed.emit()
         return place
 
     def use(self, entry: Entry) -> None:
@@ -61,7 +61,7 @@ class LibraryActions:
         except InputError as error:
             self._context.toasts.show(str(error), "fail")
             return
-        self._context.requests.library_changed.emit()
+        self._context.requests.calibrations_changed.emit()
         if not entry.validated:
             self._context.toasts.show(
                 tr(
@@ -78,7 +78,7 @@ class LibraryActions:
         except InputError as error:
             self._context.toasts.show(str(error), "fail")
             return
-        self._context.requests.library_changed.emit()
+        self._context.requests.calibrations_changed.emit()
         self._context.toasts.show(
             tr("{name} was moved to the trash folder.").format(name=entry.path.name),
             actions=((tr("Undo"), lambda: self._restore(removal)),),
@@ -89,7 +89,7 @@ class LibraryActions:
             self._context.workspace.restore(removal)
         except InputError as error:
             self._context.toasts.show(str(error), "fail")
-        self._context.requests.library_changed.emit()
+        self._context.requests.calibrations_changed.emit()
 
 
 def show_in_use(context: AppContext, entries: Iterable[Entry]) -> None:
