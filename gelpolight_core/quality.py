@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from gelpolight_core.translation import tr
+
 
 class Verdict(StrEnum):
     """How a figure, a stage or a calibration is judged."""
@@ -49,6 +51,25 @@ class Figure:
     fail_limit: float | None
     verdict: Verdict
     advice: str
+
+    @property
+    def higher_is_better(self) -> bool:
+        """Whether small values are the bad ones, by the order of the limits or by the verdict."""
+        limits = [x for x in (self.warn_limit, self.fail_limit) if x is not None]
+        if len(limits) == 2 and limits[0] != limits[1]:
+            return limits[0] > limits[1]
+        if not limits:
+            return False
+        return (self.value <= limits[0]) != (self.verdict is Verdict.PASS)
+
+
+def verdict_word(verdict: Verdict) -> str:
+    """Return a verdict as a person reads it."""
+    return {
+        Verdict.PASS: tr("Pass"),
+        Verdict.WARN: tr("Warning"),
+        Verdict.FAIL: tr("Fail"),
+    }[verdict]
 
 
 def judge(

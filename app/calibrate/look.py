@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +19,7 @@ from app.calibrate.detect import (
     detect_top_pose,
 )
 from app.calibrate.detect_light import detect_background, detect_whiteboard
-from app.calibrate.detection import Detection, or_refusal
+from app.calibrate.detection import Detection, as_picture, or_refusal
 from app.calibrate.marks import mirror_places, spot_markers, working_rim
 from app.calibrate.steps import Step
 from app.live.overlay import Circle, Overlay
@@ -31,8 +31,8 @@ from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.optics.lens_views import LensView
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.session.picture import Picture
 from gelpolight_core.session.session import Session
+from gelpolight_core.session.wholeness import decode_picture
 from gelpolight_core.translation import tr
 
 Rgb = NDArray[Any]
@@ -127,7 +127,7 @@ def _placed_spots(rgb: Rgb, session: Session) -> Detection:
     """Show the spots as a person has placed them, to be placed anew."""
 
     def look() -> Detection:
-        spots = find_mirror_spots(_picture(rgb), placed=session.decisions.spots_px)
+        spots = find_mirror_spots(as_picture(rgb), placed=session.decisions.spots_px)
         marks = Overlay(markers=spot_markers(spots, editable=True))
         return Detection(marks, tr("Spots placed by hand."), True, spots.quality.figures, spots)
 
@@ -176,12 +176,7 @@ def _ball_in_capture(rgb: Rgb, setting: BallSetting, radius_mm: float) -> Detect
     return replace(found, overlay=marks, sentence=f"{found.sentence} {by_hand}")
 
 
-def _picture(rgb: Rgb) -> Picture:
-    top = float(np.iinfo(rgb.dtype).max)
-    return Picture("", rgb.astype(np.float32) / np.float32(top), bit_depth=8 * rgb.itemsize)
-
-
-def read_raw(path: Any) -> Rgb:
+def read_raw(path: Path) -> Rgb:
     """Return a picture file as it is, (rows, columns, 3) uint8 or uint16 RGB.
 
     Raises
@@ -189,7 +184,7 @@ def read_raw(path: Any) -> Rgb:
     InputError
         If it cannot be read.
     """
-    raw = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    raw = decode_picture(path)
     if raw is None or raw.dtype not in (np.uint8, np.uint16):
         raise InputError(
             tr("the picture cannot be read"), where=str(path), advice=tr("Capture it again")

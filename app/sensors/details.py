@@ -18,10 +18,10 @@ from PySide6.QtWidgets import (
 from app.sensors.model import made_cell
 from app.shell.icons import icon
 from app.widgets.naming import named
-from app.widgets.quality_table import QualityTableWidget, verdict_word
+from app.widgets.quality_table import QualityTableWidget
 from app.workspace.entries import Entry, parse_time
 from gelpolight_core.calibration.manifest import CalibrationSummary
-from gelpolight_core.quality import Verdict
+from gelpolight_core.quality import Verdict, verdict_word
 from gelpolight_core.translation import tr
 
 

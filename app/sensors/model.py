@@ -11,9 +11,9 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelInd
 
 from app.shell import theme
 from app.shell.icons import icon
-from app.widgets.quality_table import verdict_word
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
+from gelpolight_core.quality import verdict_word
 from gelpolight_core.translation import tr
 
 Index = QModelIndex | QPersistentModelIndex

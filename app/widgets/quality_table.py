@@ -20,7 +20,7 @@ from app.shell import theme
 from app.shell.actions import make_action
 from app.shell.icons import icon
 from app.widgets.naming import named
-from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.quality import Figure, QualityTable, Verdict, verdict_word
 from gelpolight_core.translation import tr
 
 VERDICT_COLUMN, LABEL_COLUMN, VALUE_COLUMN, LIMIT_COLUMN = range(4)
@@ -29,15 +29,6 @@ ROW_HEIGHT = 24
 # Rounding alone; no figure's limit is near.
 TINY = 1e-9
 MARGIN = 6
-
-
-def verdict_word(verdict: Verdict) -> str:
-    """Return the word for a verdict."""
-    return {
-        Verdict.PASS: tr("Pass"),
-        Verdict.WARN: tr("Warning"),
-        Verdict.FAIL: tr("Fail"),
-    }[verdict]
 
 
 def value_text(figure: Figure) -> str:
@@ -58,16 +49,8 @@ def limit_text(figure: Figure) -> str:
     limit = figure.warn_limit if figure.warn_limit is not None else figure.fail_limit
     if limit is None:
         return ""
-    sign = "≥" if _higher_is_better(figure, limit) else "≤"
+    sign = "≥" if figure.higher_is_better else "≤"
     return f"{sign} {limit:.4g} {figure.unit}".rstrip()
-
-
-def _higher_is_better(figure: Figure, limit: float) -> bool:
-    warn, fail = figure.warn_limit, figure.fail_limit
-    if warn is not None and fail is not None and warn != fail:
-        return fail < warn
-    beyond = figure.value > limit
-    return beyond if figure.verdict is Verdict.PASS else figure.value < limit
 
 
 class _Grid(QTableWidget):

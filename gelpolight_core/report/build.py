@@ -10,7 +10,7 @@ from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.measurement.evaluation import Evaluation
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.quality import QualityTable, verdict_word
 from gelpolight_core.report.ball_drawings import draw_balls, draw_curves, draw_misfits
 from gelpolight_core.report.crosstalk_drawing import draw_crosstalk
 from gelpolight_core.report.document import (
@@ -20,7 +20,6 @@ from gelpolight_core.report.document import (
     Report,
     Section,
     Validation,
-    verdict_word,
 )
 from gelpolight_core.report.drawing import Map
 from gelpolight_core.report.light_drawings import (

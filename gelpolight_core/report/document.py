@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gelpolight_core.quality import Figure, QualityTable, Verdict
@@ -130,15 +129,6 @@ class Report:
     sources: Listing
 
 
-def verdict_word(verdict: Verdict) -> str:
-    """Return the verdict as a person reads it."""
-    return {
-        Verdict.PASS: tr("Pass"),
-        Verdict.WARN: tr("Warning"),
-        Verdict.FAIL: tr("Fail"),
-    }[verdict]
-
-
 def value_text(figure: Figure) -> str:
     """Return a figure's value with its unit."""
     # What rounding leaves of a zero is a zero.
@@ -152,7 +142,7 @@ def limit_text(figure: Figure) -> str:
     limits = [x for x in (figure.warn_limit, figure.fail_limit) if x is not None]
     if not limits:
         return ""
-    at_most = _is_upper_limit(figure, limits)
+    at_most = not figure.higher_is_better
     sign = "\N{LESS-THAN OR EQUAL TO}" if at_most else "\N{GREATER-THAN OR EQUAL TO}"
     text = f"{sign} {limits[0]:.4g}"
     if figure.warn_limit is not None and figure.fail_limit is not None:
@@ -160,10 +150,3 @@ def limit_text(figure: Figure) -> str:
             sign=">" if at_most else "<", limit=figure.fail_limit
         )
     return text
-
-
-def _is_upper_limit(figure: Figure, limits: Sequence[float]) -> bool:
-    """Tell from the limits' order, or from the verdict where there is one, which side is good."""
-    if len(limits) == 2 and limits[0] != limits[1]:
-        return limits[0] < limits[1]
-    return (figure.value <= limits[0]) == (figure.verdict is Verdict.PASS)

@@ -6,7 +6,7 @@ import base64
 from collections.abc import Iterable
 from html import escape
 
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.quality import QualityTable, Verdict, verdict_word
 from gelpolight_core.report.document import (
     MARKS,
     Drawing,
@@ -15,7 +15,6 @@ from gelpolight_core.report.document import (
     Section,
     limit_text,
     value_text,
-    verdict_word,
 )
 from gelpolight_core.translation import tr
 

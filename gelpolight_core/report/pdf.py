@@ -15,7 +15,7 @@ from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
-from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.quality import QualityTable, Verdict, verdict_word
 from gelpolight_core.report.document import (
     MARKS,
     Drawing,
@@ -24,7 +24,6 @@ from gelpolight_core.report.document import (
     Section,
     limit_text,
     value_text,
-    verdict_word,
 )
 from gelpolight_core.report.typeface import printable
 from gelpolight_core.translation import tr
