@@ -25,7 +25,7 @@ from app.calibrate.steps import Step
 from app.live.overlay import Circle, Overlay
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.project import CalibrationProject
-from gelpolight_core.calibration.stages import StageResults
+from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.errors import InputError
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.mirror import find_mirror_spots

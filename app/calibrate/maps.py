@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWi
 
 from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.stages import StageResults
+from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.translation import tr
 

@@ -15,12 +15,9 @@ from gelpolight_core.calibration.calibration import MODELS, Calibration, FullMod
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.joint import JointResult
-from gelpolight_core.calibration.stages import (
-    StageResults,
-    bare_calibration,
-    require_balls,
-    run_stage,
-)
+from gelpolight_core.calibration.refinement import bare_calibration
+from gelpolight_core.calibration.results import StageResults, require_balls
+from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult
 from gelpolight_core.lights.crosstalk import CrosstalkResult

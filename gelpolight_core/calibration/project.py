@@ -27,7 +27,8 @@ from gelpolight_core.calibration.inputs import (
 )
 from gelpolight_core.calibration.intake import read_bytes, refuse_other_size, refuse_unfit
 from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, stages_of
-from gelpolight_core.calibration.stages import StageResults, run_stage
+from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.status import StageState, StageStatus, judged
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically

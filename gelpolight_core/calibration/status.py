@@ -9,7 +9,7 @@ from typing import Any
 
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import judge_joint
-from gelpolight_core.calibration.stages import StageResults
+from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 

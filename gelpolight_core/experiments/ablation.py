@@ -19,12 +19,9 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import assemble, stages_of
-from gelpolight_core.calibration.stages import (
-    StageResults,
-    bare_calibration,
-    refine_with,
-    run_stage,
-)
+from gelpolight_core.calibration.refinement import bare_calibration, refine_with
+from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.score import (

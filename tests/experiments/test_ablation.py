@@ -12,12 +12,9 @@ import pytest
 
 from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.pipeline import assemble, stages_of
-from gelpolight_core.calibration.stages import (
-    StageResults,
-    bare_calibration,
-    refine_with,
-    run_stage,
-)
+from gelpolight_core.calibration.refinement import bare_calibration, refine_with
+from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.terms import CalibrationTerms
 from gelpolight_core.experiments.ablation import VARIANTS
 from gelpolight_core.session.session import read_session

@@ -1,0 +1,141 @@
+"""The last stage: LEDs and membrane refined on the ball presses, and how sure the result is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.ball_pixels import gather_ball_pixels
+from gelpolight_core.calibration.calibration import Calibration, FullModel, Provenance, ScaleSd
+from gelpolight_core.calibration.depth_scale import (
+    ball_height_error,
+    depth_scale_sd,
+    lateral_scale_sd,
+)
+from gelpolight_core.calibration.joint import JointResult, refine_jointly
+from gelpolight_core.calibration.results import StageResults, need
+from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.lights.positions import LightResult
+from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.session.session import Session
+
+CHECKED_BALLS = 4
+
+
+def refine(session: Session, results: StageResults) -> StageResults:
+    """Refine LEDs and membrane, and say how sure the lengths are."""
+    refined = refine_with(results)
+    assert refined.joint is not None and refined.full is not None
+    scale = _scale_sd(session, refined, refined.joint, refined.full)
+    return replace(refined, full=replace(refined.full, scale_sd=scale))
+
+
+def refine_with(
+    results: StageResults, *, terms: CalibrationTerms = ALL_CALIBRATION_TERMS
+) -> StageResults:
+    """Refine LEDs and membrane on the presses, and keep the background to compare with.
+
+    Parameters
+    ----------
+    results : StageResults
+        Of all earlier stages.
+    terms : CalibrationTerms, optional
+        What the full model reckons with.
+    """
+    table, lights = need(results.table, "balls"), need(results.lights, "balls")
+    bare, factors = need(results.background, "balls"), need(results.factors, "balls")
+    found = need(results.crosstalk, "balls")
+    if not terms.crosstalk:
+        found = replace(found, matrix=np.eye(3))
+    crosstalk = found.matrix
+    background = unmix(bare, crosstalk)
+    noise = press_noise(results.presses)
+    pixels = [
+        gather_ball_pixels(
+            press, unmix(picture, crosstalk), background, table, factors.usable, noise
+        )
+        for press, picture in zip(results.presses, results.pictures, strict=True)
+    ]
+    joint = refine_jointly(results.presses, pixels, lights.led_positions_mm, terms=terms)
+    full = FullModel(
+        joint.led_positions_mm,
+        joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
+        joint.membrane,
+        background,
+        joint.decay_mm,
+        joint.misfit,
+        joint.held_out,
+        joint.kept,
+        joint.membrane_sd,
+        joint.membrane_held_out,
+        joint.membrane_kept,
+    )
+    return replace(results, crosstalk=found, joint=joint, full=full)
+
+
+def _scale_sd(
+    session: Session, results: StageResults, joint: JointResult, full: FullModel
+) -> ScaleSd:
+    """Say how sure the lengths of the full model are."""
+    calibration = bare_calibration(session, replace(results, full=full))
+    lens, pose = need(results.lens, "balls"), need(results.top_pose, "balls")
+    covariance = joint.covariance.copy()
+    if joint.kept == "mirror":
+        for k, own in enumerate(calibration.led_covariance_mm2):
+            covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
+    files = [ball.file for ball in results.balls if ball.press is not None]
+    # Evenly over the session, so that one odd press does not decide.
+    some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
+    unexplained = ball_height_error(
+        calibration,
+        [session.picture(session.folder / "balls" / files[i]).rgb for i in some],
+        [joint.balls[i] for i in some],
+    )
+    lateral = lateral_scale_sd(
+        calibration.stack, pose.distance_sd_mm, lens.focal_sd_px[0] / lens.camera.fx
+    )
+    fitted = depth_scale_sd(full, calibration.table, covariance)
+    together = float(np.linalg.norm([fitted, unexplained, lateral]))
+    return ScaleSd(together, lateral, unexplained)
+
+
+def bare_calibration(session: Session, results: StageResults) -> Calibration:
+    """Return what a reconstruction needs of the results, without figures and provenance.
+
+    Raises
+    ------
+    InputError
+        If a stage was not run.
+    """
+    where = str(session.folder)
+    lens, pose = need(results.lens, where), need(results.top_pose, where)
+    lights, radiance = need(results.lights, where), need(results.radiance, where)
+    return Calibration(
+        sensor=session.sensor,
+        model="paper" if results.full is None else "full",
+        camera=lens.camera,
+        plane=pose.plane,
+        led_positions_mm=lights.led_positions_mm,
+        led_covariance_mm2=lights.led_covariance_mm2,
+        crosstalk=need(results.crosstalk, where).matrix,
+        radiance=radiance.radiance,
+        factors=need(results.factors, where).factors,
+        reflectance=need(results.reflectance, where).table,
+        noise=press_noise(results.presses),
+        quality={},
+        provenance=Provenance("", "", "", "", {}),
+        full=results.full,
+        response=need(results.response, where).response,
+    )
+
+
+def press_noise(presses: tuple[BallPress, ...]) -> NDArray[np.float64]:
+    """Return the noise of press minus background, per channel, over all presses."""
+    return np.asarray(np.mean([p.indentation.noise for p in presses], axis=0), np.float64)
+
+
+def _mirror_sd(lights: LightResult) -> NDArray[np.float64]:
+    return np.asarray(np.sqrt(np.diagonal(lights.led_covariance_mm2, axis1=1, axis2=2)))
