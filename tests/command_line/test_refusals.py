@@ -1,0 +1,321 @@
+"""What the commands refuse: one line that says how to mend it, and the exit status."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from one_line import refusal
+
+from app.command_line import calibrate
+from app.command_line import main as main_module
+from app.command_line.main import MENDABLE, OUR_FAULT, main
+from gelpolight_core.errors import InputError
+
+
+def damaged(session: Path, tmp_path: Path, damage: Callable[[Path], None]) -> Path:
+    """Return a copy of the session with one thing made wrong."""
+    copy = tmp_path / "copy"
+    shutil.copytree(session, copy, ignore=shutil.ignore_patterns("presses", "truth"))
+    damage(copy)
+    return copy
+
+
+def paint(path: Path, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Rewrite a picture after a change of its (rows, columns, 3) uint8 values, BGR."""
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    assert cv2.imwrite(str(path), np.asarray(change(picture), np.uint8))
+
+
+def replace_text(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def two_presses(folder: Path) -> None:
+    """Put the halves of two pictures together whose balls lie in different halves."""
+    pictures = sorted((folder / "balls").glob("*.png"))
+    truth = json.loads((folder / "truth.json").read_text())["balls"]
+    x = [b["centre_sensor_xy_mm"][0] for b in truth]
+    left, right = int(np.argmin(x)), int(np.argmax(x))
+    first, second = (cv2.imread(str(pictures[k])) for k in (left, right))
+    middle = first.shape[1] // 2
+    first[:, middle:] = second[:, middle:]
+    assert cv2.imwrite(str(pictures[0]), first)
+
+
+DAMAGES: list[tuple[str, Callable[[Path], None], str]] = [
+    ("no mirror", lambda f: shutil.rmtree(f / "mirror"), "mirror: the stage has no pictures"),
+    ("no background", lambda f: shutil.rmtree(f / "background"), "background"),
+    (
+        "another size",
+        lambda f: paint(next((f / "whiteboard").iterdir()), lambda p: p[:-10]),
+        "whiteboard",
+    ),
+    (
+        "grey",
+        lambda f: paint(
+            next((f / "background").iterdir()), lambda p: np.repeat(p[..., :1], 3, axis=2)
+        ),
+        "grey",
+    ),
+    ("black", lambda f: paint(next((f / "background").iterdir()), lambda p: p * 0), "dark"),
+    (
+        "saturated",
+        lambda f: paint(
+            next((f / "whiteboard").iterdir()), lambda p: np.minimum(p.astype(int) * 9, 255)
+        ),
+        "saturated",
+    ),
+    (
+        "wrong board",
+        lambda f: replace_text(f / "session.toml", "inner_corners = [", "inner_corners = [1"),
+        "views",
+    ),
+    ("two presses", two_presses, "more than one|2 |two"),
+    (
+        "ball too small",
+        lambda f: replace_text(f / "session.toml", '.png" = 3.0', '.png" = 0.9'),
+        "radius",
+    ),
+    (
+        "unknown key",
+        lambda f: replace_text(f / "session.toml", "[sensor]", "[sensor]\ncolour = 1"),
+        "colour",
+    ),
+    ("future", lambda f: replace_text(f / "session.toml", "version = 1", "version = 3"), "newer"),
+    (
+        "copied stage",
+        lambda f: shutil.copy(
+            next((f / "background").iterdir()), next((f / "whiteboard").iterdir())
+        ),
+        "copy of whiteboard",
+    ),
+    (
+        "working diameter",
+        lambda f: replace_text(
+            f / "session.toml", "working_diameter_mm = 26.0", "working_diameter_mm = 1.0"
+        ),
+        "working_diameter_mm",
+    ),
+    (
+        "no picture",
+        lambda f: next((f / "mirror").iterdir()).write_bytes(b"\x89PNG broken"),
+        "not a whole",
+    ),
+]
+
+
+@pytest.mark.parametrize(("damage", "what"), [d[1:] for d in DAMAGES], ids=[d[0] for d in DAMAGES])
+def test_a_session_with_a_fault_is_refused_in_one_line_and_nothing_is_written(
+    session: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    damage: Callable[[Path], None],
+    what: str,
+) -> None:
+    import re
+
+    folder = damaged(session, tmp_path, damage)
+    output = tmp_path / "c.gplcal"
+    line = refusal(capsys, "calibrate", str(folder), "-o", str(output))
+    assert re.search(what, line), line
+    assert not output.exists()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_what_is_wrong_on_the_command_line_is_said(
+    session: Path,
+    calibration: Path,
+    press: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    cal, out = str(calibration), str(tmp_path / "o")
+    assert "session.toml" in refusal(capsys, "calibrate", str(tmp_path), "-o", out)
+    nowhere = str(tmp_path / "no" / "c.gplcal")
+    assert "folder" in refusal(capsys, "calibrate", str(session), "-o", nowhere)
+    assert "no such file" in refusal(capsys, "inspect", str(tmp_path / "none.gplcal"))
+    assert "no such file" in refusal(capsys, "reconstruct", cal, str(tmp_path / "x.png"), "-o", out)
+    assert "xyz" in refusal(capsys, "reconstruct", cal, str(press), "-o", out, "--format", "xyz")
+    twice = ("reconstruct", cal, str(press), str(press), "-o", out)
+    assert "two pictures" in refusal(capsys, *twice)
+    other = tmp_path / "small.png"
+    assert cv2.imwrite(str(other), np.dstack([np.full((9, 9), k, np.uint8) for k in (9, 8, 7)]))
+    assert "9x9" in refusal(capsys, "reconstruct", cal, str(other), "-o", out)
+    bare = next((session / "background").iterdir())
+    nothing = refusal(capsys, "measure", cal, str(bare), "--shape", "ball")
+    assert "pressed" in nothing or "nothing" in nothing
+    cut = tmp_path / "cut.gplcal"
+    cut.write_bytes(calibration.read_bytes()[:-500])
+    assert "damaged" in refusal(capsys, "inspect", str(cut))
+
+
+def test_no_result_takes_the_place_of_what_it_is_made_of(
+    session: Path,
+    calibration: Path,
+    press: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A slip of the hand costs a line of text, not the capture or the calibration."""
+    picture, cal = tmp_path / "p.png", tmp_path / "c.gplcal"
+    shutil.copy(press, picture)
+    shutil.copy(calibration, cal)
+    (tmp_path / "link.gplcal").symlink_to(cal)
+    (tmp_path / "d.toml").write_text("")
+    ball = session / "balls" / "ball_00.png"
+    kept = [path.read_bytes() for path in (picture, cal, ball)]
+    measure = ("measure", str(cal), str(picture), "--shape", "ball", "--json")
+    both = ("-o", str(tmp_path / "x"), "--json", str(tmp_path / "x"))
+    for arguments in (
+        ("reconstruct", str(cal), str(picture), "-o", str(tmp_path), "--pictures"),
+        (*measure, str(cal)),
+        (*measure, str(picture)),
+        (*measure, str(tmp_path / "link.gplcal")),
+        ("benchmark", str(cal), str(picture), "--json", str(cal)),
+        ("calibrate", str(session), "-o", str(ball)),
+        ("calibrate", str(session), *both),
+        ("design", str(tmp_path / "d.toml"), "--shadows", str(tmp_path / "d.toml")),
+    ):
+        assert "take the place" in refusal(capsys, *arguments)
+    assert [path.read_bytes() for path in (picture, cal, ball)] == kept
+    assert not (tmp_path / "x").exists()
+
+
+def test_what_the_system_refuses_is_a_sentence(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    long = "x" * 300
+    assert "too long" in refusal(capsys, "inspect", str(tmp_path / long))
+    assert "too long" in refusal(capsys, "simulate", str(tmp_path / long))
+    inside = str(press / "session")
+    assert "a file stands" in refusal(capsys, "simulate", inside)
+    (tmp_path / "d.toml").write_text("")
+    shadows = ("design", str(tmp_path / "d.toml"), "--shadows", str(tmp_path))
+    assert "a folder stands" in refusal(capsys, *shadows)
+    shutil.copy(press, tmp_path)
+    evaluate = ("evaluate", str(calibration), str(tmp_path), "-o", str(tmp_path / "e"))
+    assert "truth.csv" in refusal(capsys, *evaluate)
+    assert not (tmp_path / "e").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (("measure", "c", "p.png", "--shape", "star"), "star"),
+        (("measure", "c"), "IMAGE"),
+        (("benchmark", "c", "p.png", "--repeats", "many"), "many"),
+        (("sing",), "sing"),
+    ],
+)
+def test_a_slip_in_the_arguments_is_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], what: str
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == MENDABLE
+    (line,) = capsys.readouterr().err.splitlines()
+    assert what in line
+    assert "--help" in line
+
+
+def test_ctrl_c_while_the_program_loads_is_answered(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(main_module, "build_parser", interrupt)
+    assert main(["inspect", "c"]) == main_module.INTERRUPTED
+    assert capsys.readouterr().err == "gelpolight: stopped\n"
+
+
+def test_a_log_that_cannot_be_written_shows_no_traceback(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "file"))
+
+    def fail(_path: Path) -> None:
+        raise ZeroDivisionError("the tests did it")
+
+    monkeypatch.setattr(calibrate, "read_session", fail)
+    assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == OUR_FAULT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "the tests did it" in line
+
+
+def test_names_that_differ_only_in_case_are_one_name(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On many disks the second depth map would take the place of the first."""
+    shutil.copy(press, tmp_path / "A.png")
+    shutil.copy(press, tmp_path / "a.tif")
+    twins = (str(tmp_path / "A.png"), str(tmp_path / "a.tif"))
+    assert "two pictures" in refusal(
+        capsys, "reconstruct", str(calibration), *twins, "-o", str(tmp_path / "o")
+    )
+
+
+def test_a_closed_output_is_no_fault(calibration: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert main(["inspect", str(calibration)]) == 0
+    for stream in (sys.stdout, sys.stderr):
+        stream.close()
+
+
+def test_warnings_of_libraries_go_to_the_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    def warn(_path: Path) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            # pytest puts its own recorder in the place of what main set
+            warnings.showwarning = main_module._log_warning
+            warnings.warn("divide by zero", RuntimeWarning, stacklevel=1)
+        raise InputError("stop", where="here", advice="Do")
+
+    monkeypatch.setattr(calibrate, "read_session", warn)
+    assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == MENDABLE
+    assert "divide" not in capsys.readouterr().err
+    assert "divide by zero" in next(tmp_path.rglob("gelpolight-faults.log")).read_text()
+
+
+def test_a_full_disk_is_a_sentence(
+    session: Path, capsys: pytest.CaptureFixture[str], calibration: Path
+) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    background = str(next((session / "background").iterdir()))
+    arguments = ("reconstruct", str(calibration), background, "-o", "/dev/full")
+    assert "/dev/full" in refusal(capsys, *arguments)
+
+
+def test_a_fault_of_ours_is_one_line_and_a_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    def fail(_path: Path) -> None:
+        raise ZeroDivisionError("the tests did it")
+
+    monkeypatch.setattr(calibrate, "read_session", fail)
+    assert main(["calibrate", str(tmp_path), "-o", str(tmp_path / "c.gplcal")]) == OUR_FAULT
+    said = capsys.readouterr().err
+    assert "the tests did it" in said
+    assert "Traceback" not in said
+    log = next(tmp_path.rglob("gelpolight-faults.log"))
+    assert "Traceback" in log.read_text()
