@@ -144,6 +144,7 @@ class Looking(QObject):
         view.set_stream(None)
         view.show_picture(raw)
         view.set_overlay(None)
+        self._panel.show_live("", ready=True)
         self._pictures.strip.choose(name)
         self._pictures.show_looked_at(name)
         self._show_radius()

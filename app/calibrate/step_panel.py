@@ -185,6 +185,7 @@ class StepPanel(QWidget):
     def _build_foot(self) -> QVBoxLayout:
         foot = QVBoxLayout()
         foot.setContentsMargins(12, 4, 12, 10)
+        foot.setSpacing(6)
         row = QHBoxLayout()
         self.progress = named(QProgressBar(), "calibrate.progress", tr("Progress"))
         self.progress.setRange(0, 100)

@@ -45,6 +45,7 @@ class Wizard(WizardFrame):
     def __init__(self, project: CalibrationProject, *, context: AppContext) -> None:
         super().__init__(project, context=context)
         self._statuses: dict[Stage, StageStatus] = project.statuses()
+        self._running: Stage | None = None
         self._build_keys()
         self.looking = Looking(self.controller, self.pictures, self.panel, self.step)
         self.saving = Saving(self.controller, self.result, context=context)
@@ -249,7 +250,7 @@ class Wizard(WizardFrame):
         self.pictures.strip.show_takes(
             takes_of(self.step, self.project, self._statuses, self.controller.lens_views())
         )
-        self.result.show_statuses(self._statuses, running)
+        self.result.show_statuses(self._statuses, running, busy=self.controller.jobs.busy)
         self._show_maps()
         if self.step.key == "reflectance" and self.curves is not None:
             self.curves.take_results()
@@ -312,13 +313,10 @@ class Wizard(WizardFrame):
 
     def _on_progress(self, title: str, share: float) -> None:
         self.panel.show_work(title, share)
-        if not title:
+        running = self.controller.running
+        if not title or running is not self._running:
+            self._running = running
             self._refresh()
-        elif self.controller.running is not None:
-            running = self.controller.running
-            for step in self.steps:
-                if running in step.stages:
-                    self.step_list.show_running(step)
 
     # Pictures
 
