@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QPushButton,
     QScrollArea,
     QSpinBox,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -250,14 +251,15 @@ class _BoardRow(QWidget):
         row.addWidget(self.columns)
         row.addWidget(QLabel("x"))
         row.addWidget(self.rows)
-        row.addWidget(QLabel(tr("corners, squares of")))
+        row.addWidget(QLabel(tr("squares of")))
         row.addWidget(self.square, 1)
         self.print = named(
-            QPushButton(tr("Print…")),
+            QToolButton(),
             f"{name}.print",
             tr("{b}: save this board as a page to print").format(b=accessible),
             tr("Save this board as a page to print, A4 at true size; measure it afterwards"),
         )
+        self.print.setText(tr("Print…"))
         row.addWidget(self.print)
 
     def show_board(self, board: BoardSpec) -> None:

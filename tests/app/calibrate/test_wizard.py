@@ -390,3 +390,20 @@ def test_a_file_broken_by_something_else_can_be_written_anew(
     technician.click("calibrate.outside.overwrite")
     assert not wizard.outside.isVisible()
     assert read_session(technician.session) == wizard.project.session
+
+
+def test_a_press_is_validated_from_its_picture_with_the_truth_beside_it(
+    technician: Technician, computed_project: Made, small_session: Path
+) -> None:
+    technician.begin(computed_project(), "result")
+    technician.click("result.save")
+    technician.rest()
+    technician.click("calibrate.next")
+    wizard = technician.wizard
+    assert not wizard.validation.measure.isEnabled()  # there is no camera
+    wizard.validating.import_press(small_session / "presses" / "cylinder_s5_d100.png")
+    technician.until(lambda: "Diameter" in wizard.validation.result.text())
+    known = wizard.validation.known()
+    assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
+    technician.click("validation.keep")
+    assert technician.state("validation") == "pass"
