@@ -6,7 +6,6 @@ import zlib
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.recording.deflate import deflate
 from gelpolight_core.recording.recording import Rgb
@@ -59,7 +58,7 @@ def unpack_strip(data: bytes, rgb: Rgb) -> bool:
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_up(differences: NDArray[np.uint8], rgb: NDArray[np.uint8]) -> None:  # pragma: no cover
+def _add_up(differences, rgb):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Undo the differences to the left neighbour, modulo the range of the values."""
     for row in range(rgb.shape[0]):
         red, green, blue = differences[row, 0]

@@ -115,8 +115,8 @@ class Recording:
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         mark = self._marks[index]
-        kind = np.uint8 if mark.bits == 8 else np.uint16
-        rgb: Rgb = np.empty((mark.rows, mark.columns, 3), kind)
+        shape = (mark.rows, mark.columns, 3)
+        rgb: Rgb = np.empty(shape, np.uint8) if mark.bits == 8 else np.empty(shape, np.uint16)
         rows = strip_rows(mark.rows, len(mark.strips))
         for strip, part in zip(mark.strips, rows, strict=True):
             try:

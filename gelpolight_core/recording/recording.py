@@ -1,4 +1,4 @@
-"""What a recording is, and the file that holds it (``.gplrec``).
+r"""What a recording is, and the file that holds it (``.gplrec``).
 
 The file is a BigTIFF of one page per frame (RGB, 8 or 16 bit, Deflate, horizontal differences), so
 that tifffile, OpenCV, Pillow, libtiff or ImageJ's Bio-Formats open its frames without this program.
@@ -6,7 +6,7 @@ What is ours lies where TIFF readers do not look, and our own reader looks nowhe
 numbers are little-endian, all blocks begin at multiples of 8 bytes::
 
     0   BigTIFF head: "II", 43, 8, 0, place of the first page's directory (8 bytes)
-    16  "GPLREC\\r\\n", version, bytes of the description, CRC-32 of these two and of the description
+    16  "GPLREC\r\n", version, bytes of the description, CRC-32 of these two and the description
     40  closing mark: frames, last frame number that was offered, 1, CRC-32; zeros until closed
     64  description: JSON in UTF-8 (sensor, calibration, source, settings, time, program)
     ..  frames, one behind the other:
@@ -113,8 +113,8 @@ class RecordingHeader:
         """
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise ValueError("not the description of a recording")
-        texts = {name: content.get(name) for name in _TEXTS}
         settings = content.get("settings")
+        texts: dict[str, Any] = {name: content.get(name) for name in _TEXTS}
         if not all(isinstance(text, str) for text in texts.values()):
             raise ValueError("a text is missing")
         if not isinstance(settings, dict):

@@ -50,7 +50,7 @@ class RecordingWriter:
         if len(head) > layout.DESCRIPTION_LIMIT:
             raise ValueError("the description of the recording is too long")
         self._shape: tuple[int, ...] | None = None
-        self._kind = np.dtype(np.uint8)
+        self._bits = 0
         self._last_number: int | None = None
         self._link_at = layout.TIFF_LINK_AT
         self.frames = 0
@@ -101,7 +101,7 @@ class RecordingWriter:
             number=int(number),
             time_s=float(time_s),
             shape=(rgb.shape[0], rgb.shape[1]),
-            bits=8 * rgb.dtype.itemsize,
+            bits=self._bits,
             place=self.size_bytes,
         )
         self._append(block.data)
@@ -156,9 +156,9 @@ class RecordingWriter:
         if rgb.dtype not in (np.uint8, np.uint16):
             raise ValueError(f"a frame holds uint8 or uint16, not {rgb.dtype}")
         if self._shape is None:
-            self._shape, self._kind = rgb.shape, rgb.dtype
-        if rgb.shape != self._shape or rgb.dtype != self._kind:
-            raise ValueError(f"the recording has {self._shape} frames, not {rgb.shape}")
+            self._shape, self._bits = rgb.shape, 8 * rgb.dtype.itemsize
+        if rgb.shape != self._shape or 8 * rgb.dtype.itemsize != self._bits:
+            raise ValueError(f"a frame of {rgb.shape} {rgb.dtype} does not go with the others")
         if number < 0 or (self._last_number is not None and number <= self._last_number):
             raise ValueError(f"frame {number} does not follow frame {self._last_number}")
         if not math.isfinite(time_s):
