@@ -125,7 +125,7 @@ class Recording:
                 raise unreadable(error, self.path) from error
             if zlib.crc32(data) != strip.crc or not unpack_strip(data, rgb[part]):
                 raise InputError(
-                    tr("frame {n} of {count} is damaged").format(n=index + 1, count=len(self)),
+                    tr("frame {n} is damaged").format(n=index),
                     where=str(self.path),
                     advice=tr("Leave this frame out, or copy the recording again"),
                 )
