@@ -48,6 +48,7 @@ def build_parser() -> argparse.ArgumentParser:
         inspect_calibration,
         measure,
         reconstruct,
+        records,
         report,
         simulate,
     )
@@ -72,6 +73,7 @@ def build_parser() -> argparse.ArgumentParser:
         reconstruct,
         measure,
         evaluate,
+        records,
         report,
         benchmark,
         ablation,
