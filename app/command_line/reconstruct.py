@@ -13,7 +13,7 @@ from tqdm import tqdm
 from app.command_line.common import add_model, load_reconstructor, refuse_overwriting
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
-from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
 from gelpolight_core.export.preview import write_preview
 from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
             where=tr("IMAGE"),
             advice=tr("Reconstruct them into different folders, so that neither is overwritten"),
         )
-    endings = dict.fromkeys([*formats, *(["png"] if options.pictures else [])])
+    endings = dict.fromkeys([*map(ending, formats), *(["png"] if options.pictures else [])])
     outputs = [options.output / f"{path.stem}.{e}" for path in options.images for e in endings]
     refuse_overwriting(outputs, [options.calibration, *options.images])
     reconstructor = load_reconstructor(options.calibration, model=options.model)
