@@ -17,9 +17,10 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
 BLOCK_MM = 0.2
-# Slopes that change the light by less are below half a degree; within the margin they fall to a
-# tenth, and the depth that is left out there to a micrometre or two.
+# Slopes that change the light by less are below half a degree, and fall off within the margin.
 LEAST_CHANGE = 5e-3
+# A press changes the light from the surroundings too, far from itself and without any slope.
+CHANGE_BY_BOUNCE = 6e-3
 SIGMAS = 6.0
 # Of the nine blocks about one, so that a hot pixel is no contact.
 NEIGHBOURS = 3
@@ -118,7 +119,8 @@ def contact_finder(calibration: Calibration, full: FullModel) -> ContactFinder:
         return np.asarray(cv2.resize(cut, (columns, rows), interpolation=cv2.INTER_AREA))
 
     expected = blocks(picture)
-    limit = np.maximum(LEAST_CHANGE * expected, SIGMAS / block * calibration.noise)
+    least = LEAST_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
+    limit = np.maximum(least * expected, SIGMAS / block * calibration.noise)
     limit[blocks(seen(known)) < 0.999] = np.inf
     return ContactFinder(
         block, expected, limit.astype(np.float32), blocks(points).astype(np.float64)

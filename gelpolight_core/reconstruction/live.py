@@ -46,15 +46,17 @@ from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 # The drape about a contact falls by a factor e over its decay length.
-MARGIN_DECAYS = 2.5
-LEAST_MARGIN_MM = 1.5
+MARGIN_DECAYS = 1.5
+LEAST_MARGIN_MM = 0.8
 # A region of this share of the grid is taken as all of it.
 WHOLE = 0.85
 ROUNDS = 2
 # A second round moves the surface by about twice its depth squared over the lights' height; below
 # this depth, by less than half a micrometre.
 SHALLOW_MM = 0.05
-TOLERANCE = 1e-3
+# Of the integration: the first rounds only have to say where the surface is.
+FIRST_TOLERANCE = 0.03
+TOLERANCE = 3e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +247,7 @@ class LiveSolver:
         corner, shape = region.at(1)
         with record.done(tr("near light, quarter scale")) as reason:
             said = near_light_rounds(
-                lambda d: self._round(maps.quarter, quarter, corner, d)[1],
+                lambda d: self._round(maps.quarter, quarter, corner, d, FIRST_TOLERANCE)[1],
                 shape,
                 longest_step_mm(self._full),
                 ROUNDS,
@@ -268,7 +270,7 @@ class LiveSolver:
             start = solved
         name = tr("near light, half scale") if effort == "balanced" else tr("last round")
         with record.done(name) as reason:
-            slopes, moved = self._round(scale, picture, corner, np.asarray(start), record)
+            slopes, moved = self._round(scale, picture, corner, np.asarray(start))
             moved = held_back(np.asarray(start), moved, longest_step_mm(self._full))
         with record.done(tr("true positions")) as reason:
             self._show(scale, region, slopes, moved, depth, flags, normals)
@@ -349,7 +351,7 @@ class LiveSolver:
         picture: _Picture,
         corner: tuple[int, int],
         depth: Map,
-        record: _Record | None = None,
+        tolerance: float = TOLERANCE,
     ) -> tuple[_Solved, Map]:
         """One near-light round; as `full._round`."""
         membrane, shape = self.maps.membrane, depth.shape
@@ -398,7 +400,7 @@ class LiveSolver:
             pitch_mm=scale.pitch_mm,
             start_mm=depth,
             hold=hold,
-            tolerance=TOLERANCE,
+            tolerance=tolerance,
             workers=self._workers.count,
         )
         return solved, result.depth_mm

@@ -40,7 +40,7 @@ def integrate_live(
     weight: Map,
     *,
     pitch_mm: float,
-    start_mm: Map,
+    start_mm: Map | None,
     hold: Map | None,
     tolerance: float,
     workers: int,
@@ -49,8 +49,11 @@ def integrate_live(
 
     Parameters
     ----------
-    slope_x, slope_y, weight, pitch_mm, start_mm, hold, tolerance, workers
+    slope_x, slope_y, weight, pitch_mm, start_mm, hold, workers
         As there; `hold` None: depth 0 is held all around.
+    tolerance : float
+        Of what is left, relative to the depth itself, in the root of the mean squared weighted
+        slope: no transform is spent on finding out.
     """
     shape = weight.shape
     firm = np.full(2 * sum(shape), 2.0, np.float32)
@@ -66,26 +69,28 @@ def integrate_live(
         _divide(spectrum, *waves)
         return np.asarray(scipy.fft.idstn(spectrum, type=2, workers=workers, overwrite_x=True))
 
-    right = np.empty(shape, np.float32)
-    _flow(slope_x, slope_y, weight, np.float32(pitch_mm), right)
-    wanted = tolerance**2 * _dot(right, precondition(right))
-    depth = np.array(start_mm, np.float32)
+    left = np.empty(shape, np.float32)
+    _flow(slope_x, slope_y, weight, np.float32(pitch_mm), left)
+    depth = np.zeros(shape, np.float32) if start_mm is None else np.array(start_mm, np.float32)
     image = np.empty(shape, np.float32)
-    _apply(depth, weight, firm, image)
-    left = right
-    left -= image
-    better = precondition(left)
+    energy = 0.0
+    if start_mm is not None:
+        energy = _apply(depth, weight, firm, image)
+        left -= image
+    direction = better = precondition(left)
     size = _dot(left, better)
-    direction = better
+    wanted = tolerance**2 * max(energy, size)
     rounds = 0
     while size > wanted and rounds < MAX_ROUNDS:
         along = _apply(direction, weight, firm, image)
         _advance(np.float32(size / along), direction, image, depth, left)
+        rounds += 1
+        if rounds == MAX_ROUNDS:
+            break
         better = precondition(left)
         fresh = _dot(left, better)
         _turn(np.float32(fresh / size), better, direction)
         size = fresh
-        rounds += 1
     return LiveIntegration(depth, rounds)
 
 
