@@ -306,7 +306,6 @@ def released_rim(field: ShadedField, pitch_mm: float) -> NDArray[np.bool_]:
     There depth 0 outside would be wrong (PHYSICS, integration); elsewhere the rim stays held, so
     that the membrane that is not in contact anchors the depth.
     """
-
     disturbed = np.abs(field.around - 1.0).max(axis=2) > RIM_CHANGE
     return crossed_rim(field.inside, disturbed, pitch_mm)
 

@@ -6,11 +6,8 @@ grid at its full scale, is said with each constant.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from threading import Lock
-from time import perf_counter
 from typing import Any
 
 import cv2
@@ -18,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import Calibration, FullModel
-from gelpolight_core.reconstruction.contact import Contact, contact_finder
+from gelpolight_core.reconstruction.contact import contact_finder
 from gelpolight_core.reconstruction.full import (
     LET_GO,
     RIM_CHANGE,
@@ -29,7 +26,7 @@ from gelpolight_core.reconstruction.full import (
     near_light_rounds,
 )
 from gelpolight_core.reconstruction.heightmap import Flag
-from gelpolight_core.reconstruction.live_integration import integrate_live
+from gelpolight_core.reconstruction.live_integration import LiveIntegration, integrate_live
 from gelpolight_core.reconstruction.live_kernel import solve_rows
 from gelpolight_core.reconstruction.live_maps import LiveMaps, LiveScale, light_levels, live_maps
 from gelpolight_core.reconstruction.live_pixels import (
@@ -39,8 +36,8 @@ from gelpolight_core.reconstruction.live_pixels import (
     show_depth,
     show_normals,
 )
-from gelpolight_core.reconstruction.plan import Plan, PlanStep
-from gelpolight_core.reconstruction.poisson import good_length
+from gelpolight_core.reconstruction.plan import Plan, PlanRecord
+from gelpolight_core.reconstruction.region import Region, padded_region
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.translation import tr
 
@@ -56,20 +53,9 @@ ROUNDS = 2
 SHALLOW_MM = 0.05
 # Of the integration: the first rounds only have to say where the surface is.
 FIRST_TOLERANCE = 0.03
-TOLERANCE = 3e-3
-
-
-@dataclass(frozen=True, slots=True)
-class Region:
-    """A rectangle of quarter-scale nodes: its first row and column, and its size."""
-
-    corner: tuple[int, int]
-    shape: tuple[int, int]
-
-    def at(self, factor: int) -> tuple[tuple[int, int], tuple[int, int]]:
-        """Return corner and shape at a finer scale, `factor` nodes to a quarter-scale node."""
-        (top, left), (rows, columns) = self.corner, self.shape
-        return (factor * top, factor * left), (factor * rows, factor * columns)
+TOLERANCE = 2e-3
+# Bytes that a node at quarter scale, a solved node and a shown node must read and write once.
+SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 4 * (12 + 20 + 13), 88, 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,25 +78,6 @@ class LiveDepth:
     stopped: str
     rim: str
     plan: Plan
-
-
-@dataclass(slots=True)
-class _Record:
-    """The steps of one frame as they happen."""
-
-    steps: list[PlanStep] = field(default_factory=list)
-
-    @contextmanager
-    def done(self, name: str) -> Iterator[list[str]]:
-        """Time a step; the caller appends its reason."""
-        reason: list[str] = []
-        begin = perf_counter()
-        yield reason
-        took = 1e3 * (perf_counter() - begin)
-        self.steps.append(PlanStep(name, True, "; ".join(reason), took))
-
-    def left_out(self, name: str, reason: str) -> None:
-        self.steps.append(PlanStep(name, False, reason))
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +154,7 @@ class LiveSolver:
             return self._depth(_whole_numbers(frame), effort, normals, everywhere)
 
     def _depth(self, raw: NDArray[Any], effort: str, normals: bool, everywhere: bool) -> LiveDepth:
-        record = _Record()
+        record = PlanRecord()
         depth = np.zeros(self.maps.flags.shape, np.float32)
         flags = self.maps.flags.copy()
         shown = flat_normals(depth.shape) if normals else None
@@ -201,80 +168,73 @@ class LiveSolver:
             record.left_out(tr("normals"), tr("nobody asked for them"))
         return LiveDepth(depth, shown, flags, stopped, rim, Plan(effort, tuple(record.steps)))
 
-    def _region(self, raw: NDArray[Any], record: _Record, everywhere: bool) -> Region | None:
+    def _region(self, raw: NDArray[Any], record: PlanRecord, everywhere: bool) -> Region | None:
         whole = Region((0, 0), self.maps.quarter.shape)
         if everywhere:
             record.left_out(tr("looking for a contact"), tr("the whole field is wanted"))
             return whole
-        with record.done(tr("looking for a contact")) as reason:
+        with record.done(tr("looking for a contact"), raw.nbytes) as reason:
             contact = self.finder.find(raw, self._workers)
             if contact is None:
                 reason.append(tr("the picture is the background's"))
                 return None
-            region = self._padded(contact)
-            share = float(np.prod(region.shape)) / float(np.prod(whole.shape))
+            region = padded_region(contact, self.maps.quarter, self._margin_mm)
+            share = region.nodes / whole.nodes
             reason.append(tr("{share:.0%} of the field is solved").format(share=share))
         return whole if share > WHOLE else region
-
-    def _padded(self, contact: Contact) -> Region:
-        """Return a contact's region with its margin, of lengths that the transform likes."""
-        scale = self.maps.quarter
-        spans = []
-        for axis in (1, 0):
-            first = (contact.low[axis] - self._margin_mm - scale.origin_mm[axis]) / scale.pitch_mm
-            last = (contact.high[axis] + self._margin_mm - scale.origin_mm[axis]) / scale.pitch_mm
-            spans.append(_span(first, last, scale.shape[1 - axis]))
-        (top, rows), (left, columns) = spans
-        return Region((top, left), (rows, columns))
 
     def _solve(
         self,
         raw: NDArray[Any],
         region: Region,
         effort: str,
-        record: _Record,
+        record: PlanRecord,
         depth: Map,
         flags: NDArray[np.uint8],
         normals: Map | None,
     ) -> tuple[str, str]:
         """Solve a region and write it into the maps of the whole grid."""
-        maps = self.maps
-        with record.done(tr("resampling and comparing")) as reason:
+        maps, nodes = self.maps, region.nodes
+        with record.done(tr("resampling and comparing"), nodes * SAMPLED_BYTES) as reason:
             half, quarter = self._compare(raw, region)
-            reason.append(tr("in blocks of 2 x 2 nodes, whose averages need no denoising"))
+            reason.append(tr("averages over 2 x 2 nodes need no denoising"))
         if maps.membrane.bounce is None:
             record.left_out(tr("light from the surroundings"), tr("this membrane gives none"))
-        corner, shape = region.at(1)
-        with record.done(tr("near light, quarter scale")) as reason:
-            said = near_light_rounds(
-                lambda d: self._round(maps.quarter, quarter, corner, d, FIRST_TOLERANCE)[1],
-                shape,
-                longest_step_mm(self._full),
-                ROUNDS,
-                shallow_mm=SHALLOW_MM,
-            )
-            solved, (changes, stopped) = said
-            reason.append(tr("{n} rounds").format(n=len(changes)))
+        with record.done(tr("near light, quarter scale"), ROUNDS * nodes * SOLVED_BYTES) as reason:
+            start, (changes, stopped) = self._rounds(region, quarter)
+            reason.append(tr("{n} rounds, {d:.2f} mm deep").format(n=len(changes), d=start.max()))
         if len(changes) < ROUNDS:
-            record.left_out(
-                tr("second near-light round"),
-                tr("the press is {d:.2f} mm deep").format(d=max(changes)),
-            )
-        scale = maps.half if effort == "balanced" else maps.quarter
-        picture = half if effort == "balanced" else quarter
+            record.left_out(tr("second near-light round"), tr("the press is that shallow"))
+        scale, picture = (maps.half, half) if effort == "balanced" else (maps.quarter, quarter)
         corner, shape = region.at(4 // scale.factor)
-        if effort == "balanced":
-            start = cv2.resize(solved, shape[::-1], interpolation=cv2.INTER_LINEAR)
-        else:
+        start = cv2.resize(start, shape[::-1], interpolation=cv2.INTER_LINEAR)
+        if effort != "balanced":
             record.left_out(tr("near light, half scale"), tr("this effort does without it"))
-            start = solved
-        name = tr("near light, half scale") if effort == "balanced" else tr("last round")
-        with record.done(name) as reason:
-            slopes, moved = self._round(scale, picture, corner, np.asarray(start))
-            moved = held_back(np.asarray(start), moved, longest_step_mm(self._full))
-        with record.done(tr("true positions")) as reason:
+        size = shape[0] * shape[1] * SOLVED_BYTES
+        with record.done(tr("near light, last round"), size) as reason:
+            slopes = self._slopes(scale, picture, corner, start)
+            reason.append(tr("from the depth at quarter scale"))
+        with record.done(tr("integration"), 5 * start.nbytes) as reason:
+            solved = self._integrate(scale, picture, corner, start, slopes, TOLERANCE)
+            moved = held_back(start, solved.depth_mm, longest_step_mm(self._full))
+            reason.append(tr("{n} rounds of conjugate gradients").format(n=solved.rounds))
+        with record.done(tr("true positions"), 16 * nodes * SHOWN_BYTES) as reason:
             self._show(scale, region, slopes, moved, depth, flags, normals)
+            reason.append(tr("and to the whole grid's scale"))
         return stopped, "held" if picture.let_go is None else "free"
+
+    def _rounds(
+        self, region: Region, picture: _Picture
+    ) -> tuple[Map, tuple[tuple[float, ...], str]]:
+        """Return the depth after the near-light rounds at quarter scale; as `coarse_depth`."""
+        scale, corner = self.maps.quarter, region.corner
+
+        def solve(depth: Map) -> Map:
+            slopes = self._slopes(scale, picture, corner, depth)
+            return self._integrate(scale, picture, corner, depth, slopes, FIRST_TOLERANCE).depth_mm
+
+        longest = longest_step_mm(self._full)
+        return near_light_rounds(solve, region.shape, longest, ROUNDS, shallow_mm=SHALLOW_MM)
 
     def _compare(self, raw: NDArray[Any], region: Region) -> tuple[_Picture, _Picture]:
         """Return press over background at half and at quarter scale."""
@@ -305,7 +265,11 @@ class LiveSolver:
         let_go = None
         (top, left), kind = region.corner, maps.quarter.kind
         kind = kind[top : top + small[0], left : left + small[1]]
-        if maps.membrane.bounce is not None or not kind.all() or self._at_border(region):
+        if (
+            maps.membrane.bounce is not None
+            or not kind.all()
+            or region.at_border(maps.quarter.shape)
+        ):
             coarse_around = self._around(coarse)
             let_go = self._released(coarse_around, kind)
         if maps.membrane.bounce is not None:
@@ -319,11 +283,6 @@ class LiveSolver:
             _Picture(ratio, marks, around, large),
             _Picture(coarse, coarse_marks, coarse_around, let_go),
         )
-
-    def _at_border(self, region: Region) -> bool:
-        """Return whether a region ends where the whole grid does."""
-        pairs = zip(region.corner, region.shape, self.maps.quarter.shape, strict=True)
-        return any(first == 0 or first + count == whole for first, count, whole in pairs)
 
     def _around(self, coarse: Map) -> Map:
         """Return press over background, averaged over the surroundings; as `neighbourhood`."""
@@ -345,15 +304,10 @@ class LiveSolver:
         let_go = crossed_rim(kind > 0, disturbed, self.maps.quarter.pitch_mm)
         return let_go if let_go.any() else None
 
-    def _round(
-        self,
-        scale: LiveScale,
-        picture: _Picture,
-        corner: tuple[int, int],
-        depth: Map,
-        tolerance: float = TOLERANCE,
-    ) -> tuple[_Solved, Map]:
-        """One near-light round; as `full._round`."""
+    def _slopes(
+        self, scale: LiveScale, picture: _Picture, corner: tuple[int, int], depth: Map
+    ) -> _Solved:
+        """Return slopes along the rays at the present depth; as `solve_near_light`."""
         membrane, shape = self.maps.membrane, depth.shape
         solved = _Solved(
             self._take("slope x", shape),
@@ -388,22 +342,34 @@ class LiveSolver:
             solved.normal_x,
             solved.normal_y,
         )
-        weight, hold = solved.weight, None
+        return solved
+
+    def _integrate(
+        self,
+        scale: LiveScale,
+        picture: _Picture,
+        corner: tuple[int, int],
+        depth: Map,
+        slopes: _Solved,
+        tolerance: float,
+    ) -> LiveIntegration:
+        """Integrate slopes from the present depth, the rim let go where a contact crosses it."""
+        weight, hold = slopes.weight, None
         if picture.let_go is not None:
+            (top, left), (rows, columns) = corner, depth.shape
             hold = np.where(picture.let_go, np.float32(LET_GO), np.float32(1.0))
-            inside = scale.kind[corner[0] : corner[0] + shape[0], corner[1] : corner[1] + shape[1]]
-            weight = np.where(inside > 0, weight, weight * hold)
-        result = integrate_live(
-            solved.slope_x,
-            solved.slope_y,
+            inside = scale.kind[top : top + rows, left : left + columns] > 0
+            weight = np.where(inside, weight, weight * hold)
+        return integrate_live(
+            slopes.slope_x,
+            slopes.slope_y,
             weight,
             pitch_mm=scale.pitch_mm,
-            start_mm=depth,
+            start_mm=depth if depth.any() else None,
             hold=hold,
             tolerance=tolerance,
             workers=self._workers.count,
         )
-        return solved, result.depth_mm
 
     def _show(
         self,
@@ -472,13 +438,6 @@ def flat_normals(shape: tuple[int, ...]) -> Map:
     normals = np.zeros((*shape, 3), np.float32)
     normals[..., 2] = -1.0
     return normals
-
-
-def _span(first: float, last: float, length: int) -> tuple[int, int]:
-    """Return begin and count of a span of nodes about `first` to `last`, of a good length."""
-    begin, end = max(int(np.floor(first)), 0), min(int(np.ceil(last)) + 1, length)
-    count = min(good_length(max(end - begin, 8)), length)
-    return min(max((begin + end - count) // 2, 0), length - count), count
 
 
 def _whole_numbers(frame: NDArray[Any]) -> NDArray[Any]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any
 
 EFFORTS = ("fast", "balanced", "best")
@@ -23,12 +26,15 @@ class PlanStep:
         Why it was done so, or left out, in a sentence for a person.
     milliseconds : float or None
         What it took; None where it was left out or not timed.
+    bytes : int
+        That it must read and write once, whatever the program; 0 where that was not counted.
     """
 
     name: str
     done: bool
     reason: str
     milliseconds: float | None = None
+    bytes: int = 0
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -74,3 +80,23 @@ class Plan:
     def as_dicts(self) -> list[dict[str, Any]]:
         """Return plain values for JSON."""
         return [step.as_dict() for step in self.steps]
+
+
+@dataclass(slots=True)
+class PlanRecord:
+    """The steps of one frame, noted as they happen."""
+
+    steps: list[PlanStep] = field(default_factory=list)
+
+    @contextmanager
+    def done(self, name: str, size: int) -> Iterator[list[str]]:
+        """Time a step that touches `size` bytes; the caller appends its reason."""
+        reason: list[str] = []
+        begin = perf_counter()
+        yield reason
+        took = 1e3 * (perf_counter() - begin)
+        self.steps.append(PlanStep(name, True, "; ".join(reason), took, size))
+
+    def left_out(self, name: str, reason: str) -> None:
+        """Note a step that was not needed."""
+        self.steps.append(PlanStep(name, False, reason))

@@ -169,7 +169,10 @@ class Reconstructor:
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
-        return self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name)
+        heightmap = self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name)
+        names = [tr("resampling and normals"), tr("integration")]
+        plan = _unplanned(self.effort, names, tr("the paper's model knows one way"), normals, False)
+        return replace(heightmap, plan=plan)
 
     def _why_unplanned(self, uncertainty: bool) -> str | None:
         """Return why everything is done for a frame, or None where it is planned."""
@@ -223,7 +226,7 @@ class Reconstructor:
             noise_mm=None if noise is None else noise.examples_mm,
             depth_scale_sd=None if scale is None else scale.depth,
             lateral_scale_sd=None if scale is None else scale.lateral,
-            plan=_unplanned(self.effort, why, normals, uncertainty),
+            plan=_unplanned(self.effort, _full_names(), why, normals, uncertainty),
         )
 
     def _heightmap(
@@ -275,15 +278,18 @@ def _notes(rim: str, stopped: str) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _unplanned(effort: str, why: str, normals: bool, uncertainty: bool) -> Plan:
-    """Return the plan of a frame for which everything is done."""
-    names = [
+def _full_names() -> list[str]:
+    return [
         tr("resampling and comparing"),
         tr("near light, quarter scale"),
         tr("near light, full scale"),
         tr("integration"),
         tr("true positions"),
     ]
+
+
+def _unplanned(effort: str, names: list[str], why: str, normals: bool, uncertainty: bool) -> Plan:
+    """Return the plan of a frame for which everything is done."""
     asked = {tr("normals"): normals, tr("standard deviations"): uncertainty}
     return Plan(
         effort,
