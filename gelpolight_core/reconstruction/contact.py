@@ -94,7 +94,9 @@ def contact_finder(calibration: Calibration, full: FullModel) -> ContactFinder:
         np.arange(n, dtype=np.float32) / np.float32(STRIDE) for n in (camera.width, camera.height)
     )
     map_u, map_v = np.meshgrid(u, v)
-    points = cv2.remap(places.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR)
+    points: Map = np.asarray(
+        cv2.remap(places.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR), np.float32
+    )
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     index = ((points - origin) / grid.pitch_mm).astype(np.float32)
     known = table.valid & (full.background > LEAST_BASE).all(axis=2)

@@ -207,7 +207,7 @@ class LiveSolver:
             record.left_out(tr("second near-light round"), tr("the press is that shallow"))
         scale, picture = (maps.half, half) if effort == "balanced" else (maps.quarter, quarter)
         corner, shape = region.at(4 // scale.factor)
-        start = cv2.resize(start, shape[::-1], interpolation=cv2.INTER_LINEAR)
+        start = np.asarray(cv2.resize(start, shape[::-1], interpolation=cv2.INTER_LINEAR))
         if effort != "balanced":
             record.left_out(tr("near light, half scale"), tr("this effort does without it"))
         size = shape[0] * shape[1] * SOLVED_BYTES
