@@ -1,4 +1,4 @@
-"""``gelpolight inspect``: what a calibration file holds."""
+"""``gelpolight inspect``: what a calibration file or a recording holds."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ import numpy as np
 
 from app.command_line.common import quality_lines
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.response.curve import CameraResponse
 from gelpolight_core.translation import tr
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser("inspect", help=tr("show what a calibration holds"))
-    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
+    parser = commands.add_parser("inspect", help=tr("show what a calibration or a recording holds"))
+    parser.add_argument("file", type=Path, metavar="FILE")
     parser.set_defaults(run=run)
 
 
@@ -31,8 +32,39 @@ def response_text(response: CameraResponse | None) -> str:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Print what the file holds."""
+    if is_recording(options.file):
+        with Recording.open(options.file) as recording:
+            _print_recording(recording)
+    else:
+        _print_calibration(options.file)
+    return 0
+
+
+def _print_recording(recording: Recording) -> None:
+    header = recording.header
+    rows = [
+        (tr("recording"), recording.path.name),
+        (tr("sensor"), header.serial or tr("not stated")),
+        (tr("calibration"), header.calibration_id or tr("none")),
+        (tr("source"), f"{header.source} ({header.kind})" if header.source else tr("not stated")),
+        (tr("made"), header.started),
+        (tr("program"), header.program),
+        (tr("picture"), tr("{w}x{h} px, {bits} bit").format(
+            w=recording.size[0], h=recording.size[1], bits=recording.bits)),
+        (tr("frames"), tr("{n} in {s:.2f} s").format(n=len(recording), s=recording.duration_s)),
+        (tr("frames lost"), str(recording.lost)),
+        (tr("complete"), tr("no") if recording.truncated else tr("yes")),
+    ]  # fmt: skip
+    rows += [(key, str(value)) for key, value in header.settings.items()]
+    if header.note:
+        rows.append((tr("note"), header.note))
+    print("\n".join(f"{label:<18} {value}" for label, value in rows))
+
+
+def _print_calibration(path: Path) -> None:
     """Print provenance, geometry and quality table."""
-    c = read_calibration(options.calibration)
+    c = read_calibration(path)
     grid = c.table.grid
     rows = [
         (tr("calibration"), c.identity),
@@ -80,4 +112,3 @@ def run(options: argparse.Namespace) -> int:
         )
     print("\n".join(f"{label:<18} {value}" for label, value in rows))
     print("\n".join(quality_lines(c.quality)))
-    return 0

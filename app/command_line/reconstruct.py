@@ -1,29 +1,32 @@
-"""``gelpolight reconstruct``: pictures become height maps."""
+"""``gelpolight reconstruct``: pictures and recordings become height maps."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
 from app.command_line.common import add_model, load_reconstructor, refuse_overwriting
+from app.command_line.inputs import Inputs
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
 from gelpolight_core.export.preview import write_preview
-from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser("reconstruct", help=tr("turn pictures into depth maps in mm"))
+    parser = commands.add_parser(
+        "reconstruct", help=tr("turn pictures and recordings into depth maps in mm")
+    )
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
-    parser.add_argument("images", type=Path, nargs="+", metavar="IMAGE")
+    parser.add_argument(
+        "images", type=Path, nargs="+", metavar="IMAGE", help=tr("pictures and recordings")
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
     parser.add_argument(
         "--format",
@@ -38,6 +41,12 @@ def add_parser(commands: Any) -> None:
         "--uncertainty",
         action="store_true",
         help=tr("also standard deviations, in npz; takes several times as long"),
+    )
+    parser.add_argument(
+        "--frames",
+        default="",
+        metavar="A:B",
+        help=tr("of a recording, the frames from A, counted from 0, up to but not with B"),
     )
     add_model(parser)
     parser.set_defaults(run=run)
@@ -59,33 +68,24 @@ def run(options: argparse.Namespace) -> int:
             where="--uncertainty",
             advice=tr("Add npz to --format, or leave it out"),
         )
-    names = Counter(path.stem.casefold() for path in options.images)  # some disks ignore the case
-    twins = [path.stem for path in options.images if names[path.stem.casefold()] > 1]
-    if twins:
-        raise InputError(
-            tr("two pictures are named {name}").format(name=twins[0]),
-            where=tr("IMAGE"),
-            advice=tr("Reconstruct them into different folders, so that neither is overwritten"),
-        )
     endings = dict.fromkeys([*formats, *(["png"] if options.pictures else [])])
-    outputs = [options.output / f"{path.stem}.{e}" for path in options.images for e in endings]
-    refuse_overwriting(outputs, [options.calibration, *options.images])
-    reconstructor = load_reconstructor(options.calibration, model=options.model)
-    make_folder(options.output)
-    for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):
-        picture = read_picture(path, response=reconstructor.calibration.response)
-        require_colour(picture, where=str(path))
-        heightmap = reconstructor.depth(
-            picture.rgb, name=path.name, uncertainty=options.uncertainty
-        )
-        write_heightmap(heightmap, options.output, formats=formats)
-        for note in heightmap.notes:
-            tqdm.write(f"{path}: {note}", file=sys.stderr)
-        if options.pictures:
-            write_preview(heightmap, picture.rgb, options.output / f"{path.stem}.png")
+    with Inputs(options.images, options.frames) as inputs:
+        outputs = [options.output / f"{item.stem}.{e}" for item in inputs.items for e in endings]
+        refuse_overwriting(outputs, [options.calibration, *options.images])
+        reconstructor = load_reconstructor(options.calibration, model=options.model)
+        inputs.require_match(reconstructor.calibration)
+        make_folder(options.output)
+        for item in inputs:
+            picture = item.read(reconstructor.calibration.response)
+            heightmap = reconstructor.depth(
+                picture.rgb, name=item.name, uncertainty=options.uncertainty
+            )
+            write_heightmap(heightmap, options.output, formats=formats)
+            for note in heightmap.notes:
+                tqdm.write(f"{item.where}: {note}", file=sys.stderr)
+            if options.pictures:
+                write_preview(heightmap, picture.rgb, options.output / f"{item.stem}.png")
     print(
-        tr("{n} depth maps written to {folder}").format(
-            n=len(options.images), folder=options.output
-        )
+        tr("{n} depth maps written to {folder}").format(n=len(inputs.items), folder=options.output)
     )
     return 0

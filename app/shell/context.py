@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
@@ -51,6 +52,13 @@ class SourceChoice(QObject):
             self.bench = Bench(SensorDesign())
         if self.info is None or self.info.kind != "virtual":
             self.choose(*virtual_sensor(self.bench)())
+
+    def choose_recording(self, file: Path) -> None:
+        """Choose a recording, to be played from its beginning."""
+        from app.sources.listing import recordings  # heavy, as above
+
+        for info in recordings([file])():
+            self.choose(info)
 
 
 class Requests(QObject):

@@ -8,20 +8,22 @@ from pathlib import Path
 from PySide6.QtCore import QMimeData
 
 from app.workspace.workspace import ENDING
+from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 
 DESCRIPTION = "session.toml"
 
 
 @dataclass(frozen=True, slots=True)
 class Dropped:
-    """The session folders and the calibration files among what was dropped."""
+    """The session folders, calibration files and recordings among what was dropped."""
 
     sessions: tuple[Path, ...] = ()
     calibrations: tuple[Path, ...] = ()
+    recordings: tuple[Path, ...] = ()
 
     def __bool__(self) -> bool:
         """Whether there is anything for this program."""
-        return bool(self.sessions or self.calibrations)
+        return bool(self.sessions or self.calibrations or self.recordings)
 
 
 def is_session(folder: Path) -> bool:
@@ -30,12 +32,17 @@ def is_session(folder: Path) -> bool:
 
 
 def sort_dropped(paths: tuple[Path, ...]) -> Dropped:
-    """Find session folders and calibrations; ``session.toml`` itself stands for its folder."""
+    """Find what this program opens; ``session.toml`` itself stands for its folder."""
     sessions = [p.parent if p.name == DESCRIPTION else p for p in paths]
     return Dropped(
         sessions=tuple(dict.fromkeys(p for p in sessions if is_session(p))),
-        calibrations=tuple(p for p in paths if p.suffix.lower() == ENDING and p.is_file()),
+        calibrations=_files(paths, ENDING),
+        recordings=_files(paths, RECORDING_ENDING),
     )
+
+
+def _files(paths: tuple[Path, ...], ending: str) -> tuple[Path, ...]:
+    return tuple(path for path in paths if path.suffix.lower() == ending and path.is_file())
 
 
 def dropped_paths(data: QMimeData) -> tuple[Path, ...]:

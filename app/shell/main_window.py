@@ -226,12 +226,12 @@ class MainWindow(QMainWindow):
         self.open_path_in("calibrate", str(folder))
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Take session folders and calibration files."""
+        """Take session folders, calibration files and recordings."""
         if sort_dropped(dropped_paths(event.mimeData())):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open the session folder, or add the calibrations to the library."""
+        """Open the session folder, add the calibrations to the library, play the recording."""
         self.open_dropped(dropped_paths(event.mimeData()))
         event.acceptProposedAction()
 
@@ -244,6 +244,9 @@ class MainWindow(QMainWindow):
             self.open_session(folder)
         if len(dropped.sessions) > 1:
             self.context.toasts.show(tr("Only the first session folder was opened."))
+        for file in dropped.recordings[:1]:
+            self.context.source.choose_recording(file)
+            self.context.toasts.show(tr("The camera is now {name}.").format(name=file.name))
 
     # Dialogs
 

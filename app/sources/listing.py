@@ -48,3 +48,20 @@ def picture_folders(folders: Sequence[Path]) -> Finder:
                 yield SourceInfo("folder", folder.name, detail, partial(FolderSource, folder))
 
     return find
+
+
+def recordings(files: Sequence[Path]) -> Finder:
+    """Return the finder of recordings; a file that is gone is left out."""
+
+    def find() -> Iterable[SourceInfo]:
+        for file in files:
+            if file.is_file():
+                yield SourceInfo("recording", file.stem, str(file.parent), partial(_play, file))
+
+    return find
+
+
+def _play(file: Path) -> Source:
+    from app.sources.recording import RecordingSource  # heavy
+
+    return RecordingSource(file)

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QMenu, QToolButton, QWidget
 from app.shell.context import AppContext
 from app.sources.listing import picture_folders
 from app.widgets.naming import named
+from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
 
 
@@ -40,6 +41,7 @@ class SourceButton(QToolButton):
             ("none", none, lambda: context.source.choose(None)),
             ("virtual", tr("Virtual sensor"), context.source.choose_virtual_sensor),
             ("folder", tr("Folder of pictures…"), self.choose_folder),
+            ("recording", tr("Recording…"), self.choose_recording),
         ):
             action = menu.addAction(text, choose)
             action.setObjectName(f"{page}.source.{name}")
@@ -60,6 +62,22 @@ class SourceButton(QToolButton):
         self._context.settings.last_folder = folder
         for info in picture_folders([folder])():
             self._context.source.choose(info)
+
+    def choose_recording(self) -> None:
+        """Let the person choose a recording that plays the camera."""
+        chosen, _ = QFileDialog.getOpenFileName(
+            self,
+            tr("Recording"),
+            str(self._context.settings.last_folder),
+            tr("Recordings (*{ending})").format(ending=ENDING),
+        )
+        if chosen:
+            self.use_recording(Path(chosen))
+
+    def use_recording(self, file: Path) -> None:
+        """Take the frames of a recording as the camera's."""
+        self._context.settings.last_folder = file.parent
+        self._context.source.choose_recording(file)
 
     def _show(self) -> None:
         info = self._context.source.info

@@ -38,7 +38,7 @@ def write_atomically(path: Path, writer: Callable[[BinaryIO], object]) -> None:
     try:
         _write_and_replace(target, _temporary_for(target), writer)
     except OSError as error:
-        raise _as_input_error(error, path) from error
+        raise cannot_write(error, path) from error
 
 
 def refuse_unwritable(path: Path) -> None:
@@ -57,7 +57,7 @@ def refuse_unwritable(path: Path) -> None:
         temporary.open("xb").close()
         temporary.unlink()
     except OSError as error:
-        raise _as_input_error(error, path) from error
+        raise cannot_write(error, path) from error
 
 
 def make_folder(folder: Path) -> None:
@@ -71,7 +71,7 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _as_input_error(error, folder) from error
+        raise cannot_write(error, folder) from error
 
 
 def _ordinary_target(path: Path) -> Path:
@@ -107,7 +107,8 @@ def _write_and_replace(target: Path, temporary: Path, writer: Callable[[BinaryIO
         raise
 
 
-def _as_input_error(error: OSError, path: Path) -> InputError:
+def cannot_write(error: OSError, path: Path) -> InputError:
+    """Return what to raise about a file that the system does not let be written."""
     found, advice = _plain_words(error)
     return InputError(found, where=str(path), advice=advice)
 

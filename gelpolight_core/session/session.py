@@ -14,7 +14,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.response.curve import CameraResponse, declared_response
 from gelpolight_core.session.decisions import Decisions, read_decisions
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.picture import Picture, linear_picture
 from gelpolight_core.session.table import Table
 from gelpolight_core.session.wholeness import decode_picture, unreadable
 from gelpolight_core.translation import tr
@@ -254,14 +254,9 @@ def read_picture(path: Path, *, response: CameraResponse | None = None) -> Pictu
             where=str(path),
             advice=tr("Use pictures of 8 or 16 bit"),
         )
-    depth = 8 if raw.dtype == np.uint8 else 16
     grey = raw.ndim == 2
     bgr = np.repeat(raw[:, :, None], 3, axis=2) if grey else raw[:, :, :3]
-    if response is not None:
-        rgb = response.linearise(np.ascontiguousarray(bgr[:, :, ::-1]))
-    else:
-        rgb = np.ascontiguousarray(bgr[:, :, ::-1], dtype=np.float32) / np.float32(2**depth - 1)
-    return Picture(path.name, rgb, bit_depth=depth, grey=grey)
+    return linear_picture(bgr[:, :, ::-1], path.name, response=response, grey=grey)
 
 
 def require_colour(picture: Picture, *, where: str) -> None:

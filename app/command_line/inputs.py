@@ -1,0 +1,177 @@
+"""What the commands reconstruct: pictures, and the frames of recordings."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from tqdm import tqdm
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording.matching import require_match
+from gelpolight_core.recording.reader import Recording, is_recording
+from gelpolight_core.response.curve import CameraResponse
+from gelpolight_core.session.picture import Picture, linear_picture
+from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One picture that is to be read.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the result; without its ending, that of the result's files.
+    stem : str
+        The name without its ending.
+    where : str
+        What a message names.
+    read : callable
+        Returns it as linear light.
+    """
+
+    name: str
+    stem: str
+    where: str
+    read: Callable[[CameraResponse | None], Picture]
+
+
+class Inputs:
+    """Pictures and recordings that were named on the command line; a context manager.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Of both kinds.
+    frames : str
+        Which frames of the recordings, as "a:b"; empty for all.
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be read, the range of frames is none or empty, or two inputs would
+        have results of one name.
+    """
+
+    def __init__(self, paths: Sequence[Path], frames: str = "") -> None:
+        self._open = ExitStack()
+        self.recordings: list[Recording] = []
+        self.items: list[Input] = []
+        try:
+            for path in paths:
+                if is_recording(path):
+                    self._add_recording(path, frames)
+                else:
+                    self.items.append(_of_file(path))
+            if frames and not self.recordings:
+                raise InputError(
+                    tr("none of the inputs is a recording"),
+                    where="--frames",
+                    advice=tr("Leave it out, or name a recording"),
+                )
+            self._refuse_twins()
+        except BaseException:
+            self._open.close()
+            raise
+
+    def __enter__(self) -> Inputs:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *details: object) -> None:
+        """Close the recordings."""
+        self._open.close()
+
+    def __iter__(self) -> Iterator[Input]:
+        """Return the inputs one by one, with a bar of progress."""
+        return iter(tqdm(self.items, file=sys.stderr, unit=tr("picture")))
+
+    def require_match(self, calibration: Calibration) -> None:
+        """Refuse recordings of another sensor or size, and say what is missing of the others."""
+        for recording in self.recordings:
+            require_match(recording, calibration)
+            for note in recording_notes(recording):
+                print(f"{recording.path}: {note}", file=sys.stderr)
+
+    def _add_recording(self, path: Path, frames: str) -> None:
+        recording = self._open.enter_context(Recording.open(path))
+        self.recordings.append(recording)
+        for index in frame_range(frames, len(recording), where=str(path)):
+            stem = f"{path.stem}_{index:06d}"
+            where = tr("{path}, frame {n}").format(path=path, n=index)
+            read = partial(_read_frame, recording, index, stem)
+            self.items.append(Input(f"{stem}{path.suffix}", stem, where, read))
+
+    def _refuse_twins(self) -> None:
+        names = Counter(item.stem.casefold() for item in self.items)  # some disks ignore the case
+        twins = [item.stem for item in self.items if names[item.stem.casefold()] > 1]
+        if twins:
+            raise InputError(
+                tr("two pictures are named {name}").format(name=twins[0]),
+                where=tr("IMAGE"),
+                advice=tr("Reconstruct them into different folders, so that neither is lost"),
+            )
+
+
+def frame_range(text: str, count: int, *, where: str) -> range:
+    """Return the frames that "a:b" means: from a, counted from 0, up to but not with b.
+
+    Raises
+    ------
+    InputError
+        If it is no range, or no frame is in it.
+    """
+    if not count:
+        raise InputError(
+            tr("the recording holds no frames"), where=where, advice=tr("Choose another one")
+        )
+    first, colon, last = text.partition(":")
+    try:
+        begin, end = int(first or 0), int(last or count) if colon or not text else int(first) + 1
+    except ValueError:
+        begin, end = 0, -1
+    if not 0 <= begin < min(end, count):
+        raise InputError(
+            tr("{text} names no frame of the {count}").format(text=text, count=count),
+            where="--frames",
+            advice=tr(
+                "Give the first frame, from 0, and the one behind the last, as in 0:{n}"
+            ).format(n=count),
+        )
+    return range(begin, min(end, count))
+
+
+def recording_notes(recording: Recording) -> list[str]:
+    """Return what a person should know of a recording that is not all that it could be."""
+    notes = []
+    if recording.truncated:
+        notes.append(tr("the recording was cut short or is damaged; this is what is left of it"))
+    if recording.lost:
+        notes.append(
+            tr("{n} frames of the source are not in the recording").format(n=recording.lost)
+        )
+    return notes
+
+
+def _of_file(path: Path) -> Input:
+    return Input(path.name, path.stem, str(path), partial(_read_file, path))
+
+
+def _read_file(path: Path, response: CameraResponse | None) -> Picture:
+    picture = read_picture(path, response=response)
+    require_colour(picture, where=str(path))
+    return picture
+
+
+def _read_frame(
+    recording: Recording, index: int, name: str, response: CameraResponse | None
+) -> Picture:
+    return linear_picture(recording.frame(index).rgb, name, response=response)

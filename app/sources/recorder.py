@@ -1,0 +1,204 @@
+"""Recording what a stream delivers, in a thread of its own, without a frame lost in silence."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.sources.source import Frame
+from app.sources.stopping import join
+from app.sources.stream import Stream
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.translation import tr
+
+_LOG = logging.getLogger(__name__)
+
+# Two seconds of a fast camera: a disk that pauses for longer cannot keep up at all.
+QUEUE_BYTES = 256 * 2**20
+LEAST_QUEUE = 4
+FINISH_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderFigures:
+    """How a recording fares.
+
+    Attributes
+    ----------
+    frames : int
+        Frames in the file.
+    waiting : int
+        Frames that are still to be written.
+    missed : int
+        Frames that the source made and that never arrived here.
+    overrun : int
+        Frames that arrived while the queue was full, as the disk or the processor was too slow.
+    size_bytes : int
+        What the file takes.
+    seconds : float
+        Time from the first frame to the last one that arrived.
+    failure : str or None
+        Why it ended by itself, as a sentence; None while all is well.
+    finished : bool
+        Whether the file is closed.
+    """
+
+    frames: int = 0
+    waiting: int = 0
+    missed: int = 0
+    overrun: int = 0
+    size_bytes: int = 0
+    seconds: float = 0.0
+    failure: str | None = None
+    finished: bool = False
+
+    @property
+    def lost(self) -> int:
+        """Frames that are not in the recording, for either reason."""
+        return self.missed + self.overrun
+
+
+class Recorder:
+    """Writes every frame of a stream to a file.
+
+    Parameters
+    ----------
+    stream : Stream
+        Where the frames come from; it runs, or is started later.
+    path : Path
+        A new file.
+    header : RecordingHeader
+        What the recording says of itself.
+    queue_bytes : int, optional
+        How much may wait for the disk.
+    """
+
+    def __init__(
+        self,
+        stream: Stream,
+        path: Path,
+        header: RecordingHeader,
+        *,
+        queue_bytes: int = QUEUE_BYTES,
+    ) -> None:
+        self.path = path
+        self._stream, self._header, self._queue_bytes = stream, header, queue_bytes
+        self._changed = threading.Condition()
+        self._queue: deque[tuple[Frame, int]] = deque()
+        self._ending = self._finished = False
+        self._failure: str | None = None
+        self._frames = self._size_bytes = self._missed = self._overrun = 0
+        self._raw_number: int | None = None
+        self._number = -1
+        self._first_s = self._last_s = 0.0
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin to record; returns at once. What goes wrong is said by :meth:`figures`."""
+        if self._thread is not None:
+            raise RuntimeError("a recorder makes one recording")
+        self._thread = threading.Thread(target=self._run, name=f"recording {self.path.name}")
+        self._thread.daemon = True
+        self._thread.start()
+        self._stream.add_tap(self._take)
+
+    def finish(self) -> None:
+        """Take no more frames; those that wait are still written, while the caller goes on."""
+        self._stream.remove_tap(self._take)
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
+
+    def stop(self) -> RecorderFigures:
+        """Take no more frames, wait until all are written and the file is closed."""
+        self.finish()
+        if self._thread is not None:
+            join(self._thread, FINISH_S)
+        return self.figures()
+
+    def figures(self) -> RecorderFigures:
+        """Return how the recording fares."""
+        with self._changed:
+            return RecorderFigures(
+                frames=self._frames,
+                waiting=len(self._queue),
+                missed=self._missed,
+                overrun=self._overrun,
+                size_bytes=self._size_bytes,
+                seconds=self._last_s - self._first_s,
+                failure=self._failure,
+                finished=self._finished,
+            )
+
+    def _take(self, frame: Frame) -> None:
+        """Put a frame into the queue, in the capture thread."""
+        with self._changed:
+            if self._ending:
+                return
+            if self._raw_number is None:
+                step, self._first_s = 1, frame.time_s
+                self._number = frame.number - 1
+            else:
+                # A source that was opened anew counts from 0 again: what it made meanwhile, if
+                # anything, is not known.
+                step = max(frame.number - self._raw_number, 1)
+            self._missed += step - 1
+            self._number += step
+            self._raw_number, self._last_s = frame.number, frame.time_s
+            if len(self._queue) >= max(LEAST_QUEUE, self._queue_bytes // frame.rgb.nbytes):
+                self._overrun += 1
+                first = self._overrun == 1
+            else:
+                self._queue.append((frame, self._number))
+                self._changed.notify_all()
+                first = False
+        if first:
+            _LOG.warning("The disk is too slow for %s: frames are lost and counted", self.path)
+
+    def _run(self) -> None:
+        failure: str | None = None
+        try:
+            writer = RecordingWriter(self.path, self._header)
+            try:
+                self._write_all(writer)
+            finally:
+                writer.close(self._number)
+        except InputError as error:
+            failure = str(error)
+            _LOG.error("Recording ended: %s", error)
+        except Exception as error:
+            _LOG.exception("Recording %s failed", self.path)
+            failure = tr("A fault of this program: {kind}; the log has it.").format(
+                kind=type(error).__name__
+            )
+        self._stream.remove_tap(self._take)
+        with self._changed:
+            self._ending = self._finished = True
+            self._failure = failure
+            self._overrun += len(self._queue)  # what waits now is never written
+            self._queue.clear()
+
+    def _write_all(self, writer: RecordingWriter) -> None:
+        shape = None
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: bool(self._queue) or self._ending)
+                if not self._queue:
+                    return
+                frame, number = self._queue[0]
+            shape = shape or (frame.rgb.shape, frame.rgb.dtype)
+            if (frame.rgb.shape, frame.rgb.dtype) != shape:
+                raise InputError(
+                    tr("the size or the depth of the pictures has changed"),
+                    where=str(self.path),
+                    advice=tr("What came before is kept; begin a new recording"),
+                )
+            writer.append(frame.rgb, number, frame.time_s)
+            with self._changed:
+                self._queue.popleft()
+                self._frames, self._size_bytes = writer.frames, writer.size_bytes

@@ -1,0 +1,39 @@
+"""Whether a recording and a calibration belong together."""
+
+from __future__ import annotations
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording.reader import Recording
+from gelpolight_core.translation import tr
+
+
+def require_match(recording: Recording, calibration: Calibration) -> None:
+    """Refuse a calibration of another sensor, or of pictures of another size.
+
+    A recording that names no sensor goes with any; which of a sensor's calibrations was in use
+    when it was recorded does not matter.
+
+    Raises
+    ------
+    InputError
+        If they do not belong together.
+    """
+    recorded, calibrated = recording.header.serial, calibration.sensor.serial
+    if recorded and recorded != calibrated:
+        raise InputError(
+            tr("the recording is of sensor {a} and the calibration of sensor {b}").format(
+                a=recorded, b=calibrated
+            ),
+            where=str(recording.path),
+            advice=tr("Choose a calibration of sensor {a}").format(a=recorded),
+        )
+    size = (calibration.camera.width, calibration.camera.height)
+    if len(recording) and recording.size != size:
+        raise InputError(
+            tr("the frames are {a} pixels and the calibration is for {b}").format(
+                a="x".join(map(str, recording.size)), b="x".join(map(str, size))
+            ),
+            where=str(recording.path),
+            advice=tr("Choose a calibration for frames of this size"),
+        )

@@ -1,0 +1,233 @@
+"""Reading a recording: any frame at any time, checked."""
+
+from __future__ import annotations
+
+import json
+import math
+import mmap
+import os
+import struct
+import zlib
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording import layout
+from gelpolight_core.recording.layout import FrameMark
+from gelpolight_core.recording.pixels import strip_rows, unpack_strip
+from gelpolight_core.recording.recording import VERSION, RecordedFrame, RecordingHeader, Rgb
+from gelpolight_core.session.wholeness import MAX_PIXELS, unreadable
+from gelpolight_core.translation import tr
+
+
+class Recording:
+    """A recording file, open for reading; any thread may read.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    header : RecordingHeader
+        What it says of itself.
+    numbers : (N,) int64
+        The source's count of each frame.
+    times_s : (N,) float64
+        When each was made, on the source's clock.
+    size : (int, int)
+        (width, height) in pixels; (0, 0) without frames.
+    bits : int
+        8 or 16; 0 without frames.
+    lost : int
+        Frames that the source made between the first and the last, and that are not here.
+    truncated : bool
+        Whether the end is missing or something in it cannot be read: it was cut short, its program
+        was stopped, or it is damaged.
+    """
+
+    def __init__(self, path: Path, file: int) -> None:
+        self.path = path
+        self._file: int | None = file
+        size = os.fstat(file).st_size
+        self.header, begin = _read_header(path, file, size)
+        self._marks = _find_frames(file, begin, size)
+        closing = layout.unpack_closing(os.pread(file, layout.CLOSING.size, layout.CLOSING_AT))
+        self.numbers: NDArray[np.int64] = np.array([m.number for m in self._marks], np.int64)
+        self.times_s: NDArray[np.float64] = np.array([m.time_s for m in self._marks])
+        first = self._marks[0] if self._marks else None
+        self.size = (0, 0) if first is None else (first.columns, first.rows)
+        self.bits = 0 if first is None else first.bits
+        self.truncated = closing is None or closing[0] != len(self._marks)
+        last = max(closing[1] if closing else 0, self._marks[-1].number if self._marks else 0)
+        made = 0 if first is None else last - first.number + 1
+        self.lost = made - len(self._marks)
+
+    @classmethod
+    def open(cls, path: Path) -> Recording:
+        """Open a recording.
+
+        Raises
+        ------
+        InputError
+            If there is no such file, it is no recording, is of a newer program, or its head is
+            damaged.
+        """
+        try:
+            file = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
+        except FileNotFoundError as error:
+            raise InputError(
+                tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
+            ) from error
+        except OSError as error:
+            raise unreadable(error, path) from error
+        try:
+            return cls(path, file)
+        except OSError as error:
+            os.close(file)
+            raise unreadable(error, path) from error
+        except BaseException:
+            os.close(file)
+            raise
+
+    def __len__(self) -> int:
+        """Return how many frames there are."""
+        return len(self._marks)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first frame to the last."""
+        return float(self.times_s[-1] - self.times_s[0]) if len(self) else 0.0
+
+    def frame(self, index: int) -> RecordedFrame:
+        """Return a frame exactly as it was written.
+
+        Raises
+        ------
+        InputError
+            If it is damaged or cannot be read.
+        IndexError
+            If there is no such frame.
+        """
+        if self._file is None:
+            raise ValueError("the recording is closed")
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        mark = self._marks[index]
+        shape = (mark.rows, mark.columns, 3)
+        rgb: Rgb = np.empty(shape, np.uint8) if mark.bits == 8 else np.empty(shape, np.uint16)
+        rows = strip_rows(mark.rows, len(mark.strips))
+        for strip, part in zip(mark.strips, rows, strict=True):
+            try:
+                data = os.pread(self._file, strip.size, strip.place)
+            except OSError as error:
+                raise unreadable(error, self.path) from error
+            if zlib.crc32(data) != strip.crc or not unpack_strip(data, rgb[part]):
+                raise InputError(
+                    tr("frame {n} is damaged").format(n=index),
+                    where=str(self.path),
+                    advice=tr("Leave this frame out, or copy the recording again"),
+                )
+        return RecordedFrame(rgb, mark.number, mark.time_s)
+
+    def close(self) -> None:
+        """Give the file back; harmless when it is closed."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
+
+    def __enter__(self) -> Recording:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the file."""
+        self.close()
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether a file says that it is a recording, whatever its name and state."""
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(layout.CLOSING_AT)
+    except OSError:
+        return False
+    return head[layout.HEAD_AT :].startswith(layout.MAGIC)
+
+
+def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int]:
+    """Return what the recording says of itself, and where the frames begin."""
+    head = os.pread(file, layout.DESCRIPTION_AT, 0)
+    if len(head) < layout.DESCRIPTION_AT or head[layout.HEAD_AT :][:8] != layout.MAGIC:
+        raise InputError(
+            tr("this is not a recording"),
+            where=str(path),
+            advice=tr("Choose a recording that this program made"),
+        )
+    _, version, length, crc = layout.HEAD.unpack_from(head, layout.HEAD_AT)
+    if version > VERSION:
+        raise InputError(
+            tr("the recording has version {a} and this program knows {b}").format(
+                a=version, b=VERSION
+            ),
+            where=str(path),
+            advice=tr("Open it with a newer version of the program"),
+        )
+    end = layout.DESCRIPTION_AT + length
+    if length <= layout.DESCRIPTION_LIMIT and end <= size:
+        text = os.pread(file, length, layout.DESCRIPTION_AT)
+        if zlib.crc32(struct.pack("<II", version, length) + text) == crc:
+            try:
+                return RecordingHeader.from_json(json.loads(text)), layout.padded(end)
+            except ValueError:
+                pass  # damaged as much as one whose checksum is wrong
+    raise InputError(
+        tr("the head of the recording is damaged"),
+        where=str(path),
+        advice=tr("Copy it again, or use another recording"),
+    )
+
+
+def _find_frames(file: int, begin: int, size: int) -> list[FrameMark]:
+    """Return the marks of all frames that lie whole in the file, in their order."""
+    marks: list[FrameMark] = []
+    place = begin
+    while place < size:
+        mark = layout.unpack_mark(os.pread(file, layout.MARK_LIMIT, place))
+        if mark is not None and _fits(mark, place, size, marks):
+            marks.append(mark)
+            place += mark.size
+        else:
+            place = _next_magic(file, place + 8, size)
+    return marks
+
+
+def _next_magic(file: int, place: int, size: int) -> int:
+    """Return where the next frame may begin behind a damaged place; `size` if nowhere."""
+    with mmap.mmap(file, size, access=mmap.ACCESS_READ) as view:
+        found = view.find(layout.FRAME_MAGIC, place)
+    return size if found < 0 else found
+
+
+def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bool:
+    """Return whether a mark can be true: inside the file, and alike the frames before it."""
+    end = place + mark.size
+    inside = end <= size and all(
+        place < strip.place and strip.place + strip.size <= end for strip in mark.strips
+    )
+    shaped = (
+        mark.bits in (8, 16)
+        and 0 < mark.rows * mark.columns <= MAX_PIXELS
+        and len(strip_rows(mark.rows, len(mark.strips))) == len(mark.strips)
+    )
+    alike = not before or (
+        (mark.rows, mark.columns, mark.bits) == (before[0].rows, before[0].columns, before[0].bits)
+        and mark.number > before[-1].number
+    )
+    return inside and shaped and alike and math.isfinite(mark.time_s)

@@ -1,0 +1,127 @@
+r"""What a recording is, and the file that holds it (``.gplrec``).
+
+The file is a BigTIFF of one page per frame (RGB, 8 or 16 bit, Deflate, horizontal differences), so
+that tifffile, OpenCV, Pillow, libtiff or ImageJ's Bio-Formats open its frames without this program.
+What is ours lies where TIFF readers do not look, and our own reader looks nowhere else. All
+numbers are little-endian, all blocks begin at multiples of 8 bytes::
+
+    0   BigTIFF head: "II", 43, 8, 0, place of the first page's directory (8 bytes)
+    16  "GPLREC\r\n", version, bytes of the description, CRC-32 of these two and the description
+    40  closing mark: frames, last frame number that was offered, 1, CRC-32; zeros until closed
+    64  description: JSON in UTF-8 (sensor, calibration, source, settings, time, program)
+    ..  frames, one behind the other:
+        frame mark: "GPLFRAME", number, time_s, bytes of all of the frame, rows, columns, bits,
+            strips; place, bytes and CRC-32 of each strip; CRC-32 of all of these
+        TIFF directory, its strip tables being those of the frame mark
+        strips: zlib streams of the differences to the left neighbour
+
+A frame counts once it is whole: a program that is killed loses at most the one it was writing, and
+the part of it that was written is passed over. The directory's link is set last, so that other
+readers never see a part of a frame either. Every frame mark and every strip has a checksum: a frame
+is given back as it was written, or refused. Behind a damaged place the reader goes on with the next
+frame mark that is whole. Frame numbers count what the source made: where they leap, frames are
+lost. Within two seconds what was written is on the disk itself, so that a power cut takes no more.
+
+Why this and not another, measured at 1280 x 960 on two cores, 8 bit, noise of 50 dB (CPU time of a
+frame, its size): this 8 ms, 0.83 MB; OpenCV's HFYU .avi 9 ms, 1.15 MB, but 8 bit only and lost
+without its index; FFV1 .mkv 69 ms, 0.74 MB; PNG 31 to 58 ms, 0.8 to 1.0 MB; zlib level 1 on raw
+values 37 ms, 1.43 MB; tifffile with zlib level 1 32 ms, 0.97 MB; plain values 1 ms, 3.69 MB, which
+at 30 frames a second is what many disks can just take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core import __version__
+
+ENDING = ".gplrec"
+FORMAT = "gelpolight-recording"
+VERSION = 1
+
+Rgb = NDArray[np.uint8] | NDArray[np.uint16]
+SettingValue = float | str | bool
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedFrame:
+    """One frame of a recording.
+
+    Attributes
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        As the source gave it.
+    number : int
+        The source's count.
+    time_s : float
+        When it was made, on the source's clock; only differences mean something.
+    """
+
+    rgb: Rgb
+    number: int
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingHeader:
+    """What a recording says of itself.
+
+    Attributes
+    ----------
+    serial, calibration_id : str
+        Sensor, and calibration in use while it was recorded; empty where there was none.
+    source, kind : str
+        What the frames came from: its name, and "camera", "virtual", "folder" or "recording".
+    settings : mapping
+        Settings of the source by their keys, which carry the units.
+    started : str
+        When, ISO 8601 in UTC.
+    program : str
+        Version that wrote it.
+    note : str
+        What the person wrote.
+    """
+
+    serial: str = ""
+    calibration_id: str = ""
+    source: str = ""
+    kind: str = ""
+    settings: Mapping[str, SettingValue] = field(default_factory=dict)
+    started: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
+    program: str = __version__
+    note: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        texts = {name: getattr(self, name) for name in _TEXTS}
+        return {"format": FORMAT, **texts, "settings": dict(self.settings)}
+
+    @classmethod
+    def from_json(cls, content: Any) -> RecordingHeader:
+        """Read what `as_json` gave; what a later minor version added is passed over.
+
+        Raises
+        ------
+        ValueError
+            If something is missing or is not what it should be.
+        """
+        if not isinstance(content, dict) or content.get("format") != FORMAT:
+            raise ValueError("not the description of a recording")
+        settings = content.get("settings")
+        texts: dict[str, Any] = {name: content.get(name) for name in _TEXTS}
+        if not all(isinstance(text, str) for text in texts.values()):
+            raise ValueError("a text is missing")
+        if not isinstance(settings, dict):
+            raise ValueError("the settings are missing")
+        if not all(isinstance(value, float | int | str) for value in settings.values()):
+            raise ValueError("a setting is neither a number nor a text")
+        return cls(settings=settings, **texts)
+
+
+_TEXTS = ("serial", "calibration_id", "source", "kind", "started", "program", "note")
