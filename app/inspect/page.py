@@ -144,6 +144,7 @@ class InspectPage(QWidget):
         self._places = None
         if reconstructor is not None:
             self._places = PixelPlaces(reconstructor.calibration.table)
+            self.views.prepare()
         self.link.use(reconstructor)
         self.views.forget()
         self._advise()

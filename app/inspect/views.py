@@ -191,6 +191,11 @@ class Views(QMainWindow):
         if self._visible["quality"]:
             self.quality.show_frame(shown, still=still)
 
+    def prepare(self) -> None:
+        """Load what the shown views need, before the first depth comes."""
+        if self._visible["surface"]:
+            self.surface.load()
+
     def forget(self) -> None:
         """Show no depth: there is another calibration, or none."""
         words = tr("No depth yet.")
