@@ -19,6 +19,7 @@ from app.inspect.products import Shown
 from app.inspect.record_control import RecordControl
 from app.inspect.replay_bar import ReplayBar
 from app.inspect.views import Views
+from app.inspect.zero import drift_sentence
 from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
@@ -55,7 +56,8 @@ class InspectPage(QWidget):
         self._cursor = (math.nan, math.nan)
         self._places: PixelPlaces | None = None
         self._shown: Shown | None = None
-        self._trouble = self._recorded = ""
+        self._trouble = self._recorded = self._drift = ""
+        self._drift_due = False
         self._lay_out()
         self._connect()
         self.views.restore()
@@ -162,10 +164,28 @@ class InspectPage(QWidget):
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
+        if self._drift_due and shown.frame.settled and shown.heightmap is not None:
+            self._drift_due = False
+            self._look_for_drift(shown)
         self.views.show_frame(shown, still=self.link.paused)
 
+    def _look_for_drift(self, shown: Shown) -> None:
+        """Warn where the untouched sensor has moved from its calibration."""
+        reconstructor = self.link.reconstructor
+        if reconstructor is None or self.jobs.busy:
+            return
+        calibration, rgb = reconstructor.calibration, shown.frame.rgb
+
+        def tell(sentence: str) -> None:
+            self._drift = sentence
+            self._advise()
+
+        self.jobs.submit(
+            Job(tr("Looking at the background"), lambda _: drift_sentence(rgb, calibration), tell)
+        )
+
     def _use(self, reconstructor: Reconstructor | None) -> None:
-        self._places = None
+        self._places, self._drift, self._drift_due = None, "", True
         if reconstructor is not None:
             self._places = PixelPlaces(reconstructor.calibration.table)
             self.views.prepare()
@@ -242,7 +262,8 @@ class InspectPage(QWidget):
         elif self._trouble:
             self.banner.advise(self._trouble, self._mend(), role="fail")
         else:
-            self.banner.advise("")
+            act = ("zero", tr("Set to zero")) if self._drift else ("", "")
+            self.banner.advise(self._drift, act, role="warn")
 
     def _mend(self) -> tuple[str, str]:
         """Return what could help with a picture of another size."""
@@ -271,6 +292,8 @@ class InspectPage(QWidget):
                 self.library.use_what_fits((columns, rows))
             case "reopen":
                 self.link.open()
+            case "zero":
+                self.deeds.zero()
 
     def calibrate_now(self) -> None:
         """Calibrate the virtual sensor, so that there is something to see."""

@@ -91,6 +91,8 @@ class SectionPanel(QWidget):
         self._plot.setMinimumHeight(90)
         self._plot.setLabel("bottom", tr("along the line (mm)"))
         self._plot.setLabel("left", tr("depth (mm)"))
+        for side in ("bottom", "left"):
+            self._plot.getAxis(side).enableAutoSIPrefix(False)
         self._plot.showGrid(x=True, y=True, alpha=0.2)
         self._plot.hideButtons()
         self._plot.setMouseEnabled(x=False, y=False)
@@ -135,7 +137,7 @@ class SectionPanel(QWidget):
             self._follow_length(float(along[-1]))
             self._curve.setData(along, depth)
             self._fit(depth)
-        self._figures.setText("<br>".join([*map(figure_text, cut.figures), *cut.sentences]))
+        self._figures.setText("<br>".join([*figure_lines(cut.figures), *cut.sentences]))
 
     def _follow_length(self, length: float) -> None:
         """Keep the ranges at their shares of a line that became longer or shorter."""
@@ -172,9 +174,21 @@ class SectionPanel(QWidget):
             axis.setTextPen(pen)
 
 
-def figure_text(figure: Measured) -> str:
+def figure_lines(figures: Sequence[Measured]) -> list[str]:
+    """Return measured values as lines; the slopes of the two ranges are told apart."""
+    lines, seen = [], 0
+    for figure in figures:
+        where = ""
+        if figure.name == "slope":
+            where = (tr(" (blue)"), tr(" (green)"))[seen % 2]
+            seen += 1
+        lines.append(figure_text(figure, where))
+    return lines
+
+
+def figure_text(figure: Measured, where: str = "") -> str:
     """Return a measured value with its unit and standard deviation."""
     unit = "°" if figure.unit == DEG else f" {figure.unit}"
     digits = {"mm": 3, "um": 1}.get(figure.unit, 1)
     sd = "" if figure.sd is None else f" ± {figure.sd:.{digits}f}"
-    return f"{figure.label}: <b>{figure.value:.{digits}f}{sd}{unit}</b>"
+    return f"{figure.label}{where}: <b>{figure.value:.{digits}f}{sd}{unit}</b>"

@@ -139,7 +139,7 @@ class Views(QMainWindow):
         self.splitDockWidget(docks["height"], docks["camera"], Qt.Orientation.Vertical)
         self.tabifyDockWidget(docks["camera"], docks["normals"])
         self.tabifyDockWidget(docks["normals"], docks["quality"])
-        self.tabifyDockWidget(docks["quality"], docks["section"])
+        self.splitDockWidget(docks["surface"], docks["section"], Qt.Orientation.Vertical)
         self.splitDockWidget(docks["look"], docks["bench"], Qt.Orientation.Vertical)
         for dock in docks.values():
             dock.show()
@@ -149,6 +149,7 @@ class Views(QMainWindow):
             [560, 400, 260],
             Qt.Orientation.Horizontal,
         )
+        self.resizeDocks([docks["surface"], docks["section"]], [460, 200], Qt.Orientation.Vertical)
         self.resizeDocks([docks["look"], docks["bench"]], [290, 400], Qt.Orientation.Vertical)
         self.follow_source()
 
