@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QSignalBlocker, Signal
@@ -16,6 +17,8 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 WIDTH_CHARACTERS = 22
+# From here on parts may be compiled, which takes a minute the first time.
+WARM_FROM = 0.2
 
 
 class CalibrationBox(QComboBox):
@@ -110,17 +113,19 @@ class Library(QObject):
         self._context.requests.calibrations_changed.emit()
 
     def _read(self, path: Path) -> None:
-        def work(_tell: object) -> object:
+        def work(tell: Callable[[float], None]) -> object:
             from gelpolight_core.calibration.file import read_calibration
             from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
             calibration = read_calibration(path)
             live = Reconstructor(calibration, effort="balanced")
+            tell(WARM_FROM)
+            live.warm_up()
             return path, live, Reconstructor(calibration)
 
         def done(found: tuple[Path, object, object]) -> None:
             if self._state[:1] == found[:1]:
                 self.loaded.emit(*found[1:])
 
-        title = tr("Reading the calibration")
+        title = tr("Getting the calibration ready")
         self._jobs.submit(Job(title, work, done, lambda s: self._context.toasts.show(s, "fail")))

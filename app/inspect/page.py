@@ -132,7 +132,7 @@ class InspectPage(QWidget):
 
     def may_close(self) -> bool:
         """Nothing is lost by closing."""
-        self.recorder.stop()
+        self.recorder.close()
         self.link.enter(False)
         self.views.keep()
         self.jobs.close()

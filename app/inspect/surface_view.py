@@ -31,6 +31,7 @@ DEGREES_PER_PX = 0.4
 KEY_DEG = 6.0
 ZOOM_STEP = 1.15
 CURSOR = QColor(255, 255, 255)
+AXIS_PX = 26.0
 
 
 class SurfaceView(QWidget):
@@ -192,25 +193,21 @@ class SurfaceView(QWidget):
             painter.drawLine(at + QPointF(0.0, -5.0), at + QPointF(0.0, -22.0))
 
     def _draw_scale(self, painter: QPainter) -> None:
-        """Draw lengths along x, y and z, as they are seen at the lower left of the surface."""
-        assert self._surface is not None
-        left, _, right, bottom = self._surface.extent_mm
-        length = round_length_mm(0.25 * (right - left))
-        # A corner of the square about the disc: no part of the surface lies there.
-        corner = (left, -bottom, 0.0)
-        ends = {
-            "x": (left + length, -bottom, 0.0),
-            "y": (left, -bottom + length, 0.0),
-        }
-        start = self._project(corner)
-        for axis, end in ends.items():
+        """Draw where x and y lie, and a length in the middle of the view."""
+        height = max(self.height(), 1)
+        start = QPointF(12.0 + AXIS_PX, height - 40.0 - AXIS_PX)
+        for axis, x, y in (("x", 1.0, 0.0), ("y", 0.0, -1.0)):
+            # As the sensor's frame: its y points down in the picture from above.
+            along = np.array([x, y, 0.0])
+            way = AXIS_PX * QPointF(
+                float(along @ self.camera.right()), -float(along @ self.camera.up())
+            )
             painter.setPen(QPen(theme.colour("muted"), 1.6))
-            at = self._project(end)
-            painter.drawLine(start, at)
-            painter.drawText(at + QPointF(4.0, -3.0), axis)
-        bar = round_length_mm(0.2 * self.width() * self.camera.mm_per_px(max(self.height(), 1)))
-        px = bar / self.camera.mm_per_px(max(self.height(), 1))
-        base = self.height() - 12.0
+            painter.drawLine(start, start + way)
+            painter.drawText(start + 1.25 * way + QPointF(-4.0, 4.0), axis)
+        scale = self.camera.mm_per_px(height)
+        bar = round_length_mm(0.2 * self.width() * scale)
+        px, base = bar / scale, height - 12.0
         text = length_text(bar)
         if self.exaggeration != 1.0:
             text += tr(",  depth x {k:g}").format(k=self.exaggeration)

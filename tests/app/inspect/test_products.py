@@ -50,9 +50,7 @@ def test_only_the_view_that_is_shown_is_computed(dome: HeightMap, frame: Frame, 
     assert shown.cut is None
 
 
-def test_with_only_the_camera_shown_nothing_is_reconstructed(
-    dome: HeightMap, frame: Frame
-) -> None:
+def test_with_only_the_camera_shown_nothing_is_reconstructed(dome: HeightMap, frame: Frame) -> None:
     shown, reconstruction = _made(dome, frame, camera=True)
     assert shown.heightmap is None
     assert reconstruction.asked == []
@@ -146,9 +144,7 @@ def test_colours_say_the_same_depth_whatever_the_frame_when_the_range_is_locked(
     np.testing.assert_array_equal(below[0, 0], table[0])
 
 
-def test_flags_have_their_colour_and_the_outside_is_no_flag(
-    dome: HeightMap, frame: Frame
-) -> None:
+def test_flags_have_their_colour_and_the_outside_is_no_flag(dome: HeightMap, frame: Frame) -> None:
     shown, _ = _made(dome, frame, quality="flags", still=True)
     assert tuple(shown.quality[85, 45]) == QUALITY_COLOURS[Flag.DARK]
     assert tuple(shown.quality[0, 0]) == SURROUND
