@@ -11,9 +11,9 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoStack
 
 from app.calibrate.commands import Correction
-from app.calibrate.jobs import Job, Jobs
 from app.calibrate.steps import Step
 from app.calibrate.watching import Watching
+from app.shell.jobs import Job, Jobs
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.status import StageStatus

@@ -10,10 +10,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from app.calibrate.controller import CalibrationController
-from app.calibrate.jobs import Job
 from app.calibrate.lut_editor import LutEditor
 from app.calibrate.lut_effect import Effect, ball_effect
 from app.calibrate.lut_model import Curve, CurveEdit, start_edit, with_curves
+from app.shell.jobs import Job
 from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject

@@ -9,13 +9,13 @@ from PySide6.QtCore import QObject, Signal
 
 from app.calibrate.controller import CalibrationController
 from app.calibrate.detection import Detection
-from app.calibrate.jobs import Job
 from app.calibrate.look import look_for, read_raw
 from app.calibrate.pictures import Pictures
 from app.calibrate.step_panel import StepPanel
 from app.calibrate.steps import Step
 from app.calibrate.watching import Seen
 from app.live.overlay import Overlay
+from app.shell.jobs import Job
 from app.sources.processor import Failure, Outcome
 from app.sources.source import Frame
 from gelpolight_core.calibration.inputs import Stage

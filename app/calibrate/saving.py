@@ -11,9 +11,9 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog
 
 from app.calibrate.controller import CalibrationController
-from app.calibrate.jobs import Job
 from app.calibrate.result_view import ResultView
 from app.shell.context import AppContext
+from app.shell.jobs import Job
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.translation import tr

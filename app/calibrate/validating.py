@@ -14,12 +14,12 @@ from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QFileDialog
 
 from app.calibrate.controller import CalibrationController
-from app.calibrate.jobs import Job
 from app.calibrate.look import read_raw
 from app.calibrate.maps import Panel
 from app.calibrate.trial import KnownObject, Trial, run_trial
 from app.calibrate.validation_panel import ValidationPanel
 from app.shell.context import AppContext
+from app.shell.jobs import Job
 from app.sources.source import Frame
 from app.workspace.validation import Validation, read_validation, write_validation
 from gelpolight_core.calibration.file import read_calibration

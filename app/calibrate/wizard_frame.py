@@ -22,7 +22,6 @@ from app.calibrate.outside import OutsideBar
 from app.calibrate.pictures import Pictures
 from app.calibrate.result_view import ResultView
 from app.calibrate.setup_form import SetupForm
-from app.calibrate.source_button import SourceButton
 from app.calibrate.step_list import StepList
 from app.calibrate.step_panel import StepPanel
 from app.calibrate.steps import all_steps
@@ -30,6 +29,7 @@ from app.calibrate.validation_panel import ValidationPanel
 from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.widgets.naming import named
+from app.widgets.source_button import SourceButton
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.translation import tr
 
@@ -134,7 +134,10 @@ class WizardFrame(QMainWindow):
             action.setText(text)
             bar.addAction(action)
         bar.addSeparator()
-        bar.addWidget(SourceButton(context=self.context))
+        source = SourceButton(
+            context=self.context, page="calibrate", none=tr("No camera: import pictures")
+        )
+        bar.addWidget(source)
         session = self.project.session
         caption = QLabel(f"  {session.sensor.serial}  ·  {session.folder.name}  ")
         caption.setToolTip(str(session.folder))

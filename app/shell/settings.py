@@ -131,6 +131,15 @@ class Settings:
         self._store.setValue("window/geometry", geometry)
         self._store.setValue("window/state", state)
 
+    def layout(self, page: str) -> QByteArray:
+        """Return the layout of a page's views; empty at first."""
+        stored = self._store.value(f"layout/{page}", QByteArray())
+        return stored if isinstance(stored, QByteArray) else QByteArray()
+
+    def keep_layout(self, page: str, state: QByteArray) -> None:
+        """Remember the layout of a page's views."""
+        self._store.setValue(f"layout/{page}", state)
+
     def save(self) -> None:
         """Write the file now."""
         self._store.sync()

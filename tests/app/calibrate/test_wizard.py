@@ -51,7 +51,7 @@ def test_captures_do_not_wait_for_a_computation(
     technician.begin(fresh, "lens")
     views = sorted((small_session / "checkerboard").glob("*.png"))[:3]
     release: list[bool] = []
-    from app.calibrate.jobs import Job
+    from app.shell.jobs import Job
 
     def work(_tell: object) -> None:
         technician_waits.wait(20.0)

@@ -21,24 +21,30 @@ class SourceButton(QToolButton):
     ----------
     context : AppContext
         With the choice that all pages share.
+    page : str
+        First part of its object name.
+    none : str
+        What the choice of no camera is called.
     """
 
-    def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, *, context: AppContext, page: str, none: str, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         self._context = context
-        named(self, "calibrate.source", tr("Camera"), tr("Where the live picture comes from"))
+        named(self, f"{page}.source", tr("Camera"), tr("Where the live picture comes from"))
         self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(self)
-        menu.setObjectName("calibrate.source.menu")
+        menu.setObjectName(f"{page}.source.menu")
         for name, text, choose in (
-            ("none", tr("No camera: import pictures"), lambda: context.source.choose(None)),
+            ("none", none, lambda: context.source.choose(None)),
             ("virtual", tr("Virtual sensor"), context.source.choose_virtual_sensor),
             ("folder", tr("Folder of pictures…"), self.choose_folder),
             ("recording", tr("Recording…"), self.choose_recording),
         ):
             action = menu.addAction(text, choose)
-            action.setObjectName(f"calibrate.source.{name}")
+            action.setObjectName(f"{page}.source.{name}")
         self.setMenu(menu)
         context.source.changed.connect(self._show)
         self._show()

@@ -1,4 +1,4 @@
-"""Long work of the calibration in one thread, one job after the other."""
+"""Long work in one thread, one job after the other."""
 
 from __future__ import annotations
 

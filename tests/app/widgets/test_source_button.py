@@ -10,7 +10,7 @@ from pytest import MonkeyPatch
 from pytestqt.qtbot import QtBot
 from recorded import write_recording
 
-from app.calibrate.source_button import SourceButton
+from app.widgets.source_button import SourceButton
 from app.shell.context import AppContext
 
 

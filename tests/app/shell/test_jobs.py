@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.calibrate.jobs import Job, Jobs
+from app.shell.jobs import Job, Jobs
 from app.sources.stopping import join_left_behind
 from gelpolight_core.errors import InputError
 

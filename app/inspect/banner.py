@@ -1,0 +1,72 @@
+"""The line above the views: what is missing and what to do, or how long work gets on."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QWidget
+
+from app.shell import theme
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+# Work that is done at once needs no progress.
+TELL_FROM = 0.005
+
+
+class Banner(QWidget):
+    """Says what to do next.
+
+    Signals
+    -------
+    act_wanted(str)
+        The button beside the advice was pressed; its name.
+    stop_wanted()
+        The work shall be stopped.
+    """
+
+    act_wanted = Signal(str)
+    stop_wanted = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "inspect.banner", tr("What to do next"))
+        self._act, self._advice = "", ""
+        self._text = named(QLabel(), "inspect.advice", tr("Advice"))
+        self._text.setWordWrap(True)
+        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._button = named(QPushButton(), "inspect.advised", tr("Do that"))
+        self._button.clicked.connect(lambda: self.act_wanted.emit(self._act))
+        self._bar = named(QProgressBar(), "inspect.progress", tr("Progress"))
+        self._bar.setFixedWidth(220)
+        self._stop = named(QPushButton(tr("Stop")), "inspect.stop", tr("Stop the work"))
+        self._stop.clicked.connect(self.stop_wanted)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 5, 10, 5)
+        for widget in (self._text, self._button, self._bar, self._stop):
+            row.addWidget(widget)
+        self._working = False
+        self._show()
+
+    def advise(self, text: str, act: tuple[str, str] = ("", ""), *, role: str = "") -> None:
+        """Say something, with a button (name, text) that does it; empty: nothing."""
+        self._advice, self._act = text, act[0]
+        self._button.setText(act[1])
+        colour = theme.colour(role or "text").name()
+        self._text.setStyleSheet(f"color: {colour};")
+        self._show()
+
+    def show_work(self, title: str, share: float) -> None:
+        """Show how work gets on; an empty title: there is none."""
+        self._working = bool(title) and share >= TELL_FROM
+        self._bar.setValue(round(100.0 * share))
+        if self._working:
+            self._text.setText(tr("{title}…").format(title=title))
+        self._show()
+
+    def _show(self) -> None:
+        if not self._working:
+            self._text.setText(self._advice)
+        self._button.setVisible(bool(self._act) and not self._working)
+        self._bar.setVisible(self._working)
+        self._stop.setVisible(self._working)
+        self.setVisible(self._working or bool(self._advice))

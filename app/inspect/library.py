@@ -1,0 +1,131 @@
+"""Which calibration the page looks through: the one in use, or one that fits the source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QSignalBlocker, Signal
+from PySide6.QtWidgets import QComboBox, QWidget
+
+from app.sensors.calibration_actions import show_in_use
+from app.shell.context import AppContext
+from app.shell.jobs import Job, Jobs
+from app.widgets.naming import named
+from app.workspace.entries import Entry
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+WIDTH_CHARACTERS = 22
+# From here on parts may be compiled, which takes a minute the first time.
+WARM_FROM = 0.2
+
+
+class CalibrationBox(QComboBox):
+    """The calibrations of the library; choosing one puts it into use."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "inspect.calibration", tr("Calibration in use"))
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(WIDTH_CHARACTERS)
+
+    def show_entries(self, entries: tuple[Entry, ...]) -> None:
+        """Show the calibrations that can be read."""
+        with QSignalBlocker(self):
+            self.clear()
+            self.addItem(tr("No calibration"), None)
+            for entry in entries:
+                if entry.summary is not None:
+                    size = "x".join(map(str, entry.summary.picture_size))
+                    text = f"{entry.serial}  {entry.summary.identity}"
+                    self.addItem(text, str(entry.path))
+                    self.setItemData(self.count() - 1, f"{entry.path.stem}, {size}", 3)
+                    if entry.in_use:
+                        self.setCurrentIndex(self.count() - 1)
+
+
+class Library(QObject):
+    """Reads the calibration in use, beside the window.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        Does the reading.
+    box : CalibrationBox
+        Shows the library.
+    context : AppContext
+        With the workspace.
+
+    Signals
+    -------
+    loaded(object, object)
+        Reconstructors of the calibration in use, for live and for standing pictures, or None.
+    """
+
+    loaded = Signal(object, object)
+
+    def __init__(self, jobs: Jobs, box: CalibrationBox, *, context: AppContext) -> None:
+        super().__init__(box)
+        self._jobs, self._box, self._context = jobs, box, context
+        self._path: Path | None = None
+        self._state: tuple[object, ...] = ()
+        self.entries: tuple[Entry, ...] = ()
+        box.activated.connect(self._on_chosen)
+        context.requests.calibrations_changed.connect(self.refresh)
+
+    def refresh(self) -> None:
+        """Look what the library has, and read the calibration in use if it is another."""
+        try:
+            self.entries = self._context.workspace.entries()
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+            self.entries = ()
+        self._box.show_entries(self.entries)
+        show_in_use(self._context, self.entries)
+        used = next((e for e in self.entries if e.in_use and e.summary is not None), None)
+        state = () if used is None or used.summary is None else (used.path, used.summary.identity)
+        if state == self._state:
+            return
+        self._state = state
+        if used is None:
+            self.loaded.emit(None, None)
+            return
+        self._read(used.path)
+
+    def use_what_fits(self, size: tuple[int, int]) -> bool:
+        """Put a calibration for pictures of this size into use; whether there is one."""
+        for entry in self.entries:
+            if entry.summary is not None and entry.summary.picture_size == size:
+                self._use(entry.path)
+                return True
+        return False
+
+    def _on_chosen(self, index: int) -> None:
+        path = self._box.itemData(index)
+        self._use(None if path is None else Path(path))
+
+    def _use(self, path: Path | None) -> None:
+        try:
+            self._context.workspace.use(path)
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+        self._context.requests.calibrations_changed.emit()
+
+    def _read(self, path: Path) -> None:
+        def work(tell: Callable[[float], None]) -> object:
+            from gelpolight_core.calibration.file import read_calibration
+            from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+            calibration = read_calibration(path)
+            live = Reconstructor(calibration, effort="balanced")
+            tell(WARM_FROM)
+            live.warm_up()
+            return path, live, Reconstructor(calibration)
+
+        def done(found: tuple[Path, object, object]) -> None:
+            if self._state[:1] == found[:1]:
+                self.loaded.emit(*found[1:])
+
+        title = tr("Getting the calibration ready")
+        self._jobs.submit(Job(title, work, done, lambda s: self._context.toasts.show(s, "fail")))

@@ -1,0 +1,315 @@
+"""The Inspect page: depth live, in 3D and as maps, with one cursor in all of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from app.inspect.actions import Deeds
+from app.inspect.banner import Banner
+from app.inspect.first_calibration import calibrate_virtual_sensor
+from app.inspect.library import CalibrationBox, Library
+from app.inspect.link import LiveLink
+from app.inspect.place import PixelPlaces, read_at
+from app.inspect.products import Shown
+from app.inspect.record_control import RecordControl
+from app.inspect.replay_bar import ReplayBar
+from app.inspect.views import Views
+from app.inspect.zero import drift_sentence
+from app.shell.actions import make_action
+from app.shell.context import AppContext
+from app.shell.jobs import Job, Jobs
+from app.sources.listing import picture_folders
+from app.widgets.naming import named
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.recording import ENDING
+from gelpolight_core.translation import tr
+
+WORDS_MS = 250
+
+
+class InspectPage(QWidget):
+    """Shows what is pressed into the sensor.
+
+    Parameters
+    ----------
+    context : AppContext
+        The program's.
+    """
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "inspect", tr("Inspect"))
+        self.context = context
+        self.jobs = Jobs("inspect", self)
+        self.views = Views(self.jobs, context=context)
+        self.link = LiveLink(self._show, context=context, parent=self)
+        self.box = CalibrationBox()
+        self.library = Library(self.jobs, self.box, context=context)
+        self.banner = Banner()
+        self._readout = named(QLabel(), "inspect.readout", tr("What is under the cursor"))
+        self._rate = named(QLabel(), "inspect.rate", tr("How fast it is shown"))
+        self._cursor = (math.nan, math.nan)
+        self._places: PixelPlaces | None = None
+        self._shown: Shown | None = None
+        self._trouble = self._recorded = self._drift = ""
+        self._drift_due = False
+        self._lay_out()
+        self._connect()
+        self.views.restore()
+
+    def _lay_out(self) -> None:
+        foot = QWidget()
+        row = QHBoxLayout(foot)
+        row.setContentsMargins(8, 2, 8, 2)
+        row.addWidget(self._readout, 1)
+        row.addWidget(self._rate)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        self.pause_action = make_action(
+            self, "inspect.pause", tr("Pause"), lambda: self.pause(not self.link.paused),
+            keys=("Space",), icon_name="pause", tip=tr("Let the picture stand, with all detail"),
+        )  # fmt: skip
+        self.pause_action.setCheckable(True)
+        self.recorder = RecordControl(self.link, self, context=self.context)
+        self.deeds = Deeds(self.link, self.views, self.jobs, self, context=self.context)
+        deeds = self.deeds
+        self.views.bar.insertActions(
+            self.views.bar.actions()[0],
+            [
+                self.pause_action,
+                self.recorder.action,
+                deeds.zero_action,
+                deeds.export_action,
+                deeds.picture_action,
+            ],
+        )
+        self.views.add_to_bar(self.box)
+        self.replay = ReplayBar()
+        column.addWidget(self.banner)
+        column.addWidget(self.views, 1)
+        column.addWidget(self.replay)
+        column.addWidget(foot)
+
+    def _connect(self) -> None:
+        self.views.wanted_changed.connect(self._want)
+        self.views.pointed.connect(self._on_pointed)
+        self.views.picture_pointed.connect(self._on_picture_pointed)
+        self.library.loaded.connect(self._use)
+        self.context.source.changed.connect(self._on_source)
+        self.link.said.connect(self._on_said)
+        self.link.switched.connect(self._on_switched)
+        self.recorder.told.connect(self._on_recorded)
+        self.jobs.progressed.connect(self.banner.show_work)
+        self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
+        self.banner.stop_wanted.connect(self.jobs.cancel)
+        self.banner.act_wanted.connect(self._on_act)
+        self._words = QTimer(self)
+        self._words.setInterval(WORDS_MS)
+        self._words.timeout.connect(self._tell)
+
+    # What the window asks of a page
+
+    def enter(self) -> None:
+        """Look at the source, through the calibration in use."""
+        self.library.refresh()
+        self._want()
+        self.link.enter(True)
+        self._words.start()
+        self._advise()
+
+    def leave(self) -> None:
+        """Let the source go."""
+        self._words.stop()
+        self.recorder.stop()
+        self.link.enter(False)
+        self.views.keep()
+
+    def may_close(self) -> bool:
+        """Nothing is lost by closing."""
+        self.recorder.close()
+        self.link.enter(False)
+        self.views.keep()
+        self.jobs.close()
+        self.views.finish()
+        return True
+
+    def open_path(self, path: Path) -> None:
+        """Take a folder of pictures, or a recording, as the camera."""
+        if path.suffix == ENDING:
+            self.context.source.choose_recording(path)
+            return
+        for info in picture_folders([path])():
+            self.context.source.choose(info)
+
+    def begin_demo(self) -> None:
+        """Look at the virtual sensor."""
+        self.context.source.choose_virtual_sensor()
+
+    # The picture
+
+    def pause(self, on: bool) -> None:
+        """Let the picture stand, or go on."""
+        self.pause_action.setChecked(on)
+        self.link.pause(on)
+        self._want()
+
+    def _want(self) -> None:
+        self.link.want(replace(self.views.wanted(), still=self.link.paused))
+
+    def _show(self, shown: Shown) -> None:
+        self._shown = shown
+        if self._drift_due and shown.frame.settled and shown.heightmap is not None:
+            self._drift_due = False
+            self._look_for_drift(shown)
+        self.views.show_frame(shown, still=self.link.paused)
+
+    def _look_for_drift(self, shown: Shown) -> None:
+        """Warn where the untouched sensor has moved from its calibration."""
+        reconstructor = self.link.reconstructor
+        if reconstructor is None or self.jobs.busy:
+            return
+        calibration, rgb = reconstructor.calibration, shown.frame.rgb
+
+        def tell(sentence: str) -> None:
+            self._drift = sentence
+            self._advise()
+
+        self.jobs.submit(
+            Job(tr("Looking at the background"), lambda _: drift_sentence(rgb, calibration), tell)
+        )
+
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        self._places, self._drift, self._drift_due = None, "", True
+        if live is not None:
+            self._places = PixelPlaces(live.calibration.table)
+            self.views.prepare()
+        self.link.use(live, best)
+        self.views.forget()
+        self._advise()
+
+    # The cursor
+
+    def _on_pointed(self, x_mm: float, y_mm: float) -> None:
+        self._cursor = (x_mm, y_mm)
+        self.views.show_cursor(x_mm, y_mm)
+        pixel = None
+        if self._places is not None and math.isfinite(x_mm):
+            pixel = self._places.pixel_of(x_mm, y_mm, self._depth())
+        self.views.show_pixel(pixel)
+        self._tell()
+
+    def _on_picture_pointed(self, u: float, v: float) -> None:
+        place = None if self._places is None else self._places.place_of(u, v, self._depth())
+        self._cursor = place or (math.nan, math.nan)
+        self.views.show_cursor(*self._cursor)
+        self._tell()
+
+    def _depth(self):
+        heightmap = None if self._shown is None else self._shown.heightmap
+        return None if heightmap is None else heightmap.depth_mm
+
+    def _tell(self) -> None:
+        self._rate.setText("    ".join(filter(None, (self._recorded, self.link.words()))))
+        self._rate.setToolTip(self.link.plan_words())
+        heightmap = None if self._shown is None else self._shown.heightmap
+        text = tr("Point at a view to read the depth there.")
+        if heightmap is None:
+            text = ""
+        elif math.isfinite(self._cursor[0]):
+            reading = read_at(heightmap, *self._cursor)
+            text = text if reading is None else reading.text()
+        self._readout.setText(text)
+
+    # What to do next
+
+    def _on_source(self) -> None:
+        self.recorder.stop()
+        self.link.open()
+        self._advise()
+
+    def _on_switched(self) -> None:
+        self.views.follow_source()
+        self.replay.follow(None if self.link.stream is None else self.link.stream.source)
+
+    def _on_recorded(self, words: str) -> None:
+        self._recorded = words
+        self._tell()
+
+    def _on_said(self, sentence: str) -> None:
+        self._trouble = sentence
+        self._advise()
+
+    def _advise(self) -> None:
+        """Say what to do next, where something is missing."""
+        info = self.context.source.info
+        if info is None:
+            self.banner.advise(
+                tr("No camera: choose where the pictures come from, or try the virtual sensor."),
+                ("virtual", tr("Use the virtual sensor")),
+            )
+        elif self.link.reconstructor is None:
+            text = tr("No calibration is in use: only the camera's picture can be shown.")
+            if info.kind == "virtual":
+                act = ("calibrate", tr("Calibrate the virtual sensor now"))
+            else:
+                act = ("sensors", tr("Choose or calibrate a sensor"))
+            self.banner.advise(text, act)
+        elif self._trouble:
+            self.banner.advise(self._trouble, self._mend(), role="fail")
+        else:
+            act = ("zero", tr("Set to zero")) if self._drift else ("", "")
+            self.banner.advise(self._drift, act, role="warn")
+
+    def _mend(self) -> tuple[str, str]:
+        """Return what could help with a picture of another size."""
+        link, info = self.link, self.context.source.info
+        if link.stream is not None and link.reconstructor is not None and self._shown is not None:
+            rows, columns = self._shown.frame.rgb.shape[:2]
+            camera = link.reconstructor.calibration.camera
+            if (columns, rows) != (camera.width, camera.height):
+                sizes = {e.summary.picture_size for e in self.library.entries if e.summary}
+                if (columns, rows) in sizes:
+                    return "fitting", tr("Use a calibration that fits")
+                if info is not None and info.kind == "virtual":
+                    return "calibrate", tr("Calibrate the virtual sensor now")
+        return ("reopen", tr("Open it again")) if link.stream is not None else ("", "")
+
+    def _on_act(self, name: str) -> None:
+        match name:
+            case "virtual":
+                self.context.source.choose_virtual_sensor()
+            case "calibrate":
+                self.calibrate_now()
+            case "sensors":
+                self.context.requests.page.emit("sensors")
+            case "fitting" if self._shown is not None:
+                rows, columns = self._shown.frame.rgb.shape[:2]
+                self.library.use_what_fits((columns, rows))
+            case "reopen":
+                self.link.open()
+            case "zero":
+                self.deeds.zero()
+
+    def calibrate_now(self) -> None:
+        """Calibrate the virtual sensor, so that there is something to see."""
+        bench, workspace = self.context.source.bench, self.context.workspace
+        if bench is None or self.jobs.busy:
+            return
+
+        def done(_path: Path) -> None:
+            self.context.toasts.show(tr("The virtual sensor is calibrated."), "pass")
+            self.context.requests.calibrations_changed.emit()
+
+        self.jobs.submit(
+            Job(
+                tr("Calibrating the virtual sensor"),
+                lambda tell: calibrate_virtual_sensor(bench.design, workspace, tell),
+                done,
+            )
+        )

@@ -1,0 +1,295 @@
+"""All views of the page as docks: moved, tabbed, hidden, and found again as they were left."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QByteArray, Qt, Signal
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QMainWindow,
+    QMenu,
+    QScrollArea,
+    QToolBar,
+    QToolButton,
+    QWidget,
+)
+
+from app.inspect.cuts import Section
+from app.inspect.height_panel import HeightPanel, extent_of
+from app.inspect.look import Look
+from app.inspect.look_panel import LookPanel
+from app.inspect.map_view import MapView
+from app.inspect.products import Shown, Wanted
+from app.inspect.quality_panel import QualityPanel
+from app.inspect.section_line import RegionBox, SectionLine
+from app.inspect.section_panel import SectionPanel
+from app.inspect.surface_panel import SurfacePanel, preset_names
+from app.live.overlay import Marker, Overlay
+from app.live.picture_view import PictureView
+from app.live.zebra import eight_bits
+from app.shell.actions import make_action
+from app.shell.context import AppContext
+from app.shell.jobs import Jobs
+from app.widgets.naming import named
+from app.widgets.source_button import SourceButton
+from gelpolight_core.translation import tr
+
+# Raised when views are added, so that an older layout is not forced onto them.
+LAYOUT_VERSION = 2
+AREAS = Qt.DockWidgetArea
+
+
+class Views(QMainWindow):
+    """Holds the views and tells what they need.
+
+    Signals
+    -------
+    wanted_changed()
+        Something was shown, hidden, or is to be shown otherwise.
+    pointed(float, float)
+        Place (x, y) under the pointer in one of the views, mm; NaN for none.
+    picture_pointed(float, float)
+        Pixel (u, v) under the pointer in the camera's picture; NaN for none.
+    """
+
+    wanted_changed = Signal()
+    pointed = Signal(float, float)
+    picture_pointed = Signal(float, float)
+
+    def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "inspect.views", tr("Views"))
+        self.setWindowFlags(Qt.WindowType.Widget)
+        self.setDockNestingEnabled(True)
+        self._context = context
+        self.surface = SurfacePanel(jobs)
+        self.height = HeightPanel()
+        self.normals = MapView("inspect.normals", tr("Normals"))
+        self.normals.say(tr("No depth yet."))
+        self.quality = QualityPanel()
+        self.camera = PictureView()
+        self.section = SectionPanel()
+        self.line, self.region = SectionLine(self.height.map), RegionBox(self.height.map)
+        self.look = LookPanel()
+        self._bench = QScrollArea()
+        self._bench.setWidgetResizable(True)
+        self.docks: dict[str, QDockWidget] = {}
+        self._visible: dict[str, bool] = {}
+        self.bar = self._make_bar()
+        self._make_docks()
+        self._connect()
+
+    def _make_bar(self) -> QToolBar:
+        bar = named(QToolBar(tr("Inspect")), "inspect.bar", tr("Inspect"))
+        bar.setMovable(False)
+        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        self._menu = QMenu(self)
+        button = named(QToolButton(), "inspect.views.menu", tr("Views"), tr("Show or hide a view"))
+        button.setText(tr("Views"))
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setMenu(self._menu)
+        bar.addSeparator()
+        self._bar_end = bar.addWidget(
+            SourceButton(context=self._context, page="inspect", none=tr("No camera"))
+        )
+        bar.addWidget(button)
+        self.addToolBar(bar)
+        return bar
+
+    def add_to_bar(self, widget: QWidget) -> None:
+        """Put a control beside the choice of the camera."""
+        self.bar.insertWidget(self.bar.actions()[-1], widget)
+
+    def _make_docks(self) -> None:
+        table = (
+            ("surface", tr("3D"), self.surface, "Alt+1"),
+            ("height", tr("Height map"), self.height, "Alt+2"),
+            ("camera", tr("Camera"), self.camera, "Alt+3"),
+            ("normals", tr("Normals"), self.normals, "Alt+4"),
+            ("quality", tr("Quality"), self.quality, "Alt+5"),
+            ("section", tr("Cross-section"), self.section, "Alt+6"),
+            ("look", tr("Display"), self.look, "Alt+7"),
+            ("bench", tr("Virtual bench"), self._bench, "Alt+8"),
+        )
+        for name, title, widget, keys in table:
+            dock = named(QDockWidget(title, self), f"inspect.dock.{name}", title)
+            dock.setWidget(widget)
+            self.docks[name] = dock
+            self._visible[name] = False
+            dock.visibilityChanged.connect(lambda on, name=name: self._on_visible(name, on))
+            action = dock.toggleViewAction()
+            action.setObjectName(f"inspect.show_{name}")
+            action.setShortcut(keys)
+            self.addAction(action)
+            self._menu.addAction(action)
+        self._menu.addSeparator()
+        self._menu.addAction(
+            make_action(self, "inspect.layout", tr("Arrange as at first"), self.arrange)
+        )
+        self.arrange()
+
+    def arrange(self) -> None:
+        """Put the views where they are at first."""
+        docks = self.docks
+        for dock in docks.values():
+            self.removeDockWidget(dock)
+        left = AREAS.LeftDockWidgetArea
+        self.addDockWidget(left, docks["surface"])
+        self.splitDockWidget(docks["surface"], docks["height"], Qt.Orientation.Horizontal)
+        self.splitDockWidget(docks["height"], docks["look"], Qt.Orientation.Horizontal)
+        self.splitDockWidget(docks["height"], docks["camera"], Qt.Orientation.Vertical)
+        self.tabifyDockWidget(docks["camera"], docks["normals"])
+        self.tabifyDockWidget(docks["normals"], docks["quality"])
+        self.splitDockWidget(docks["surface"], docks["section"], Qt.Orientation.Vertical)
+        self.splitDockWidget(docks["look"], docks["bench"], Qt.Orientation.Vertical)
+        for dock in docks.values():
+            dock.show()
+        docks["camera"].raise_()
+        self.resizeDocks(
+            [docks["surface"], docks["height"], docks["look"]],
+            [560, 400, 260],
+            Qt.Orientation.Horizontal,
+        )
+        self.resizeDocks([docks["surface"], docks["section"]], [460, 200], Qt.Orientation.Vertical)
+        self.resizeDocks([docks["look"], docks["bench"]], [290, 400], Qt.Orientation.Vertical)
+        self.follow_source()
+
+    def _connect(self) -> None:
+        for view in (self.height.map, self.normals, self.quality.map, self.surface):
+            view.pointed.connect(self.pointed)
+        self.camera.pointed.connect(self.picture_pointed)
+        self.camera.clicked.connect(self._on_picture_clicked)
+        self.look.changed.connect(self._on_look)
+        self.quality.chosen.connect(self.wanted_changed)
+        for part in (self.line, self.region):
+            part.moved.connect(self.wanted_changed)
+        self.section.changed.connect(self._on_section)
+        for name, (text, keys) in preset_names().items():
+            make_action(
+                self, f"inspect.look_{name}", tr("3D: {name}").format(name=text),
+                lambda name=name: self.surface.look_from(name), keys=(keys,),
+            )  # fmt: skip
+        make_action(
+            self, "inspect.lock", tr("Lock the range of colours"), self.look.toggle_lock,
+            keys=("K",),
+        )  # fmt: skip
+
+    # What the page asks
+
+    def wanted(self) -> Wanted:
+        """Return what is to be made of the frames: what is shown and no more."""
+        shown = self._visible
+        return Wanted(
+            surface=shown["surface"],
+            height=shown["height"],
+            normals=shown["normals"],
+            camera=shown["camera"],
+            quality=self.quality.what if shown["quality"] else "",
+            section=self._section() if shown["section"] else None,
+            region=self.region.rectangle if self._measures_region() else None,
+            look=self.look.look,
+        )
+
+    def _section(self) -> Section:
+        start, end = self.line.ends_mm
+        first, second = self.section.ranges
+        return Section(start, end, self.section.width_mm, first, second)
+
+    def _measures_region(self) -> bool:
+        return self._visible["section"] and self.section.has_region
+
+    def show_frame(self, shown: Shown, *, still: bool) -> None:
+        """Show a frame in every view that is shown."""
+        if self._visible["camera"]:
+            self.camera.show_rgb(eight_bits(shown.frame.rgb))
+        if shown.heightmap is None:
+            return
+        if shown.surface is not None:
+            self.surface.show_surface(shown.surface)
+        self.height.show_frame(shown, self.look.look.colours)
+        self.look.show_range(*shown.range_mm)
+        if shown.normals is not None:
+            self.normals.show_picture(shown.normals, extent_of(shown.heightmap))
+        if self._visible["quality"]:
+            self.quality.show_frame(shown, still=still)
+        if shown.cut is not None:
+            self.section.show_cut(shown.cut)
+
+    def prepare(self) -> None:
+        """Load what the shown views need, before the first depth comes."""
+        if self._visible["surface"]:
+            self.surface.load()
+
+    def forget(self) -> None:
+        """Show no depth: there is another calibration, or none."""
+        words = tr("No depth yet.")
+        self.surface.show_surface(None)
+        for view in (self.height.map, self.normals, self.quality.map):
+            view.say(words)
+
+    def show_cursor(self, x_mm: float, y_mm: float) -> None:
+        """Mark a place in every view of the depth."""
+        for view in (self.height.map, self.normals, self.quality.map, self.surface):
+            view.show_cursor(x_mm, y_mm)
+
+    def show_pixel(self, pixel: tuple[float, float] | None) -> None:
+        """Mark a pixel in the camera's picture."""
+        markers = () if pixel is None else (Marker(*pixel, "cross", "info"),)
+        width, height = self.camera.picture_size
+        self.camera.overlay.set_overlay(Overlay(markers=markers), (max(width, 1), max(height, 1)))
+
+    def follow_source(self) -> None:
+        """Have the bench beside the views where the virtual sensor is the camera."""
+        source = self._context.source
+        virtual = source.info is not None and source.info.kind == "virtual"
+        dock = self.docks["bench"]
+        dock.toggleViewAction().setVisible(virtual)
+        if virtual and source.bench is not None and self._bench.widget() is None:
+            from app.bench.bench_panel import BenchPanel  # only the demo needs it
+
+            self._bench.setWidget(BenchPanel(bench=source.bench))
+        dock.setVisible(virtual)
+        if source.info is None:
+            self.camera.show_rgb(None)
+
+    # Layout
+
+    def restore(self) -> None:
+        """Arrange the views as they were left."""
+        state = self._context.settings.layout("inspect")
+        if not state.isEmpty():
+            self.restoreState(state, LAYOUT_VERSION)
+        self.follow_source()
+
+    def keep(self) -> None:
+        """Remember how the views are arranged."""
+        state: QByteArray = self.saveState(LAYOUT_VERSION)
+        self._context.settings.keep_layout("inspect", state)
+
+    def finish(self) -> None:
+        """Give back what the views hold."""
+        self.surface.finish()
+
+    # Slots
+
+    def _on_visible(self, name: str, on: bool) -> None:
+        self._visible[name] = on
+        if name == "section":
+            self._on_section()
+        else:
+            self.wanted_changed.emit()
+
+    def _on_section(self) -> None:
+        self.line.show(self._visible["section"])
+        self.line.set_width(self.section.width_mm)
+        self.region.show(self._measures_region())
+        self.wanted_changed.emit()
+
+    def _on_look(self) -> None:
+        look: Look = self.look.look
+        self.surface.set_exaggeration(look.exaggeration)
+        self.wanted_changed.emit()
+
+    def _on_picture_clicked(self, u: float, v: float) -> None:
+        source = self._context.source
+        if source.info is not None and source.info.kind == "virtual" and source.bench is not None:
+            source.bench.drag_to(u, v)
