@@ -10,6 +10,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gelpolight_core.calibration.calibration import MODELS
@@ -18,6 +20,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -62,6 +65,36 @@ def add_model(parser: argparse.ArgumentParser, *, default: str | None = None) ->
 def load_reconstructor(path: Path, *, model: str | None = None) -> Reconstructor:
     """Read a calibration and make its reconstructor ready, for its own model or another."""
     return Reconstructor(read_calibration(path), model=model)
+
+
+def read_frame(path: Path, reconstructor: Reconstructor) -> NDArray[np.float32]:
+    """Read a colour picture as linear light, for a reconstructor's camera."""
+    picture = read_picture(path, response=reconstructor.calibration.response)
+    require_colour(picture, where=str(path))
+    return picture.rgb
+
+
+def numbers(text: str) -> list[float]:
+    """Return the numbers of an argument such as ``1.5`` or ``1.5,-2``."""
+    return [float(part) for part in text.split(",")]
+
+
+def points(given: Iterable[Iterable[float]], *, where: str) -> list[tuple[float, float]]:
+    """Return places from numbers X Y X Y ..., separated by spaces or commas.
+
+    Raises
+    ------
+    InputError
+        If their count is odd.
+    """
+    flat = [value for part in given for value in part]
+    if len(flat) % 2 or not flat:
+        raise InputError(
+            tr("{n} numbers, where each place has two").format(n=len(flat)),
+            where=where,
+            advice=tr("Give X and Y in mm for each place"),
+        )
+    return list(zip(flat[::2], flat[1::2], strict=True))
 
 
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

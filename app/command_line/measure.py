@@ -6,24 +6,40 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import add_model, load_reconstructor, refuse_overwriting, write_json
+from app.command_line.common import (
+    add_model,
+    load_reconstructor,
+    read_frame,
+    refuse_overwriting,
+    write_json,
+)
+from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
-from gelpolight_core.measurement.measure import SHAPES, measure_object
-from gelpolight_core.measurement.result import Comparison, Measurement, compare
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import SHAPES
+from gelpolight_core.measurement.proposal import propose
+from gelpolight_core.measurement.result import Comparison, Measurement, Truth, compare
+from gelpolight_core.measurement.tools import ToolResult, result_as_dict
 from gelpolight_core.measurement.truth import read_truth
-from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.translation import tr
+
+AUTO = "auto"
 
 
 def add_parser(commands: Any) -> None:
     """Add the command."""
-    parser = commands.add_parser("measure", help=tr("say how large the pressed object is"))
+    parser = commands.add_parser(
+        "measure", help=tr("say how large the pressed object is, or apply a measuring tool")
+    )
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("image", type=Path, metavar="IMAGE")
-    parser.add_argument("--shape", required=True, choices=SHAPES)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--shape", choices=(*SHAPES, AUTO))
+    add_tool_arguments(parser, what)
     parser.add_argument(
-        "--truth", type=Path, metavar="FILE", help=tr("truth.csv with this picture")
+        "--truth", type=Path, metavar="FILE", help=tr("truth.csv with this picture; with --shape")
     )
     parser.add_argument(
         "--seed",
@@ -38,43 +54,87 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct the picture, fit the object and print its size."""
+    """Reconstruct the picture, fit the object or apply the tools, and print what they say."""
     if options.json:
-        used = [options.calibration, options.image, options.truth]
+        used = [options.calibration, options.image, options.truth, options.tools]
         refuse_overwriting([options.json], filter(None, used))
         refuse_unwritable(options.json)
+    tools = chosen_tools(options)
+    truth = _truth(options)
     reconstructor = load_reconstructor(options.calibration, model=options.model)
-    truth = None
-    if options.truth is not None:
-        rows = {row.file: row.truth for row in read_truth(options.truth).rows}
-        truth = rows.get(options.image.name)
-        if truth is None:
-            raise InputError(
-                tr("there is no row for {name}").format(name=options.image.name),
-                where=str(options.truth),
-                advice=tr("Add the picture with its shape and true sizes"),
-            )
-    picture = read_picture(options.image, response=reconstructor.calibration.response)
-    require_colour(picture, where=str(options.image))
-    heightmap = reconstructor.depth(
-        picture.rgb, name=options.image.name, normals=False, uncertainty=True
-    )
-    measurement = measure_object(
-        heightmap.depth_mm,
-        heightmap.x_mm,
-        heightmap.y_mm,
-        shape=options.shape,
-        seed_mm=tuple(options.seed) if options.seed else None,
-        flags=heightmap.flags,
-        noise_mm=heightmap.noise_mm,
-        depth_scale_sd=heightmap.depth_scale_sd,
-        lateral_scale_sd=heightmap.lateral_scale_sd,
-    )
-    comparison = None if truth is None else compare(measurement, truth)
+    frame = read_frame(options.image, reconstructor)
+    heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
+    if tools:
+        results = [tool.apply(heightmap) for tool in tools]
+        content: dict[str, Any] = {
+            "image": heightmap.source,
+            "calibration_id": heightmap.calibration_id,
+            "model": heightmap.model,
+            "results": [result_as_dict(result) for result in results],
+        }
+        lines = [line for result in results for line in tool_lines(result)]
+    else:
+        seed = tuple(options.seed) if options.seed else None
+        shape = options.shape if options.shape != AUTO else _proposed(heightmap, seed, options)
+        measurement = measure_heightmap(heightmap, shape=shape, seed_mm=seed)
+        comparison = None if truth is None else compare(measurement, truth)
+        content = measurement.as_json(comparison)
+        lines = measurement_lines(measurement, comparison)
+        if options.shape == AUTO:
+            lines = [f"{tr('shape'):<12} {shape}", *lines]
     if options.json:
-        write_json(measurement.as_json(comparison), options.json)
-    print("\n".join(measurement_lines(measurement, comparison)))
+        write_json(content, options.json)
+    print("\n".join(lines))
     return 0
+
+
+def _truth(options: argparse.Namespace) -> Truth | None:
+    """Return the true sizes of the picture's object, where a file with them is named."""
+    if options.truth is None:
+        return None
+    if options.shape is None:
+        raise InputError(
+            tr("a tool has no true sizes to compare with"),
+            where="--truth",
+            advice=tr("Use it with --shape"),
+        )
+    rows = {row.file: row.truth for row in read_truth(options.truth).rows}
+    if options.image.name not in rows:
+        raise InputError(
+            tr("there is no row for {name}").format(name=options.image.name),
+            where=str(options.truth),
+            advice=tr("Add the picture with its shape and true sizes"),
+        )
+    return rows[options.image.name]
+
+
+def _proposed(
+    heightmap: HeightMap, seed_mm: tuple[float, float] | None, options: argparse.Namespace
+) -> str:
+    """Return the shape that is pressed."""
+    proposal = propose(heightmap, seed_mm=seed_mm)
+    if proposal is not None and proposal.shape in SHAPES:
+        return proposal.shape
+    found = (
+        tr("nothing that looks like a ball, a cylinder or a cuboid is pressed")
+        if proposal is None
+        else tr("it may be a {first} or a {second}").format(
+            first=proposal.candidates[0], second=proposal.candidates[1]
+        )
+    )
+    raise InputError(
+        found, where=str(options.image), advice=tr("Say what it is with --shape, or use --tool")
+    )
+
+
+def tool_lines(result: ToolResult) -> list[str]:
+    """Return a tool's result as lines of text, each value with its standard deviation."""
+    lines = [f"{result.tool.name}:"]
+    for figure in result.figures:
+        line = f"  {figure.label:<26} {figure.value:.4f} {figure.unit}"
+        lines.append(line + ("" if figure.sd is None else f"  (sd {figure.sd:.4f})"))
+    verdict = result.verdict + (f": {result.reason}" if result.reason else "")
+    return [*lines, f"  {tr('verdict'):<26} {verdict}"]
 
 
 def measurement_lines(measurement: Measurement, comparison: Comparison | None) -> list[str]:

@@ -13,7 +13,7 @@ from app.command_line.common import add_model, load_reconstructor, refuse_overwr
 from app.command_line.inputs import Inputs
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
-from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
 from gelpolight_core.export.preview import write_preview
 from gelpolight_core.translation import tr
 
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
             where="--uncertainty",
             advice=tr("Add npz to --format, or leave it out"),
         )
-    endings = dict.fromkeys([*formats, *(["png"] if options.pictures else [])])
+    endings = dict.fromkeys([*map(ending, formats), *(["png"] if options.pictures else [])])
     with Inputs(options.images, options.frames) as inputs:
         outputs = [options.output / f"{item.stem}.{e}" for item in inputs.items for e in endings]
         refuse_overwriting(outputs, [options.calibration, *options.images])

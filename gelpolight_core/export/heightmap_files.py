@@ -10,21 +10,26 @@ from typing import BinaryIO
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.export.mesh import Mesh, mesh_of, write_ply, write_stl, write_vtp
-from gelpolight_core.export.raster import describe, write_gsf, write_npz, write_tiff
+from gelpolight_core.export.raster import describe, write_gsf, write_npz, write_png16, write_tiff
 from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.translation import tr
 
 Writer = Callable[[BinaryIO], object]
 
-RASTER_FORMATS = ("npz", "tif", "gsf")
+RASTER_FORMATS = ("npz", "tif", "png", "gsf")
 MESH_FORMATS = ("vtp", "ply", "stl")
 FORMATS = (*RASTER_FORMATS, *MESH_FORMATS)
+
+
+def ending(name: str) -> str:
+    """Return the ending of a format's files, without its first dot."""
+    return "depth.png" if name == "png" else name
 
 
 def write_heightmap(
     heightmap: HeightMap, folder: Path, *, formats: Sequence[str], stride: int = 1
 ) -> list[Path]:
-    """Write a height map as ``<folder>/<picture without ending>.<format>``, one file per format.
+    """Write a height map as ``<folder>/<picture without ending>.<format>``, a file per format.
 
     Parameters
     ----------
@@ -33,8 +38,10 @@ def write_heightmap(
     folder : Path
         Made when it is not there. Files of the same name are replaced, each whole or not at all.
     formats : sequence of str
-        Out of :data:`FORMATS`: ``npz`` (everything), ``tif`` and ``gsf`` (the depth), ``vtp``
-        (mesh with depth, flags and normals), ``ply`` (the same), ``stl`` (bare mesh).
+        Out of :data:`FORMATS`: ``npz`` (everything), ``tif``, ``gsf`` and ``png`` (the
+        depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera's
+        picture may stand beside it), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
+        same), ``stl`` (bare mesh).
     stride : int, optional
         The meshes take every so many-th row and column only.
 
@@ -60,7 +67,7 @@ def write_heightmap(
         surface = mesh_of(heightmap, stride=stride)
     make_folder(folder)
     stem = PurePath(heightmap.source).stem or "heightmap"
-    paths = [folder / f"{stem}.{name}" for name in formats]
+    paths = [folder / f"{stem}.{ending(name)}" for name in formats]
     for name, path in zip(formats, paths, strict=True):
         write_atomically(path, _writer(name, heightmap, surface, stride))
     return paths
@@ -68,7 +75,7 @@ def write_heightmap(
 
 def _writer(name: str, heightmap: HeightMap, surface: Mesh | None, stride: int) -> Writer:
     if surface is None or name in RASTER_FORMATS:
-        writers = {"npz": write_npz, "tif": write_tiff, "gsf": write_gsf}
+        writers = {"npz": write_npz, "tif": write_tiff, "png": write_png16, "gsf": write_gsf}
         return partial(writers[name], heightmap)
     if name == "vtp":
         pitch_mm = heightmap.pitch_mm * stride

@@ -1,13 +1,21 @@
-"""Files that hold the depth as a regular grid: NumPy, TIFF and Gwyddion Simple Field."""
+"""Files that hold the depth as a regular grid: NumPy, TIFF, PNG and Gwyddion Simple Field."""
 
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from typing import Any, BinaryIO
 
+import cv2
 import numpy as np
 
 from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, HeightMap
+
+GREY_LEVELS = 65_535
+"""Of 16 bits, without the one that stands for an unknown depth."""
+LEAST_STEP_MM = 1e-6
+"""Step of a map without any difference of depth."""
 
 
 def flag_names() -> list[str]:
@@ -22,6 +30,18 @@ def describe(heightmap: HeightMap) -> dict[str, str]:
         "model": heightmap.model,
         "source": heightmap.source,
         "flag_names": ", ".join(flag_names()),
+    }
+
+
+def _about(heightmap: HeightMap) -> dict[str, str | float]:
+    """Return unit, scale and origin of the depth, for formats that keep texts."""
+    return {
+        "quantity": "depth_mm",
+        "unit": "mm",
+        "pitch_mm": float(heightmap.pitch_mm),
+        "x0_mm": float(heightmap.x_mm[0]),
+        "y0_mm": float(heightmap.y_mm[0]),
+        **describe(heightmap),
     }
 
 
@@ -62,14 +82,6 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
     """
     import tifffile
 
-    about = {
-        "quantity": "depth_mm",
-        "unit": "mm",
-        "pitch_mm": float(heightmap.pitch_mm),
-        "x0_mm": float(heightmap.x_mm[0]),
-        "y0_mm": float(heightmap.y_mm[0]),
-        **describe(heightmap),
-    }
     per_centimetre = 10.0 / heightmap.pitch_mm
     tifffile.imwrite(
         file,
@@ -78,10 +90,41 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
         photometric="minisblack",
         resolution=(per_centimetre, per_centimetre),
         resolutionunit="CENTIMETER",
-        description=json.dumps(about),
+        description=json.dumps(_about(heightmap)),
         metadata=None,
         software="GelPoLight Studio",
     )
+
+
+def write_png16(heightmap: HeightMap, file: BinaryIO) -> None:
+    """Write the depth as a grey PNG of 16 bits, with its scale.
+
+    ``depth = offset_mm + step_mm * value``, right to within half a step; the value 0 stands for a
+    depth that is not known. The scale is in the picture's text (keyword ``GelPoLight``) as JSON,
+    with what a TIFF says too; the pitch is in its resolution as well.
+
+    References
+    ----------
+    PNG specification (third edition), chunks tEXt and pHYs.
+    """
+    depth = heightmap.depth_mm.astype(np.float64)
+    known = np.isfinite(depth)
+    low, high = (float(f(depth[known])) if known.any() else 0.0 for f in (np.min, np.max))
+    step = (high - low) / (GREY_LEVELS - 1) or LEAST_STEP_MM
+    value = np.zeros(depth.shape, np.uint16)
+    value[known] = 1 + np.round((depth[known] - low) / step).astype(np.uint16)
+    about = {**_about(heightmap), "offset_mm": low - step, "step_mm": step, "unknown": 0}
+    data = cv2.imencode(".png", value)[1].tobytes()
+    per_metre = round(1e3 / heightmap.pitch_mm)
+    chunks = _chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
+    chunks += _chunk(b"tEXt", b"GelPoLight\0" + json.dumps(about).encode("ascii"))
+    # After the signature and the header (8 + 25 bytes), where the standard wants them.
+    file.write(data[:33] + chunks + data[33:])
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    """Return one chunk of a PNG file."""
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def write_gsf(heightmap: HeightMap, file: BinaryIO) -> None:

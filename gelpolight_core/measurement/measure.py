@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,8 @@ OTHER_REACH_MM = 2.5
 """How far the drape of another object reaches into the ground around this one."""
 DRAPE_MM = 1.5
 """Where the drape falls to a tenth of the height, about two decay lengths."""
+EDGE_RADIUS_MM = 0.08
+"""Fillet of an object's edge that is taken before the map is seen."""
 SEED_REACH_MM = 1.0
 """How far beside an object's half-height outline a seed point may lie."""
 
@@ -58,7 +61,7 @@ def measure_object(
     noise_mm: NDArray[np.float32] | None = None,
     depth_scale_sd: float | None = None,
     lateral_scale_sd: float | None = None,
-    edge_radius_mm: float = 0.08,
+    edge_radius_mm: float = EDGE_RADIUS_MM,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane, its drape fitted with it.
 
@@ -97,6 +100,62 @@ def measure_object(
             where=tr("shape"),
             advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
         )
+    found = find_object(
+        depth_mm,
+        x_mm,
+        y_mm,
+        seed_mm=seed_mm,
+        flags=flags,
+        depth_sd_mm=depth_sd_mm,
+        edge_radius_mm=edge_radius_mm,
+    )
+    window, region, prior = found.window, found.region, found.edge
+    fit = _fit(shape, window, region, prior)
+    reason = find_doubt(shape, fit, window, region, prior)
+    face = _face(shape, fit, window)
+    noise = (
+        {}
+        if noise_mm is None
+        else noise_of_fit(
+            fit, window, face, noise_mm, np.asarray(x_mm, np.float64), np.asarray(y_mm, np.float64)
+        )
+    )
+    scale = {}
+    if depth_scale_sd is not None and lateral_scale_sd is not None:
+        scale = calibration_sd(shape, fit.values, depth_scale_sd, lateral_scale_sd)
+    return _measurement(shape, fit, _plateau_shift_mm(fit, face), (noise, scale), reason)
+
+
+@dataclass(frozen=True, slots=True)
+class FoundObject:
+    """An object before its shape is known.
+
+    Attributes
+    ----------
+    window : WindowData
+        It and the ground around it.
+    region : PressedRegion
+        The segmented bump.
+    edge : EdgePrior
+        What is known of its edge.
+    """
+
+    window: WindowData
+    region: PressedRegion
+    edge: EdgePrior
+
+
+def find_object(
+    depth_mm: NDArray[np.floating],
+    x_mm: NDArray[np.floating],
+    y_mm: NDArray[np.floating],
+    *,
+    seed_mm: tuple[float, float] | None = None,
+    flags: NDArray[np.uint8] | None = None,
+    depth_sd_mm: NDArray[np.floating] | float | None = None,
+    edge_radius_mm: float = EDGE_RADIUS_MM,
+) -> FoundObject:
+    """Find the object that is to be measured; parameters and errors as :func:`measure_object`."""
     depth, x, y, weight = _checked(depth_mm, x_mm, y_mm, flags, depth_sd_mm)
     regions = find_pressed_regions(depth, x, y, weight > 0.0)
     region = _chosen_region(regions, x, y, seed_mm)
@@ -109,15 +168,9 @@ def measure_object(
             advice=tr("Press it nearer to the middle of the sensor"),
         )
     window = _window(depth, x, y, weight, region, regions)
-    prior = EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, window.pitch_mm)
-    fit = _fit(shape, window, region, prior)
-    reason = find_doubt(shape, fit, window, region, prior)
-    face = _face(shape, fit, window)
-    noise = {} if noise_mm is None else noise_of_fit(fit, window, face, noise_mm, x, y)
-    scale = {}
-    if depth_scale_sd is not None and lateral_scale_sd is not None:
-        scale = calibration_sd(shape, fit.values, depth_scale_sd, lateral_scale_sd)
-    return _measurement(shape, fit, _plateau_shift_mm(fit, face), (noise, scale), reason)
+    return FoundObject(
+        window, region, EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, window.pitch_mm)
+    )
 
 
 def _checked(

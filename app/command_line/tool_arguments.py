@@ -1,0 +1,164 @@
+"""The arguments that describe a measuring tool, and the tool that they describe."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from app.command_line.common import numbers, points
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.outline_tools import EDGES
+from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
+from gelpolight_core.translation import tr
+
+# How many places each tool takes; None: any number from there on.
+PLACES: dict[str, tuple[int, int | None]] = {
+    "distance": (2, 2),
+    "step-height": (2, 2),
+    "profile-step": (2, 2),
+    "profile-width": (2, 2),
+    "profile-angle": (2, 2),
+    "angle": (3, 3),
+    "circle": (3, None),
+    "rectangle": (1, 1),
+    "ball": (0, 1),
+    "cylinder": (0, 1),
+    "cuboid": (0, 1),
+}
+
+
+def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
+    """Add the tools to a group of which one is chosen, and their geometry to the parser."""
+    what.add_argument("--tool", choices=tuple(TOOLS), metavar="NAME", help=", ".join(TOOLS))
+    what.add_argument(
+        "--tools", type=Path, metavar="FILE", help=tr("JSON file of tools, or of stored results")
+    )
+    parser.add_argument(
+        "--at",
+        type=numbers,
+        nargs="+",
+        metavar="X Y",
+        default=[],
+        help=tr(
+            "the tool's places in mm: ends, centres, apex and arms, or points of a rim "
+            "(write --at=-1,2 where a pair with a comma begins with a minus)"
+        ),
+    )
+    parser.add_argument("--width", type=float, metavar="MM", help=tr("across a profile"))
+    parser.add_argument("--level", type=float, metavar="MM", help=tr("depth of a profile's width"))
+    parser.add_argument(
+        "--range",
+        type=float,
+        nargs="+",
+        metavar="MM",
+        help=tr("one or two ranges along a profile: A B [C D]"),
+    )
+    parser.add_argument(
+        "--size", type=float, nargs=2, metavar=("A", "B"), help=tr("sides of rectangles")
+    )
+    parser.add_argument("--yaw", type=float, metavar="DEG", help=tr("turn of rectangles"))
+    parser.add_argument("--edge", choices=EDGES, help=tr("where a circle or rectangle is measured"))
+
+
+def chosen_tools(options: argparse.Namespace) -> tuple[Tool, ...]:
+    """Return the tools of the arguments; none with ``--shape``.
+
+    Raises
+    ------
+    InputError
+        If something is missing or does not belong to the tool.
+    """
+    if options.tools is not None:
+        _refuse_rest(options, set(), "--tools")
+        return tools_from_json(_read(options.tools))
+    if options.tool is None:
+        _refuse_rest(options, set(), "--shape")
+        return ()
+    return (tool_from_dict({"tool": options.tool, **_geometry(options)}),)
+
+
+def _geometry(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the tool's geometry as :func:`tool_from_dict` wants it."""
+    name = options.tool
+    places = points(options.at, where="--at") if options.at else []
+    least, most = PLACES[name]
+    if len(places) < least or (most is not None and len(places) > most):
+        raise InputError(
+            tr("{n} places are given").format(n=len(places)),
+            where=tr("measuring tool {name}").format(name=name),
+            advice=tr("It takes {least} of them: --at X Y ...").format(
+                least=least if most == least else tr("{n} or more").format(n=least)
+            ),
+        )
+    if name in ("step-height", "rectangle"):
+        taken = {"at", "size", "yaw"} | ({"edge"} if name == "rectangle" else set())
+        _refuse_rest(options, taken, name)
+        areas = [_rectangle(options, place) for place in places]
+        keys = ("rectangle",) if name == "rectangle" else ("first", "second")
+        return dict(zip(keys, areas, strict=True)) | _given(edge=options.edge)
+    if name.startswith("profile-"):
+        taken = {"at", "width", "range"} | ({"level"} if name == "profile-width" else set())
+        _refuse_rest(options, taken, name)
+        ends = {"start_mm": places[0], "end_mm": places[1]}
+        return ends | _given(width_mm=options.width, level_mm=options.level) | _ranges(options)
+    _refuse_rest(options, {"at"} | ({"edge"} if name == "circle" else set()), name)
+    if name == "circle":
+        return {"points_mm": places} | _given(edge=options.edge)
+    keys = {"distance": ("a_mm", "b_mm"), "angle": ("apex_mm", "first_mm", "second_mm")}.get(
+        name, ("at_mm",)
+    )
+    return dict(zip(keys, places, strict=False))
+
+
+def _rectangle(options: argparse.Namespace, centre_mm: tuple[float, float]) -> dict[str, Any]:
+    if options.size is None:
+        raise InputError(
+            tr("the size is missing"),
+            where=tr("measuring tool {name}").format(name=options.tool),
+            advice=tr("Give it by --size A B, in mm"),
+        )
+    return {"centre_mm": centre_mm, "sides_mm": options.size, **_given(yaw_deg=options.yaw)}
+
+
+def _ranges(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the ranges along a profile."""
+    given = options.range or []
+    keys = ("between_mm",) if options.tool == "profile-width" else ("first_mm", "second_mm")
+    if options.tool == "profile-width" and not given:
+        return {}
+    if len(given) != 2 * len(keys):
+        raise InputError(
+            tr("{n} numbers are given").format(n=len(given)),
+            where="--range",
+            advice=tr("The tool {name} takes {n}").format(name=options.tool, n=2 * len(keys)),
+        )
+    return {key: given[2 * k : 2 * k + 2] for k, key in enumerate(keys)}
+
+
+def _given(**values: Any) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _refuse_rest(options: argparse.Namespace, taken: set[str], name: str) -> None:
+    """Refuse an argument that would be ignored."""
+    for key in ("at", "width", "level", "range", "size", "yaw", "edge"):
+        if getattr(options, key) not in (None, []) and key not in taken:
+            raise InputError(
+                tr("it does not go with {name}").format(name=name),
+                where=f"--{key}",
+                advice=tr("Leave it out"),
+            )
+
+
+def _read(path: Path) -> Any:
+    """Read a JSON file."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            tr("the file cannot be read as JSON"),
+            where=str(path),
+            advice=tr("Name a file of tools, such as measure --json writes"),
+        ) from error

@@ -1,0 +1,37 @@
+"""A profile as a table that spreadsheets read."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+
+from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.measurement.profile import Profile
+
+COLUMNS = ("along_mm", "x_mm", "y_mm", "depth_mm", "depth_sd_mm", "flags")
+
+
+def write_profile(profile: Profile, path: Path) -> None:
+    """Write a profile as CSV (UTF-8, points for decimals), whole or not at all.
+
+    One row for each point: distance from the start, place, depth, its standard deviation and the
+    flags. A cell is empty where the depth or its deviation is not known.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    sd = profile.depth_sd_mm
+    for k, (x, y) in enumerate(profile.points_mm.tolist()):
+        spread = math.nan if sd is None else float(sd[k])
+        lengths = (float(profile.along_mm[k]), x, y, float(profile.depth_mm[k]), spread)
+        cells = [f"{v:.6f}" if math.isfinite(v) else "" for v in lengths]
+        writer.writerow([*cells, int(profile.flags[k])])
+    data = stream.getvalue().encode()
+    write_atomically(path, lambda file: file.write(data))

@@ -1,0 +1,136 @@
+"""A rectangle on the membrane, and the nodes of a height map inside it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Point = tuple[float, float]
+LEAST_NODES = 9
+"""Fewer nodes say nothing of a plane."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """A rectangle in the sensor frame.
+
+    Attributes
+    ----------
+    centre_mm : (float, float)
+        (x, y).
+    sides_mm : (float, float)
+        The first lies along `yaw_deg`.
+    yaw_deg : float
+        From the x axis towards y.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, or a side is not greater than zero.
+    """
+
+    centre_mm: Point
+    sides_mm: Point
+    yaw_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        numbers = (*self.centre_mm, *self.sides_mm, self.yaw_deg)
+        if not all(map(math.isfinite, numbers)) or min(self.sides_mm) <= 0.0:
+            raise InputError(
+                tr("a rectangle of {a:g} x {b:g} mm at ({x:g}, {y:g}) mm").format(
+                    a=self.sides_mm[0],
+                    b=self.sides_mm[1],
+                    x=self.centre_mm[0],
+                    y=self.centre_mm[1],
+                ),
+                where=tr("rectangle"),
+                advice=tr("Give two sides greater than zero, and where its centre lies"),
+            )
+
+    @property
+    def outline_mm(self) -> Array:
+        """(5, 2) corners, (x, y), closed."""
+        a, b = 0.5 * self.sides_mm[0], 0.5 * self.sides_mm[1]
+        along, across = np.array([[-a, a, a, -a, -a], [-b, -b, b, b, -b]])
+        return self.place(along, across)
+
+    def place(self, along_mm: Array, across_mm: Array) -> Array:
+        """Return sensor coordinates (..., 2) of places along and across the first side."""
+        cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
+        x = self.centre_mm[0] + cos * along_mm - sin * across_mm
+        y = self.centre_mm[1] + sin * along_mm + cos * across_mm
+        return np.stack([x, y], axis=-1)
+
+
+@dataclass(frozen=True, slots=True)
+class AreaNodes:
+    """The nodes of a height map inside an area, without those outside the working area.
+
+    Attributes
+    ----------
+    x_mm, y_mm, depth_mm : (N,)
+        Place and depth.
+    flags : (N,) uint8
+        Their flags.
+    """
+
+    x_mm: Array
+    y_mm: Array
+    depth_mm: Array
+    flags: NDArray[np.uint8]
+
+    def thinned(self, most: int) -> AreaNodes:
+        """Return at most so many of them, evenly chosen."""
+        stride = max(math.ceil(self.x_mm.size / most), 1)
+        # A stride that divides the rows' length would choose columns, not nodes.
+        chosen = np.random.default_rng(0).permutation(self.x_mm.size)[::stride]
+        return AreaNodes(
+            self.x_mm[chosen], self.y_mm[chosen], self.depth_mm[chosen], self.flags[chosen]
+        )
+
+
+def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
+    """Return the nodes inside a rectangle.
+
+    Raises
+    ------
+    InputError
+        If fewer than nine of them lie in the working area.
+    """
+    corners = rectangle.outline_mm
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    columns = np.flatnonzero((heightmap.x_mm >= low[0]) & (heightmap.x_mm <= high[0]))
+    rows = np.flatnonzero((heightmap.y_mm >= low[1]) & (heightmap.y_mm <= high[1]))
+    x, y = np.meshgrid(heightmap.x_mm[columns], heightmap.y_mm[rows])
+    yaw = math.radians(rectangle.yaw_deg)
+    dx, dy = x - rectangle.centre_mm[0], y - rectangle.centre_mm[1]
+    along, across = (
+        math.cos(yaw) * dx + math.sin(yaw) * dy,
+        math.cos(yaw) * dy - math.sin(yaw) * dx,
+    )
+    depth = heightmap.depth_mm[np.ix_(rows, columns)].astype(np.float64)
+    flags = heightmap.flags[np.ix_(rows, columns)]
+    # Nodes that lie on the edge belong to it, whatever rounding says.
+    slack = 1e-9 * heightmap.pitch_mm
+    inside = (np.abs(along) <= 0.5 * rectangle.sides_mm[0] + slack) & (
+        np.abs(across) <= 0.5 * rectangle.sides_mm[1] + slack
+    )
+    inside &= ((flags & int(Flag.OUTSIDE)) == 0) & np.isfinite(depth)
+    if int(inside.sum()) < LEAST_NODES:
+        raise InputError(
+            tr("the rectangle holds {n} points of the map").format(n=int(inside.sum())),
+            where=tr("rectangle at ({x:g}, {y:g}) mm").format(
+                x=rectangle.centre_mm[0], y=rectangle.centre_mm[1]
+            ),
+            advice=tr("Make it larger, or move it into the working area"),
+        )
+    return AreaNodes(x[inside], y[inside], depth[inside], flags[inside])

@@ -1,0 +1,271 @@
+"""Where the surface is steepest near a drawn circle or rectangle, and the shape through there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import least_squares
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
+from gelpolight_core.measurement.measured import depth_at
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Point = tuple[float, float]
+
+REACH_SHARE = 0.25
+"""How far beside a drawn edge the steepest place is looked for, as a share of the half size."""
+REACH_MM = 1.0
+"""The same at most."""
+LINES = 180
+"""Lines across a circle's rim; four sides of a rectangle take a quarter each."""
+MIDDLE = 0.7
+"""Share of a rectangle's side that is looked at: its corners are round."""
+FLAT_SHARE = 0.3
+"""A place less steep than this share of the median is no edge."""
+LEAST_SLOPE = 0.02
+"""Nor is any place that is flatter than this (mm per mm)."""
+LEAST_POINTS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class FittedCircle:
+    """A circle through points of a rim.
+
+    Attributes
+    ----------
+    centre_mm : (float, float)
+    radius_mm : float
+    sd_mm : (float, float, float)
+        Standard deviations of the centre's x and y and of the radius, from the points' scatter;
+        zero for three points, which a circle always meets.
+    rms_mm : float
+        Departure of the points from the circle.
+    points_mm : (N, 2)
+        The points that count.
+    """
+
+    centre_mm: Point
+    radius_mm: float
+    sd_mm: tuple[float, float, float]
+    rms_mm: float
+    points_mm: Array
+
+
+@dataclass(frozen=True, slots=True)
+class FittedRectangle:
+    """A rectangle through points of its edges.
+
+    Attributes
+    ----------
+    rectangle : Rectangle
+    sides_sd_mm : (float, float)
+        Standard deviations of the sides, from the points' scatter.
+    points_mm : (N, 2)
+        The points that count.
+    """
+
+    rectangle: Rectangle
+    sides_sd_mm: Point
+    points_mm: Array
+
+
+def fit_circle(points_mm: Array) -> FittedCircle:
+    """Return the circle with the least squares of distances to points.
+
+    Parameters
+    ----------
+    points_mm : (N, 2)
+        At least three, not on one line.
+
+    Raises
+    ------
+    InputError
+        If there is no such circle.
+    """
+    points = np.asarray(points_mm, np.float64)
+    start = _algebraic_circle(points)
+
+    def distance(p: Array) -> Array:
+        return np.asarray(np.hypot(points[:, 0] - p[0], points[:, 1] - p[1]) - p[2])
+
+    found = least_squares(distance, start, loss="soft_l1", f_scale=_scale(distance(start)))
+    x, y, radius = map(float, found.x)
+    left = distance(found.x)
+    if not math.isfinite(radius) or radius > 100.0 * float(np.ptp(points, axis=0).max()):
+        raise _no_circle()
+    rms = math.sqrt(float(np.mean(left**2)))
+    sd = (0.0, 0.0, 0.0)
+    if len(points) > 3:
+        jacobian = np.stack(
+            [(x - points[:, 0]), (y - points[:, 1]), np.full(len(points), -radius)], axis=1
+        )
+        jacobian /= radius
+        variance = float(left @ left) / (len(points) - 3) * _together(points)
+        spread = np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)) * variance)
+        sd = (float(spread[0]), float(spread[1]), float(spread[2]))
+    return FittedCircle((x, y), radius, sd, rms, points)
+
+
+def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircle:
+    """Return the circle through the steepest places near a drawn one.
+
+    Raises
+    ------
+    InputError
+        If no edge is found near it.
+    """
+    reach = min(REACH_SHARE * drawn.radius_mm, REACH_MM)
+    turns = np.linspace(0.0, 2.0 * np.pi, LINES, endpoint=False)
+
+    def place(offset: Array) -> Array:
+        radius = drawn.radius_mm + offset
+        x = drawn.centre_mm[0] + radius * np.cos(turns)[:, None]
+        y = drawn.centre_mm[1] + radius * np.sin(turns)[:, None]
+        return np.stack([x, y], axis=-1)
+
+    offset, there = _steepest(heightmap, place, reach)
+    radius = drawn.radius_mm + offset[there]
+    centre = np.array(drawn.centre_mm)
+    away = radius[:, None] * np.stack([np.cos(turns[there]), np.sin(turns[there])], axis=1)
+    return fit_circle(centre + away)
+
+
+def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
+    """Return the rectangle through the steepest places near the sides of a drawn one.
+
+    A straight line is fitted to each side; the four turn together.
+
+    Raises
+    ------
+    InputError
+        If a side has no edge near it.
+    """
+    half = (0.5 * drawn.sides_mm[0], 0.5 * drawn.sides_mm[1])
+    shifts, turns, spreads, points = [], [], [], []
+    for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
+        along = np.asarray(np.linspace(-MIDDLE, MIDDLE, LINES // 4) * half[1 - axis], np.float64)
+        place = _side_place(drawn, axis, sign * half[axis], sign, along)
+        reach = min(REACH_SHARE * half[axis], REACH_MM)
+        offset, there = _steepest(heightmap, place, reach)
+        found = np.asarray(offset[there], np.float64)
+        slope, shift = _robust_line(along[there], found)
+        left = found - shift - slope * along[there]
+        edge = place(offset[:, None])[there, 0]
+        shifts.append(sign * shift)
+        # Outwards along +y at growing x turns the rectangle the other way than along +x.
+        turns.append(sign * slope * (-1.0 if axis == 0 else 1.0))
+        spreads.append(float(np.std(left)) * math.sqrt(_together(edge) / len(edge)))
+        points.append(edge)
+    turn = float(np.median(turns))
+    middle = (0.5 * (shifts[0] + shifts[1]), 0.5 * (shifts[2] + shifts[3]))
+    sides = (
+        (drawn.sides_mm[0] + shifts[0] - shifts[1]) * math.cos(turn),
+        (drawn.sides_mm[1] + shifts[2] - shifts[3]) * math.cos(turn),
+    )
+    centre = drawn.place(np.array(middle[0]), np.array(middle[1]))
+    fitted = replace(
+        drawn,
+        centre_mm=(float(centre[0]), float(centre[1])),
+        sides_mm=sides,
+        yaw_deg=drawn.yaw_deg + math.degrees(math.atan(turn)),
+    )
+    sd = (math.hypot(*spreads[:2]), math.hypot(*spreads[2:]))
+    return FittedRectangle(fitted, sd, np.concatenate(points))
+
+
+def _side_place(
+    drawn: Rectangle, axis: int, level: float, sign: float, along: Array
+) -> Callable[[Array], Array]:
+    """Return the function from offsets outwards (lines, n) to places (lines, n, 2)."""
+
+    def place(offset: Array) -> Array:
+        outwards = level + sign * offset + np.zeros((along.size, 1))
+        beside = along[:, None] + np.zeros_like(outwards)
+        return drawn.place(outwards, beside) if axis == 0 else drawn.place(beside, outwards)
+
+    return place
+
+
+def _steepest(
+    heightmap: HeightMap, place: Callable[[Array], Array], reach: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the offset of the steepest place on each line, and which lines cross an edge."""
+    step = float(0.5 * heightmap.pitch_mm)
+    steps = max(math.ceil(reach / step), 4)
+    offsets = np.asarray(step * np.arange(-steps, steps + 1), np.float64)
+    places = place(offsets[None, :])
+    depth = depth_at(heightmap, places[..., 0].ravel(), places[..., 1].ravel())
+    depth = depth.reshape(places.shape[:2])
+    # Bilinear depths have slopes that jump at the nodes; two steps smooth over one node.
+    smooth = gaussian_filter1d(depth, 2.0, axis=1, mode="nearest")
+    steep = np.nan_to_num(np.abs(np.gradient(smooth, step, axis=1)))
+    # The steepest one, not the end of a slope that goes on beyond the reach.
+    best = steep[:, 1:-1].argmax(axis=1) + 1
+    lines = np.arange(len(steep))
+    before, top, after = (steep[lines, best + k] for k in (-1, 0, 1))
+    bend = before - 2.0 * top + after
+    shift = np.divide(0.5 * (before - after), bend, out=np.zeros_like(bend), where=bend < 0.0)
+    inner = (best > 1) & (best < steep.shape[1] - 2)
+    least = max(FLAT_SHARE * float(np.median(top)), LEAST_SLOPE)
+    there = inner & (top > least) & np.isfinite(smooth).all(axis=1)
+    if int(there.sum()) < LEAST_POINTS:
+        raise InputError(
+            tr("there is no edge near what was drawn"),
+            where=tr("steepest slope"),
+            advice=tr("Draw it nearer to the edge, or measure it as it is drawn (plain)"),
+        )
+    return np.asarray(offsets[best] + step * np.clip(shift, -1.0, 1.0)), there
+
+
+def _robust_line(x: Array, y: Array) -> tuple[float, float]:
+    """Return slope and level of a line that outliers do not move."""
+
+    def distance(p: Array) -> Array:
+        return np.asarray(y - p[0] * x - p[1])
+
+    start = np.array([0.0, float(np.median(y))])
+    found = least_squares(distance, start, loss="soft_l1", f_scale=_scale(distance(start)))
+    return float(found.x[0]), float(found.x[1])
+
+
+def _algebraic_circle(points: Array) -> Array:
+    """Return x, y and radius of the circle that is linear in the points' squares (Kasa)."""
+    middle = points.mean(axis=0)
+    centred = points - middle
+    size = float(np.abs(centred).max()) if len(points) else 0.0
+    terms = np.concatenate([2.0 * centred, np.ones((len(points), 1))], axis=1)
+    if len(points) < 3 or not np.isfinite(points).all() or size <= 0.0:
+        raise _no_circle()
+    # Points on one line leave the terms without full rank.
+    if np.linalg.svd(centred / size, compute_uv=False)[-1] < 1e-6:
+        raise _no_circle()
+    x, y, rest = np.linalg.lstsq(terms, (centred**2).sum(axis=1))[0].tolist()
+    return np.array([x + middle[0], y + middle[1], math.sqrt(max(rest + x**2 + y**2, 0.0))])
+
+
+def _scale(left: Array) -> float:
+    return max(1.4826 * float(np.median(np.abs(left))), 1e-6)
+
+
+def _together(points: Array) -> float:
+    """Return how many neighbouring points of an edge err together: those within the drape."""
+    gaps = np.hypot(*np.diff(points, axis=0).T)
+    gap = max(float(np.median(gaps)), 1e-9)
+    return max(TYPICAL_DECAY_MM / gap, 1.0)
+
+
+def _no_circle() -> InputError:
+    return InputError(
+        tr("no circle goes through these points"),
+        where=tr("circle"),
+        advice=tr("Give three or more points of the rim that do not lie on one line"),
+    )

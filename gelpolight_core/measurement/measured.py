@@ -1,0 +1,206 @@
+"""One measured value with its standard deviation, and the map's errors that it follows from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+MODEL_REACH_MM = 2.0 * TYPICAL_DECAY_MM
+"""Over which the model's own errors of the depth hang together: errors of slopes do so over lengths
+like the drape's, and what is integrated from them over twice that."""
+WAVES = 24
+"""Waves that one smooth example of the model's errors is made of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """One measured value.
+
+    Attributes
+    ----------
+    value : float
+        In `unit`.
+    sd : float or None
+        Standard deviation: the picture's noise, the model and the calibration together. None
+        where the height map states none. How well a person placed the tool is no part of it.
+    unit : str
+        ``mm``, ``um`` or ``deg``.
+    name : str
+        Name for scripts, such as ``step_height``.
+    """
+
+    value: float
+    sd: float | None
+    unit: str
+    name: str
+
+    @property
+    def label(self) -> str:
+        """The name as a person reads it."""
+        return figure_labels().get(self.name, self.name)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return plain values."""
+        return {"name": self.name, "value": self.value, "sd": self.sd, "unit": self.unit}
+
+
+def figure_labels() -> dict[str, str]:
+    """Return what people read for each name of a figure."""
+    return {
+        "distance": tr("distance in the plane"),
+        "distance_3d": tr("distance in space"),
+        "depth_difference": tr("depth difference"),
+        "step_height": tr("step height"),
+        "width": tr("width"),
+        "level": tr("level of the width"),
+        "slope": tr("slope"),
+        "angle": tr("angle"),
+        "angle_3d": tr("angle in space"),
+        "diameter": tr("diameter"),
+        "centre_x": tr("centre x"),
+        "centre_y": tr("centre y"),
+        "roundness": tr("departure from round, RMS"),
+        "side_a": tr("first side"),
+        "side_b": tr("second side"),
+        "yaw": tr("yaw"),
+        "mean_depth": tr("mean depth"),
+        "deepest": tr("deepest place"),
+        "tilt": tr("tilt"),
+        "sa": tr("roughness Sa"),
+        "sq": tr("roughness Sq"),
+        "sz": tr("roughness Sz"),
+        "height": tr("height"),
+        "drape_decay": tr("drape decay"),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class MapErrors:
+    """Errors that the depths at some places could as well have had.
+
+    Attributes
+    ----------
+    depth_mm : (examples, N)
+        Each row is one set of errors that belong together: noise and model.
+    depth_scale_sd, lateral_scale_sd : float
+        Relative standard deviations of depths, and of lengths across, common to all places.
+    """
+
+    depth_mm: Array
+    depth_scale_sd: float
+    lateral_scale_sd: float
+
+    def sd_mm(self, depth_mm: Array) -> Array:
+        """Return the standard deviation (N,) of depths (N,) at the places."""
+        spread = np.mean(self.depth_mm**2, axis=0) + (self.depth_scale_sd * depth_mm) ** 2
+        return np.asarray(np.sqrt(spread))
+
+
+def map_errors(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> MapErrors | None:
+    """Return errors at places of a height map; None where it does not state any.
+
+    The noise is that of the map's own examples. Of the model's errors the map says how large they
+    are; they are taken as smooth over the drape's length, and are the same for every tool on a map.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        Reconstructed with its uncertainty.
+    x_mm, y_mm : (N,)
+        Places.
+    """
+    noise = heightmap.noise_mm
+    if noise is None or heightmap.depth_model_sd_mm is None:
+        return None
+    column, row = index_of(heightmap, x_mm, y_mm)
+    factor = round(heightmap.x_mm.size / noise.shape[2])
+    first = 0.5 * (factor - 1)
+    place = np.stack([row - first, column - first]) / factor
+    examples = np.array([map_coordinates(e, place, order=1, mode="nearest") for e in noise])
+    model_sd = map_coordinates(
+        heightmap.depth_model_sd_mm, np.stack([row, column]), order=1, mode="nearest"
+    )
+    examples = examples + model_sd * _smooth_fields(len(noise), x_mm, y_mm)
+    return MapErrors(examples, heightmap.depth_scale_sd or 0.0, heightmap.lateral_scale_sd or 0.0)
+
+
+def measured(
+    name: str,
+    unit: str,
+    compute: Callable[[Array, float], float],
+    depth_mm: Array,
+    errors: MapErrors | None,
+) -> Measured:
+    """Measure, and repeat it with every error that the depths could as well have had.
+
+    Parameters
+    ----------
+    name, unit : str
+        As in :class:`Measured`.
+    compute : callable (depth_mm, stretch) -> value
+        What is measured, from depths (N,) and a factor on all lengths across.
+    depth_mm : (N,)
+        The depths.
+    errors : MapErrors or None
+        Of these depths.
+    """
+    value = compute(depth_mm, 1.0)
+    if errors is None:
+        return Measured(value, None, unit, name)
+    moved = [compute(depth_mm + error, 1.0) - value for error in errors.depth_mm]
+    scaled = compute(depth_mm * (1.0 + errors.depth_scale_sd), 1.0) - value
+    stretched = compute(depth_mm, 1.0 + errors.lateral_scale_sd) - value
+    noise = math.sqrt(float(np.mean(np.square(moved))))
+    return Measured(value, math.hypot(noise, scaled, stretched), unit, name)
+
+
+def index_of(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
+    """Return fractional (column, row) of places."""
+    column = (np.asarray(x_mm, np.float64) - heightmap.x_mm[0]) / heightmap.pitch_mm
+    row = (np.asarray(y_mm, np.float64) - heightmap.y_mm[0]) / heightmap.pitch_mm
+    return column, row
+
+
+def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
+    """Return the depth at places, bilinear; NaN outside the map and its working area."""
+    outside = (heightmap.flags & int(Flag.OUTSIDE)) != 0
+    known = np.where(outside, np.nan, heightmap.depth_mm.astype(np.float64))
+    column, row = index_of(heightmap, x_mm, y_mm)
+    return np.asarray(
+        map_coordinates(known, np.stack([row, column]), order=1, mode="constant", cval=np.nan)
+    )
+
+
+def flags_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> NDArray[np.uint8]:
+    """Return the flags of the nearest nodes; ``OUTSIDE`` beyond the map."""
+    column, row = (np.round(index).astype(int) for index in index_of(heightmap, x_mm, y_mm))
+    rows, columns = heightmap.flags.shape
+    there = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    found = np.full(column.shape, int(Flag.OUTSIDE), np.uint8)
+    found[there] = heightmap.flags[row[there], column[there]]
+    return found
+
+
+def _smooth_fields(examples: int, x_mm: Array, y_mm: Array) -> Array:
+    """Return random fields (examples, N) of unit variance that are smooth over the model's reach.
+
+    A sum of waves with Gaussian wave numbers has a Gaussian correlation.
+    """
+    random = np.random.default_rng(0)
+    waves = random.standard_normal((examples, WAVES, 2)) / MODEL_REACH_MM
+    phases = random.uniform(0.0, 2.0 * np.pi, (examples, WAVES, 1))
+    places = np.stack([x_mm, y_mm])
+    fields = [np.cos(w @ places + p).sum(axis=0) for w, p in zip(waves, phases, strict=True)]
+    return np.asarray(np.sqrt(2.0 / WAVES) * np.array(fields))

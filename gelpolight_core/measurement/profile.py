@@ -1,0 +1,336 @@
+"""A section through a height map, and what is read off it: steps, widths, slopes and angles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.measured import (
+    MapErrors,
+    Measured,
+    depth_at,
+    flags_at,
+    map_errors,
+    measured,
+)
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Point = tuple[float, float]
+
+STEP = 0.5
+"""Distance of the profile's points, as a share of the map's pitch."""
+ERROR_STEP = 4.0
+"""The same for the errors, which the map knows at every fourth node."""
+MOST_POINTS = 20_000
+"""Of a line; the map's diagonal has about 3000."""
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Depth along a line, averaged across a width.
+
+    Attributes
+    ----------
+    start_mm, end_mm : (float, float)
+        Ends of the line, (x, y) in the sensor frame.
+    width_mm : float
+        Across the line; 0 for the line alone.
+    along_mm : (n,)
+        Distance from the start.
+    depth_mm : (n,)
+        NaN outside the map and its working area.
+    depth_sd_mm : (n,) or None
+        Standard deviation of `depth_mm`, the calibration's share included; None where the height
+        map states none.
+    flags : (n,) uint8
+        Every flag that is set anywhere across the width.
+    errors : MapErrors or None
+        Errors of `depth_mm` that belong together, for figures read off the profile.
+    """
+
+    start_mm: Point
+    end_mm: Point
+    width_mm: float
+    along_mm: Array
+    depth_mm: Array
+    depth_sd_mm: Array | None
+    flags: NDArray[np.uint8]
+    errors: MapErrors | None = None
+
+    @property
+    def points_mm(self) -> Array:
+        """(n, 2) places of the points, (x, y)."""
+        share = self.along_mm / self.along_mm[-1]
+        start, end = np.array(self.start_mm), np.array(self.end_mm)
+        return np.asarray(start + share[:, None] * (end - start))
+
+
+def take_profile(
+    heightmap: HeightMap, start_mm: Point, end_mm: Point, *, width_mm: float = 0.0
+) -> Profile:
+    """Cut through a height map along a line.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        What to cut.
+    start_mm, end_mm : (float, float)
+        Ends of the line, (x, y) in the sensor frame; they may lie outside the map.
+    width_mm : float, optional
+        Depths are averaged over this width across the line, as far as the map reaches.
+
+    Raises
+    ------
+    InputError
+        If the line has no length, no point on the map, or a bad width.
+    """
+    length = math.hypot(end_mm[0] - start_mm[0], end_mm[1] - start_mm[1])
+    step = STEP * heightmap.pitch_mm
+    _check_line(length, width_mm, step)
+    along = np.linspace(0.0, length, math.ceil(length / step) + 1)
+    x, y = _strip(start_mm, end_mm, along, _across(width_mm, step))
+    depth = depth_at(heightmap, x.ravel(), y.ravel()).reshape(x.shape)
+    there = np.isfinite(depth)
+    count = there.sum(axis=0)
+    if not count.any():
+        raise InputError(
+            tr("the line lies outside the working area"),
+            where=tr("profile"),
+            advice=tr("Draw it over what is measured"),
+        )
+    total = np.where(there, depth, 0.0).sum(axis=0)
+    mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
+    flags = np.bitwise_or.reduce(flags_at(heightmap, x, y), axis=0)
+    errors = _profile_errors(heightmap, start_mm, end_mm, along, width_mm)
+    sd = None if errors is None else errors.sd_mm(mean)
+    return Profile(start_mm, end_mm, width_mm, along, mean, sd, flags, errors)
+
+
+def _check_line(length: float, width_mm: float, step: float) -> None:
+    good = math.isfinite(length) and math.isfinite(width_mm) and width_mm >= 0.0
+    if not good or not 2.0 * step <= length <= MOST_POINTS * step:
+        raise InputError(
+            tr("a line of {length:g} mm and a width of {width:g} mm").format(
+                length=length, width=width_mm
+            ),
+            where=tr("profile"),
+            advice=tr("Draw a line across the object, and give a width of 0 or more"),
+        )
+
+
+def _across(width_mm: float, step: float) -> Array:
+    """Return the offsets of the lines that are averaged: the middles of equal strips."""
+    lines = min(max(math.ceil(width_mm / step), 1), MOST_POINTS)
+    return width_mm * ((np.arange(lines) + 0.5) / lines - 0.5)
+
+
+def _strip(start_mm: Point, end_mm: Point, along: Array, across: Array) -> tuple[Array, Array]:
+    """Return x and y (lines, points) of a strip."""
+    angle = math.atan2(end_mm[1] - start_mm[1], end_mm[0] - start_mm[0])
+    x = start_mm[0] + along * math.cos(angle) - across[:, None] * math.sin(angle)
+    y = start_mm[1] + along * math.sin(angle) + across[:, None] * math.cos(angle)
+    return x, y
+
+
+def _profile_errors(
+    heightmap: HeightMap, start_mm: Point, end_mm: Point, along: Array, width_mm: float
+) -> MapErrors | None:
+    """Return the errors of a profile, from fewer points: they are smooth."""
+    step = ERROR_STEP * heightmap.pitch_mm
+    few = np.linspace(0.0, along[-1], math.ceil(along[-1] / step) + 1)
+    x, y = _strip(start_mm, end_mm, few, _across(width_mm, step))
+    found = map_errors(heightmap, x.ravel(), y.ravel())
+    if found is None:
+        return None
+    mean = found.depth_mm.reshape(-1, *x.shape).mean(axis=1)
+    examples = np.array([np.interp(along, few, example) for example in mean])
+    return MapErrors(examples, found.depth_scale_sd, found.lateral_scale_sd)
+
+
+def step_height(profile: Profile, *, first_mm: Point, second_mm: Point) -> Measured:
+    """Return how much deeper the second part of a profile lies than the first.
+
+    Parameters
+    ----------
+    profile : Profile
+        From :func:`take_profile`.
+    first_mm, second_mm : (float, float)
+        Two ranges of `along_mm`; the mean depth of each counts.
+
+    Raises
+    ------
+    InputError
+        If a range holds no point of the map.
+    """
+    first, second = (_within(profile, part, 1) for part in (first_mm, second_mm))
+
+    def compute(depth: Array, stretch: float) -> float:
+        return float(depth[second].mean() - depth[first].mean())
+
+    return measured("step_height", "mm", compute, profile.depth_mm, profile.errors)
+
+
+def width_at(
+    profile: Profile, level_mm: float | None = None, *, between: Point | None = None
+) -> Measured:
+    """Return the distance between the outermost places at which a profile crosses a level.
+
+    Parameters
+    ----------
+    profile : Profile
+        From :func:`take_profile`.
+    level_mm : float, optional
+        A depth; left out, it is half way between the least and the greatest depth.
+    between : (float, float), optional
+        The range of `along_mm` to look at; left out, all of it.
+
+    Raises
+    ------
+    InputError
+        If the range holds no point of the map, or the profile does not cross the level and come
+        back.
+    """
+    left, right, _ = _crossings(profile, level_mm, between)
+
+    def compute(depth: Array, stretch: float) -> float:
+        level = level_mm if level_mm is not None else _half_level(left, depth)
+        return stretch * (right.place(depth, level) - left.place(depth, level))
+
+    return measured("width", "mm", compute, profile.depth_mm, profile.errors)
+
+
+def width_ends(
+    profile: Profile, level_mm: float | None = None, *, between: Point | None = None
+) -> tuple[float, float, float]:
+    """Return the two places (along the profile) that a width lies between, and its level in mm.
+
+    Parameters and errors are those of :func:`width_at`.
+    """
+    left, right, level = _crossings(profile, level_mm, between)
+    return left.place(profile.depth_mm, level), right.place(profile.depth_mm, level), level
+
+
+def slope(profile: Profile, a: float, b: float) -> Measured:
+    """Return how steeply a profile deepens between two places, in degrees.
+
+    Parameters
+    ----------
+    profile : Profile
+        From :func:`take_profile`.
+    a, b : float
+        Ends of a range of `along_mm`; a straight line is fitted to it.
+
+    Raises
+    ------
+    InputError
+        If the range holds fewer than three points of the map.
+    """
+    part = _within(profile, (a, b), 3)
+
+    def compute(depth: Array, stretch: float) -> float:
+        return _slope_deg(profile.along_mm[part], depth[part], stretch)
+
+    return measured("slope", "deg", compute, profile.depth_mm, profile.errors)
+
+
+def angle_between(profile: Profile, first_mm: Point, second_mm: Point) -> Measured:
+    """Return by how many degrees a profile turns from one range to another; 0 when parallel.
+
+    Parameters
+    ----------
+    profile : Profile
+        From :func:`take_profile`.
+    first_mm, second_mm : (float, float)
+        Two ranges of `along_mm`; a straight line is fitted to each.
+
+    Raises
+    ------
+    InputError
+        If a range holds fewer than three points of the map.
+    """
+    first, second = (_within(profile, part, 3) for part in (first_mm, second_mm))
+
+    def compute(depth: Array, stretch: float) -> float:
+        turns = [_slope_deg(profile.along_mm[p], depth[p], stretch) for p in (first, second)]
+        return abs(turns[1] - turns[0])
+
+    return measured("angle", "deg", compute, profile.depth_mm, profile.errors)
+
+
+@dataclass(frozen=True, slots=True)
+class _Crossing:
+    """Where a profile crosses a level, and how that place moves with depths and level."""
+
+    index: int
+    """Of the point before the crossing."""
+    along_mm: float
+    length_mm: float
+    rise_mm: float
+    extremes: tuple[int, int]
+    """Points of least and greatest depth."""
+
+    def place(self, depth: Array, level_mm: float) -> float:
+        """Return the crossing's place, the profile's slope there taken as it was found."""
+        return self.along_mm + (level_mm - float(depth[self.index])) * self.length_mm / self.rise_mm
+
+
+def _half_level(crossing: _Crossing, depth: Array) -> float:
+    return 0.5 * float(depth[crossing.extremes[0]] + depth[crossing.extremes[1]])
+
+
+def _crossings(
+    profile: Profile, level_mm: float | None, between: Point | None
+) -> tuple[_Crossing, _Crossing, float]:
+    """Return the outermost crossings and the level."""
+    whole = (float(profile.along_mm[0]), float(profile.along_mm[-1]))
+    points = np.flatnonzero(_within(profile, between or whole, 3))
+    depth, along = profile.depth_mm[points], profile.along_mm[points]
+    extremes = (int(points[depth.argmin()]), int(points[depth.argmax()]))
+    level = 0.5 * float(depth.min() + depth.max()) if level_mm is None else level_mm
+    above = depth > level
+    places = np.flatnonzero(above[1:] != above[:-1])
+    if places.size < 2 or above[0] != above[-1]:
+        raise InputError(
+            tr("the profile does not cross {level:.4f} mm and come back").format(level=level),
+            where=tr("width of a profile"),
+            advice=tr("Choose another level, or a range that begins and ends beside the object"),
+        )
+    found = [
+        _Crossing(
+            int(points[k]),
+            float(along[k]),
+            float(along[k + 1] - along[k]),
+            float(depth[k + 1] - depth[k]),
+            extremes,
+        )
+        for k in (places[0], places[-1])
+    ]
+    return found[0], found[1], level
+
+
+def _within(profile: Profile, part_mm: Point, least: int) -> Mask:
+    """Return which points lie in a range and on the map."""
+    low, high = sorted(part_mm)
+    along = profile.along_mm
+    part = (along >= low) & (along <= high) & np.isfinite(profile.depth_mm)
+    if int(part.sum()) < least:
+        raise InputError(
+            tr("the range from {low:g} to {high:g} mm holds too few points of the map").format(
+                low=low, high=high
+            ),
+            where=tr("profile of {length:.2f} mm").format(length=along[-1]),
+            advice=tr("Choose a longer range inside the working area"),
+        )
+    return np.asarray(part)
+
+
+def _slope_deg(along: Array, depth: Array, stretch: float) -> float:
+    centred = stretch * (along - along.mean())
+    return math.degrees(math.atan(float(centred @ depth) / float(centred @ centred)))

@@ -1,0 +1,114 @@
+"""Tools that read a section: step, width and angle between parts of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.profile import (
+    Profile,
+    angle_between,
+    step_height,
+    take_profile,
+    width_at,
+    width_ends,
+)
+from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
+from gelpolight_core.reconstruction.heightmap import HeightMap
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileStep:
+    """The step between two ranges of a profile.
+
+    Attributes
+    ----------
+    start_mm, end_mm, width_mm
+        The profile, as in :func:`~gelpolight_core.measurement.profile.take_profile`.
+    first_mm, second_mm : (float, float)
+        Ranges along it.
+    """
+
+    name: ClassVar[str] = "profile-step"
+    start_mm: Point
+    end_mm: Point
+    first_mm: Point
+    second_mm: Point
+    width_mm: float = 0.0
+
+    def apply(self, heightmap: HeightMap) -> ToolResult:
+        """Measure."""
+        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        figure = step_height(profile, first_mm=self.first_mm, second_mm=self.second_mm)
+        return _profile_result(self, profile, (figure,), (self.first_mm, self.second_mm))
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileWidth:
+    """The width of what a profile crosses, at a level.
+
+    Attributes
+    ----------
+    start_mm, end_mm, width_mm
+        The profile, as in :func:`~gelpolight_core.measurement.profile.take_profile`.
+    level_mm : float or None
+        The depth at which it is measured; None: half way between least and greatest depth.
+    between_mm : (float, float) or None
+        The range along the profile; None: all of it.
+    """
+
+    name: ClassVar[str] = "profile-width"
+    start_mm: Point
+    end_mm: Point
+    width_mm: float = 0.0
+    level_mm: float | None = None
+    between_mm: Point | None = None
+
+    def apply(self, heightmap: HeightMap) -> ToolResult:
+        """Measure."""
+        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        figure = width_at(profile, self.level_mm, between=self.between_mm)
+        left, right, level = width_ends(profile, self.level_mm, between=self.between_mm)
+        figures = (figure, Measured(level, None, "mm", "level"))
+        return _profile_result(self, profile, figures, ((left, right),))
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileAngle:
+    """By how much a profile turns from one range to another.
+
+    Attributes
+    ----------
+    start_mm, end_mm, width_mm
+        The profile, as in :func:`~gelpolight_core.measurement.profile.take_profile`.
+    first_mm, second_mm : (float, float)
+        Ranges along it; a straight line is fitted to each.
+    """
+
+    name: ClassVar[str] = "profile-angle"
+    start_mm: Point
+    end_mm: Point
+    first_mm: Point
+    second_mm: Point
+    width_mm: float = 0.0
+
+    def apply(self, heightmap: HeightMap) -> ToolResult:
+        """Measure."""
+        profile = take_profile(heightmap, self.start_mm, self.end_mm, width_mm=self.width_mm)
+        figure = angle_between(profile, self.first_mm, self.second_mm)
+        return _profile_result(self, profile, (figure,), (self.first_mm, self.second_mm))
+
+
+def _profile_result(
+    tool: Tool, profile: Profile, figures: tuple[Measured, ...], parts: tuple[Point, ...]
+) -> ToolResult:
+    """Return a result drawn as the line, and the parts of it that count."""
+    start, end = np.array(profile.start_mm), np.array(profile.end_mm)
+    length = float(profile.along_mm[-1])
+    lines = [np.stack([start, end])]
+    lines += [start + np.array(part)[:, None] / length * (end - start) for part in parts]
+    there = np.isfinite(profile.depth_mm)
+    return tool_result(tool, figures, tuple(lines), profile.flags[there], profile=profile)

@@ -1,0 +1,110 @@
+"""Which known indenter is pressed: ball, cylinder or cuboid, or none of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gelpolight_core.measurement.doubt import BETTER_SHAPE, POOR_RESIDUAL
+from gelpolight_core.measurement.fit import fit_indenter
+from gelpolight_core.measurement.indenter import MODELS
+from gelpolight_core.measurement.measure import OUTSIDE_FLAG, find_object
+from gelpolight_core.measurement.segmentation import PressedRegion, find_pressed_regions
+from gelpolight_core.reconstruction.heightmap import HeightMap
+
+UNCLEAR = "unclear"
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """What is pressed, as far as the depth map tells.
+
+    Attributes
+    ----------
+    shape : str
+        ``ball``, ``cylinder`` or ``cuboid``; ``unclear`` where the best two are alike.
+    candidates : tuple of str
+        The shapes that come into question, the best first: one, or the two that are alike.
+    at_mm : (float, float)
+        Where it is, (x, y): the centroid of its upper half.
+    height_mm : float
+        How high it stands, roughly.
+    residual_mm : mapping of str to float
+        What each shape leaves unexplained, root mean square.
+    """
+
+    shape: str
+    candidates: tuple[str, ...]
+    at_mm: tuple[float, float]
+    height_mm: float
+    residual_mm: Mapping[str, float]
+
+
+def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None) -> Proposal | None:
+    """Say which indenter is pressed; None where nothing is, or none of the three.
+
+    All three are fitted with their drape. The best one counts when it leaves no more than 6 % of
+    the height, and less than three quarters of what the next one leaves; the limits are those by
+    which a measurement is called doubtful.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The map.
+    seed_mm : (float, float), optional
+        A point on the object; left out, the tallest object counts.
+
+    Raises
+    ------
+    InputError
+        If a seed is given and no object is there, or nothing of the map is usable.
+    """
+    region = _tallest(heightmap)
+    if region is None or (seed_mm is None and region.cut):
+        return None
+    found = find_object(
+        heightmap.depth_mm,
+        heightmap.x_mm,
+        heightmap.y_mm,
+        seed_mm=seed_mm or _point_on(region, heightmap),
+        flags=heightmap.flags,
+    )
+    residual = {
+        shape: fit_indenter(
+            model, found.window, model.start(found.region), edge=found.edge, most_rounds=1
+        ).residual_rms_mm
+        for shape, model in MODELS.items()
+    }
+    best, second, _ = sorted(residual, key=lambda shape: residual[shape])
+    height = found.region.height_mm
+    if residual[best] > POOR_RESIDUAL * height:
+        return None
+    alike = residual[best] > BETTER_SHAPE * residual[second]
+    return Proposal(
+        UNCLEAR if alike else best,
+        (best, second) if alike else (best,),
+        found.region.centre_mm,
+        height,
+        residual,
+    )
+
+
+def _tallest(heightmap: HeightMap) -> PressedRegion | None:
+    """Return the tallest object, cut by the border or not."""
+    depth = heightmap.depth_mm.astype(np.float64)
+    valid = np.isfinite(depth) & ((heightmap.flags & OUTSIDE_FLAG) == 0)
+    if not valid.any():
+        return None
+    x, y = (np.asarray(axis, np.float64) for axis in (heightmap.x_mm, heightmap.y_mm))
+    regions = find_pressed_regions(np.where(valid, depth, 0.0), x, y, valid)
+    return regions[0] if regions else None
+
+
+def _point_on(region: PressedRegion, heightmap: HeightMap) -> tuple[float, float]:
+    """Return the point of an object's upper half that is nearest to its centroid."""
+    rows, columns = np.nonzero(region.core)
+    x, y = heightmap.x_mm[columns], heightmap.y_mm[rows]
+    nearest = int(np.hypot(x - region.centre_mm[0], y - region.centre_mm[1]).argmin())
+    return float(x[nearest]), float(y[nearest])

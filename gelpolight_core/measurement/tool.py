@@ -1,0 +1,111 @@
+"""What all measuring tools share: frozen geometry in mm that is applied to a height map.
+
+A tool and a height map give one result, wherever they come from: the screen, a stored file or the
+command line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.profile import Profile
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.uint8]
+Point = tuple[float, float]
+
+UNKNOWN = int(Flag.SATURATED | Flag.NOT_OBSERVABLE | Flag.INVALID)
+"""Flags of places whose depth is a guess. Walls lie in the shadow of a light, which the model knows
+how to do without."""
+FLAGGED_SHARE = 0.1
+"""Share of such places from which a result is called doubtful."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToolResult:
+    """What a tool says of a height map.
+
+    Attributes
+    ----------
+    tool : Tool
+        The tool.
+    figures : tuple of Measured
+        What was measured, the most important first.
+    drawing_mm : tuple of (N, 2) arrays
+        Lines (x, y) to be drawn over the map.
+    verdict : str
+        ``ok`` or ``doubtful``.
+    reason : str
+        Why doubtful; empty when ok.
+    measurement : Measurement or None
+        The whole fit, of a fitted indenter.
+    profile : Profile or None
+        The section that was read, where the tool reads one.
+    """
+
+    tool: Tool
+    figures: tuple[Measured, ...]
+    drawing_mm: tuple[Array, ...]
+    verdict: str = "ok"
+    reason: str = ""
+    measurement: Measurement | None = None
+    profile: Profile | None = None
+
+    def __getitem__(self, name: str) -> Measured:
+        """Return the figure of that name."""
+        for figure in self.figures:
+            if figure.name == name:
+                return figure
+        raise KeyError(name)
+
+
+class Tool(Protocol):
+    """Geometry that can be applied to a height map."""
+
+    name: ClassVar[str]
+
+    def apply(self, heightmap: HeightMap) -> ToolResult:
+        """Measure.
+
+        Raises
+        ------
+        InputError
+            Where the map has nothing to measure there.
+        """
+        ...
+
+
+def tool_result(
+    tool: Tool,
+    figures: tuple[Measured, ...],
+    drawing: tuple[Array, ...],
+    flags: Flags,
+    profile: Profile | None = None,
+) -> ToolResult:
+    """Return a result; doubtful where much of what it rests on is flagged.
+
+    Parameters
+    ----------
+    tool, figures, drawing, profile
+        As in :class:`ToolResult`.
+    flags : (N,) uint8
+        Of all places that the figures rest on.
+    """
+    flagged = (flags & UNKNOWN) != 0
+    share = float(np.mean(flagged)) if flagged.size else 0.0
+    reason = ""
+    if share > FLAGGED_SHARE:
+        names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
+        reason = tr("{percent:.0f} % of the places are flagged ({names})").format(
+            percent=100.0 * share, names=", ".join(names)
+        )
+    verdict = "doubtful" if reason else "ok"
+    return ToolResult(tool, figures, drawing, verdict, reason, profile=profile)
