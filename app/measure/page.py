@@ -1,0 +1,110 @@
+"""The Measure page: measure what is pressed, and what was measured before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
+
+from app.inspect.first_calibration import calibrate_virtual_sensor
+from app.measure.desk import PICTURES, RECORDING, Desk
+from app.shell.context import AppContext
+from app.shell.dropping import dropped_paths
+from app.shell.jobs import Job, Jobs
+from app.widgets.naming import named
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+
+class MeasurePage(QWidget):
+    """Tools on the height map, the lab's records, and the evaluation protocol.
+
+    Parameters
+    ----------
+    context : AppContext
+        The program's.
+    """
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "measure", tr("Measure"))
+        self.setAcceptDrops(True)
+        self.context = context
+        self.jobs = Jobs("measure-jobs", self)
+        self.desk = Desk(self.jobs, context=context)
+        self.tabs = named(QTabWidget(), "measure.tabs", tr("Parts of this page"))
+        self.tabs.setDocumentMode(True)
+        self.tabs.addTab(self.desk, tr("Measure"))
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.tabs)
+        self.desk.calibrate_wanted.connect(self.calibrate_now)
+        self.jobs.progressed.connect(self.desk.banner.show_work)
+        self.jobs.refused.connect(lambda text: context.toasts.show(text, "warn"))
+        self.desk.banner.stop_wanted.connect(self.jobs.cancel)
+
+    # What the window asks of a page
+
+    def enter(self) -> None:
+        """Look at the source."""
+        self.desk.enter()
+
+    def leave(self) -> None:
+        """Let the source go."""
+        self.desk.leave()
+
+    def may_close(self) -> bool:
+        """Everything that was kept is on disk."""
+        self.desk.close_work()
+        self.jobs.close()
+        return True
+
+    def open_path(self, path: Path) -> None:
+        """Measure on a picture, or play a recording.
+
+        Raises
+        ------
+        InputError
+            If it is neither.
+        """
+        self.tabs.setCurrentWidget(self.desk)
+        self.desk.open_file(path)
+
+    def begin_demo(self) -> None:
+        """Measure on the virtual sensor."""
+        self.context.source.choose_virtual_sensor()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Take pictures and recordings; all else is the window's."""
+        paths = dropped_paths(event.mimeData())
+        if any(path.suffix.lower() in (*PICTURES, RECORDING) for path in paths):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open the first of them."""
+        paths = dropped_paths(event.mimeData())
+        wanted = [path for path in paths if path.suffix.lower() in (*PICTURES, RECORDING)]
+        try:
+            self.open_path(wanted[0])
+        except InputError as error:
+            self.context.toasts.show(str(error), "fail")
+        event.acceptProposedAction()
+
+    def calibrate_now(self) -> None:
+        """Calibrate the virtual sensor, so that there is something to measure with."""
+        bench, workspace = self.context.source.bench, self.context.workspace
+        if bench is None or self.jobs.busy:
+            return
+
+        def done(_path: Path) -> None:
+            self.context.toasts.show(tr("The virtual sensor is calibrated."), "pass")
+            self.context.requests.calibrations_changed.emit()
+
+        self.jobs.submit(
+            Job(
+                tr("Calibrating the virtual sensor"),
+                lambda tell: calibrate_virtual_sensor(bench.design, workspace, tell),
+                done,
+            )
+        )
