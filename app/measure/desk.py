@@ -181,7 +181,7 @@ class Desk(QMainWindow):
         panel.tool_chosen.connect(self.work.choose)
         panel.remove_wanted.connect(lambda: self.work.remove(self.work.chosen))
         panel.keep_wanted.connect(self.keep)
-        panel.truth.changed.connect(self._judge)
+        panel.truth.changed.connect(self.judge_again)
         panel.truth.indenters_wanted.connect(self.indenters_wanted)
         panel.truth.limits_wanted.connect(self.limits_wanted)
 
@@ -323,7 +323,8 @@ class Desk(QMainWindow):
             return ()
         return judge(result, self.panel.truth.stated, self.context.settings.limits)
 
-    def _judge(self) -> None:
+    def judge_again(self) -> None:
+        """Compare with the truth again: it, the result or the limits are others."""
         try:
             rows = self.judged()
         except InputError as error:
@@ -336,7 +337,7 @@ class Desk(QMainWindow):
         self.panel.show_work(self.work, known=known)
         self.map.tools.allow(known)
         self.hold_action.setEnabled(self.work.taken is not None or self._can_hold)
-        self._judge()
+        self.judge_again()
         self._advise()
 
     @property

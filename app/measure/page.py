@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 
 from app.inspect.first_calibration import calibrate_virtual_sensor
 from app.measure.desk import PICTURES, RECORDING, Desk
+from app.measure.indenters_dialog import IndentersDialog
+from app.measure.limits_dialog import LimitsDialog
 from app.shell.context import AppContext
 from app.shell.dropping import dropped_paths
 from app.shell.jobs import Job, Jobs
+from app.shell.settings import Limits
 from app.widgets.naming import named
+from app.workspace.indenters import Indenter, read_indenters, write_indenters
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -35,11 +40,14 @@ class MeasurePage(QWidget):
         self.desk = Desk(self.jobs, context=context)
         self.tabs = named(QTabWidget(), "measure.tabs", tr("Parts of this page"))
         self.tabs.setDocumentMode(True)
+        self.tabs.tabBar().setDrawBase(False)
         self.tabs.addTab(self.desk, tr("Measure"))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.tabs)
         self.desk.calibrate_wanted.connect(self.calibrate_now)
+        self.desk.indenters_wanted.connect(self.edit_indenters)
+        self.desk.limits_wanted.connect(self.edit_limits)
         self.jobs.progressed.connect(self.desk.banner.show_work)
         self.jobs.refused.connect(lambda text: context.toasts.show(text, "warn"))
         self.desk.banner.stop_wanted.connect(self.jobs.cancel)
@@ -48,6 +56,7 @@ class MeasurePage(QWidget):
 
     def enter(self) -> None:
         """Look at the source."""
+        self._read_indenters()
         self.desk.enter()
 
     def leave(self) -> None:
@@ -90,6 +99,42 @@ class MeasurePage(QWidget):
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
         event.acceptProposedAction()
+
+    # Lists and limits
+
+    def _read_indenters(self) -> tuple[Indenter, ...]:
+        try:
+            known = read_indenters(self.context.workspace.folder)
+        except InputError as error:
+            self.context.toasts.show(str(error), "fail")
+            known = ()
+        self.desk.panel.truth.show_indenters(known)
+        return known
+
+    def edit_indenters(self) -> None:
+        """Edit the known indenters."""
+        dialog = IndentersDialog(self._read_indenters(), self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.accepted.connect(lambda: self._keep_indenters(dialog.indenters))
+        dialog.open()
+
+    def _keep_indenters(self, indenters: tuple[Indenter, ...]) -> None:
+        try:
+            write_indenters(indenters, self.context.workspace.folder)
+        except InputError as error:
+            self.context.toasts.show(str(error), "fail")
+        self._read_indenters()
+
+    def edit_limits(self) -> None:
+        """Edit up to which error a measurement passes."""
+        dialog = LimitsDialog(self.context.settings.limits, self)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.accepted.connect(lambda: self._keep_limits(dialog.limits))
+        dialog.open()
+
+    def _keep_limits(self, limits: Limits) -> None:
+        self.context.settings.limits = limits
+        self.desk.judge_again()
 
     def calibrate_now(self) -> None:
         """Calibrate the virtual sensor, so that there is something to measure with."""

@@ -167,9 +167,10 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
             colour = QColor(COLOURS["chosen" if tool.key == self._key else tool.state])
             for line in tool.lines:
                 _stroke(painter, to_screen.map(QPolygonF([QPointF(*p) for p in line])), colour)
+        taken: list[QRectF] = []
         for tool in self._tools:
             if tool.text:
-                _paint_text(painter, tool, to_screen)
+                taken.append(_paint_text(painter, tool, to_screen, taken))
         for grip in self._grips:
             self._paint_grip(painter, to_screen.map(QPointF(*grip.at_mm)), grip.name == self._grip)
         for place in self._begun:
@@ -191,24 +192,27 @@ def _stroke(painter: QPainter, line: QPolygonF, colour: QColor) -> None:
         painter.drawPolyline(line)
 
 
-def _paint_text(painter: QPainter, tool: DrawnTool, to_screen: QTransform) -> None:
-    """Write a tool's figure beside its upper right, within the view."""
+def _paint_text(
+    painter: QPainter, tool: DrawnTool, to_screen: QTransform, taken: list[QRectF]
+) -> QRectF:
+    """Write a tool's figure beside its upper right, below those that are there; return where."""
     points = [to_screen.map(QPointF(*p)) for line in tool.lines for p in line]
-    if not points:
-        return
     metrics = QFontMetricsF(painter.font())
     width, height = metrics.horizontalAdvance(tool.text) + 10.0, metrics.height() + 4.0
     view = QRectF(painter.window())
-    left = max(p.x() for p in points) + 10.0
-    top = min(p.y() for p in points) - height
+    left = max((p.x() for p in points), default=0.0) + 10.0
+    top = min((p.y() for p in points), default=0.0) - height
     left = min(max(left, 0.0), max(view.right() - width, 0.0))
-    top = min(max(top, 0.0), max(view.bottom() - height, 0.0))
-    plate = QRectF(left, top, width, height)
+    plate = QRectF(left, min(max(top, 0.0), max(view.bottom() - height, 0.0)), width, height)
+    for other in sorted(taken, key=lambda place: place.top()):
+        if plate.intersects(other):
+            plate.moveTop(other.bottom() + 2.0)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(PLATE)
     painter.drawRoundedRect(plate, 3.0, 3.0)
     painter.setPen(QColor(COLOURS[tool.state]))
     painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, tool.text)
+    return plate
 
 
 def _distance(at: Point, line: tuple[Point, ...]) -> float:

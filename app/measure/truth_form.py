@@ -132,7 +132,7 @@ class TruthForm(QGroupBox):
             self._show(self._kept.get(kind, Stated()))
         self.setEnabled(bool(kind))
         self.size_on.setText(label[:1].upper() + label[1:] if label else tr("Size"))
-        self.size.setSuffix(f" {UNITS.get(unit, unit)}")
+        self.size.setSuffix(UNITS.get(unit, unit))
         self.known.setVisible(self._is_indenter)
         self._form.setRowVisible(self.height_on, self._is_indenter)
 
@@ -200,14 +200,13 @@ class TruthForm(QGroupBox):
 
 def _sentence(row: Judged) -> str:
     role = "pass" if row.passed else "fail"
-    unit = UNITS.get(row.unit, row.unit)
     return tr(
-        "{label}: {error:+.3f} {unit}, <b style='color:{colour}'>{percent:+.2f} %: {word}"
+        "{label}: {error:+.3f}{unit}, <b style='color:{colour}'>{percent:+.2f} %: {word}"
         " {limit:g} %</b>"
     ).format(
         label=row.label[:1].upper() + row.label[1:],
         error=row.error,
-        unit=unit,
+        unit=UNITS.get(row.unit, row.unit),
         colour=theme.colour(role).name(),
         percent=row.error_percent,
         word=tr("within") if row.passed else tr("beyond"),
@@ -220,5 +219,6 @@ def _spin(name: str, accessible: str, value: float) -> QDoubleSpinBox:
     box.setDecimals(3)
     box.setRange(0.001, 500.0)
     box.setSingleStep(0.1)
+    box.setSuffix(UNITS["mm"])
     box.setValue(value)
     return box
