@@ -82,6 +82,7 @@ def run(arguments: Sequence[str] = ()) -> int:
         ended = join_left_behind(LAST_JOIN_S)
     finally:
         faults.uninstall()
+        context.workspace.close()
         context.log.stop()
     if not ended:
         sys.stdout.flush()

@@ -50,6 +50,7 @@ def build_parser() -> argparse.ArgumentParser:
         measure,
         profile,
         reconstruct,
+        records,
         report,
         simulate,
     )
@@ -76,6 +77,7 @@ def build_parser() -> argparse.ArgumentParser:
         profile,
         evaluate,
         drift,
+        records,
         report,
         benchmark,
         ablation,

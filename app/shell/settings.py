@@ -8,6 +8,8 @@ from pathlib import Path
 import platformdirs
 from PySide6.QtCore import QByteArray, QSettings
 
+from app.workspace.workspace import default_folder
+
 APPLICATION = "gelpolight"
 THEMES = ("system", "light", "dark")
 RECENT = 8
@@ -55,7 +57,7 @@ class Settings:
     def workspace_folder(self) -> Path:
         """Where sensors are kept."""
         chosen = self._text("workspace")
-        return Path(chosen) if chosen else platformdirs.user_documents_path() / "GelPoLight"
+        return Path(chosen) if chosen else default_folder()
 
     @workspace_folder.setter
     def workspace_folder(self, folder: Path) -> None:

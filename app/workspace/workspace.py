@@ -5,6 +5,8 @@
     workspace.json                       which calibration is in use
     sensors/SERIAL/NAME.gplcal           calibrations, and NAME.validation.json beside them
     sensors/SERIAL/sessions/NAME/        session folders
+    sensors/SERIAL/recordings/TIME.gplrec
+    records.sqlite                       what was measured
     trash/TIME-NUMBER/                   what was removed, with its old place
 """
 
@@ -20,12 +22,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO
 
+import platformdirs
+
 from app.workspace.entries import Entry, read_entry
 from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
+from gelpolight_core.records.records import NAME as RECORDS
+from gelpolight_core.records.records import Records
 from gelpolight_core.translation import tr
 
 ENDING = ".gplcal"
@@ -63,6 +70,29 @@ class Workspace:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._records: Records | None = None
+
+    @property
+    def records(self) -> Records:
+        """What was measured; opened when it is first asked for, begun where there is none.
+
+        Raises
+        ------
+        InputError
+            If it cannot be opened or made.
+        """
+        path = self.folder / RECORDS
+        if self._records is None or self._records.path != path:
+            self.close()
+            make_folder(self.folder)
+            self._records = Records.open(path)
+        return self._records
+
+    def close(self) -> None:
+        """Let the records go; they are opened again when they are asked for."""
+        records, self._records = self._records, None
+        if records is not None:
+            records.close()
 
     @property
     def sensors_folder(self) -> Path:
@@ -76,6 +106,17 @@ class Workspace:
     def sessions_folder(self, serial: str) -> Path:
         """Return where the sessions of a sensor are kept."""
         return self.sensor_folder(serial) / "sessions"
+
+    def recordings_folder(self, serial: str) -> Path:
+        """Return where the recordings of a sensor are kept."""
+        return self.sensor_folder(serial) / "recordings"
+
+    def recording_path(self, serial: str) -> Path:
+        """Return a place for a new recording, named after the time; its folder is made."""
+        folder = self.recordings_folder(serial)
+        make_folder(folder)
+        stamp = datetime.now().astimezone().strftime("%Y-%m-%d_%H-%M-%S")
+        return _free(folder / f"{stamp}{RECORDING_ENDING}")
 
     def calibration_path(self, serial: str, name: str) -> Path:
         """Return a place for a new calibration that no other file has; its folder is made."""
@@ -228,6 +269,11 @@ class Workspace:
                 where=str(path),
                 advice=tr("Import it first"),
             )
+
+
+def default_folder() -> Path:
+    """Return where the workspace is unless the person chose another place."""
+    return platformdirs.user_documents_path() / "GelPoLight"
 
 
 def folder_name(text: str) -> str:

@@ -58,6 +58,7 @@ def context(qapp: QApplication, tmp_path: Path) -> Iterator[AppContext]:
     made.log.start()
     yield made
     made.toasts.clear()
+    made.workspace.close()
     made.log.stop()
     assert logging.getLogger().handlers.count(made.log.recent) == 0
 

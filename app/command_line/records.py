@@ -1,0 +1,83 @@
+"""``gelpolight records``: what was measured with the lab's sensors."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from app.workspace.workspace import default_folder
+from gelpolight_core.errors import InputError
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.translation import tr
+
+_LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser("records", help=tr("list what was measured, or write it as CSV"))
+    parser.add_argument(
+        "--workspace",
+        type=Path,
+        default=default_folder(),
+        metavar="DIR",
+        help=tr("the folder of the sensors (default: {folder})").format(folder=default_folder()),
+    )
+    parser.add_argument("--sensor", metavar="SERIAL", help=tr("only what this sensor measured"))
+    parser.add_argument("--csv", type=Path, metavar="FILE", help=tr("also write a table"))
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print a table, and write one."""
+    path = options.workspace / NAME
+    if not path.is_file():
+        raise InputError(
+            tr("there are no records"),
+            where=str(path),
+            advice=tr(
+                "Name the folder of the sensors with --workspace, or measure something first"
+            ),
+        )
+    with Records.open(path) as records:
+        if records.notice:
+            print(records.notice, file=sys.stderr)
+        found = records.measurements(options.sensor)
+        print("\n".join(table_lines(found)))
+        if options.csv is not None:
+            records.export_csv(options.csv, options.sensor)
+    return 0
+
+
+def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
+    """Return the measurements as lines of text, one for each measured value."""
+    head = _LINE.format(
+        "id", tr("time (UTC)"), tr("sensor"), tr("shape"), tr("quantity"), tr("measured"),
+        "sd", tr("true"), tr("error %"), tr("verdict"), tr("note"),
+    )  # fmt: skip
+    lines = [head]
+    for record in records:
+        for quantity in record.quantities:
+            lines.append(_line(record, quantity))
+    return [line.rstrip() for line in lines]
+
+
+def _line(record: MeasurementRecord, quantity: Quantity) -> str:
+    first = quantity is record.quantities[0]
+    error = quantity.error_percent
+    return _LINE.format(
+        record.id if first else "",
+        f"{record.time:%Y-%m-%d %H:%M}" if first else "",
+        record.serial if first else "",
+        record.shape if first else "",
+        quantity.name,
+        f"{quantity.value:.4f}",
+        "" if quantity.sd is None else f"{quantity.sd:.4f}",
+        "" if quantity.truth is None else f"{quantity.truth:.4f}",
+        "" if error is None else f"{error:+.2f}",
+        record.verdict if first else "",
+        record.note.replace("\n", " ") if first else "",
+    )

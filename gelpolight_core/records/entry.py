@@ -1,0 +1,199 @@
+"""One line of the lab's records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from gelpolight_core.measurement.result import Comparison, Measurement
+
+PASSED, FAILED, DOUBTFUL, UNJUDGED = "pass", "fail", "doubtful", ""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One measured value.
+
+    Attributes
+    ----------
+    name : str
+        With its unit, such as ``diameter_mm``, ``height_mm`` or ``angle_deg``.
+    value : float
+        As measured.
+    sd : float or None
+        Its standard deviation, where that is known.
+    truth : float or None
+        The true value, where that is known.
+    limit_percent : float or None
+        Largest error that passes, in percent of the truth.
+    """
+
+    name: str
+    value: float
+    sd: float | None = None
+    truth: float | None = None
+    limit_percent: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no number, and a truth without size."""
+        given = (self.value, self.sd, self.truth, self.limit_percent)
+        if not all(number is None or math.isfinite(number) for number in given):
+            raise ValueError(f"{self.name} holds a number that is not finite: {given}")
+        if self.truth == 0.0:
+            raise ValueError(f"{self.name} has a truth of 0")
+
+    @property
+    def error(self) -> float | None:
+        """Measured minus true, in the quantity's unit."""
+        return None if self.truth is None else self.value - self.truth
+
+    @property
+    def error_percent(self) -> float | None:
+        """The error in percent of the truth."""
+        return None if self.truth is None else 100.0 * (self.value / self.truth - 1.0)
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the error is within the limit; None without truth or limit."""
+        if self.error_percent is None or self.limit_percent is None:
+            return None
+        return abs(self.error_percent) <= self.limit_percent
+
+
+@dataclass(frozen=True, slots=True)
+class MeasurementRecord:
+    """A measurement as it is kept.
+
+    Attributes
+    ----------
+    serial, calibration_id : str
+        Sensor and calibration.
+    shape : str
+        Tool or shape: ``cylinder``, ``cuboid``, ``ball``, ``distance``, ``step_height``, ...
+    quantities : tuple of Quantity
+        What was measured; at least one.
+    verdict : str
+        ``pass``, ``fail``, ``doubtful``, or empty where nothing was to be judged.
+    reason : str
+        Why doubtful.
+    settings : mapping
+        Model, camera and tool settings; plain values.
+    details : mapping
+        Everything else that the measurement says, as ``measure --json`` writes it.
+    operator : str
+        Who measured.
+    time : datetime
+        When, in UTC.
+    picture : str
+        The picture or recording, with the frame where it is one of several.
+    note : str
+        What the person wrote.
+    id : int or None
+        In the database; None before it is there.
+    """
+
+    serial: str
+    calibration_id: str
+    shape: str
+    quantities: tuple[Quantity, ...]
+    verdict: str = UNJUDGED
+    reason: str = ""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+    operator: str = ""
+    time: datetime = field(default_factory=lambda: datetime.now(UTC))
+    picture: str = ""
+    note: str = ""
+    id: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a measurement of nothing, of no sensor, or at a time without zone."""
+        names = [quantity.name for quantity in self.quantities]
+        if not names or len(set(names)) != len(names):
+            raise ValueError(f"a measurement has quantities of different names, not {names}")
+        if not self.serial:
+            raise ValueError("a measurement is of a sensor")
+        if self.time.tzinfo is None:
+            raise ValueError("the time has no zone")
+
+    def quantity(self, name: str) -> Quantity | None:
+        """Return the quantity of a name; None where that was not measured."""
+        return next((q for q in self.quantities if q.name == name), None)
+
+
+def verdict_of(quantities: Sequence[Quantity], *, doubtful: bool = False) -> str:
+    """Return the verdict on a measurement: the worst one of its quantities."""
+    if doubtful:
+        return DOUBTFUL
+    judged = [q.passed for q in quantities if q.passed is not None]
+    if not judged:
+        return UNJUDGED
+    return PASSED if all(judged) else FAILED
+
+
+def indenter_record(
+    measurement: Measurement,
+    comparison: Comparison | None = None,
+    *,
+    serial: str,
+    calibration_id: str,
+    size_limit_percent: float,
+    height_limit_percent: float,
+    settings: Mapping[str, Any] | None = None,
+    operator: str = "",
+    picture: str = "",
+    note: str = "",
+) -> MeasurementRecord:
+    """Return what is to be kept of a fitted indenter.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        As fitted; of a cuboid the mean side is kept as ``side_mm``, as its error is judged by it.
+    comparison : Comparison, optional
+        With the truth, where that is known.
+    serial, calibration_id, settings, operator, picture, note
+        As in :class:`MeasurementRecord`.
+    size_limit_percent, height_limit_percent : float
+        Largest errors that pass.
+    """
+    truth = None if comparison is None else comparison.truth
+    size_name = "diameter_mm" if measurement.side_mm is None else "side_mm"
+    quantities = (
+        Quantity(
+            size_name,
+            measurement.size_mm,
+            _finite(measurement.size_sd_mm),
+            None if truth is None else truth.size_mm,
+            size_limit_percent,
+        ),
+        Quantity(
+            "height_mm",
+            measurement.height_mm,
+            _finite(measurement.sd.get("height_mm")),
+            None if truth is None else truth.height_mm,
+            height_limit_percent,
+        ),
+    )
+    return MeasurementRecord(
+        serial=serial,
+        calibration_id=calibration_id,
+        shape=measurement.shape,
+        quantities=quantities,
+        verdict=verdict_of(quantities, doubtful=measurement.verdict != "ok"),
+        reason=measurement.reason,
+        settings=dict(settings or {}),
+        details=measurement.as_json(comparison),
+        operator=operator,
+        picture=picture,
+        note=note,
+    )
+
+
+def _finite(value: Any) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)

@@ -1,0 +1,360 @@
+"""The lab's records: one SQLite database in the workspace.
+
+Every change is one transaction that is on the disk before the call returns (rollback journal,
+``synchronous = EXTRA``), so that neither a killed program nor a power cut loses or halves what was
+acknowledged; not the write-ahead log, which does not work on network disks. Several programs may
+use the file at once: each waits for its turn, for a few seconds. Nothing is ever deleted; what was
+removed is marked so, and can be brought back.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.records.faults import in_plain_words, is_damage
+from gelpolight_core.records.opening import connect, keep_aside
+from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of
+from gelpolight_core.records.statistics import Drift, Statistics, statistics_of
+from gelpolight_core.records.table import write_csv
+from gelpolight_core.translation import tr
+
+NAME = "records.sqlite"
+BUSY_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Measurements of one thing.
+
+    Attributes
+    ----------
+    serial : str
+        The sensor.
+    shape, quantity : str
+        What was measured, and which value of it.
+    truth : float or None
+        Its true value; None for those without.
+    """
+
+    serial: str
+    shape: str
+    quantity: str
+    truth: float | None = None
+
+
+class Records:
+    """The records of a workspace, open; any thread may use them.
+
+    Made by :meth:`open`.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    notice : str
+        What the person should know, as a sentence: that a damaged file was kept aside. Else empty.
+    """
+
+    def __init__(self, path: Path, connection: sqlite3.Connection, notice: str = "") -> None:
+        self.path, self.notice = path, notice
+        self._connection = connection
+        self._lock = threading.RLock()
+
+    @classmethod
+    def open(cls, path: Path, *, busy_s: float = BUSY_S) -> Records:
+        """Open the records, or begin them; a damaged file is kept aside and new ones are begun.
+
+        Parameters
+        ----------
+        path : Path
+            The file; its folder must be there.
+        busy_s : float, optional
+            How long to wait for another program.
+
+        Raises
+        ------
+        InputError
+            If they cannot be opened: another program holds them, the folder cannot be written and
+            holds none, or they are of a newer version.
+        """
+        try:
+            return cls(path, connect(path, busy_s))
+        except sqlite3.Error as error:
+            if not is_damage(error):
+                with in_plain_words(path):
+                    raise
+        aside = keep_aside(path)
+        notice = tr(
+            "The records were damaged. They are kept as {name}, and new ones were begun."
+        ).format(name=aside.name)
+        with in_plain_words(path):
+            return cls(path, connect(path, busy_s), notice)
+
+    def add(self, record: MeasurementRecord) -> int:
+        """Keep a measurement, and return its number; it is on the disk then.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written; nothing of it is kept then.
+        """
+        row = row_of(record)
+        with self._writing() as connection:
+            self._know(connection, record.serial, record.calibration_id)
+            cursor = connection.execute(
+                "INSERT INTO measurements (time, serial, calibration_id, shape, verdict, reason,"
+                " settings, details, operator, picture, note)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                row,
+            )
+            number = cursor.lastrowid
+            connection.executemany(
+                "INSERT INTO quantities VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                [(number, *row) for row in quantity_rows(record)],
+            )
+        assert number is not None
+        return number
+
+    def measurements(
+        self,
+        serial: str | None = None,
+        shape: str | None = None,
+        since: datetime | None = None,
+        *,
+        removed: bool = False,
+    ) -> tuple[MeasurementRecord, ...]:
+        """Return measurements, oldest first.
+
+        Parameters
+        ----------
+        serial, shape : str, optional
+            Only those of this sensor, of this shape.
+        since : datetime, optional
+            Only those of this time or later.
+        removed : bool, optional
+            The removed ones in place of the others.
+
+        Raises
+        ------
+        InputError
+            If they cannot be read.
+        """
+        where, values = [f"m.removed IS {'NOT ' if removed else ''}NULL"], []
+        for column, value in (("m.serial = ?", serial), ("m.shape = ?", shape)):
+            if value is not None:
+                where.append(column)
+                values.append(value)
+        if since is not None:
+            where.append("m.time >= ?")
+            values.append(text_of(since))
+        chosen = " AND ".join(where)
+        with self._reading() as connection:
+            rows = connection.execute(
+                f"SELECT m.* FROM measurements m WHERE {chosen} ORDER BY m.time, m.id", values
+            ).fetchall()
+            parts = connection.execute(
+                "SELECT q.* FROM quantities q JOIN measurements m ON m.id = q.measurement_id"
+                f" WHERE {chosen} ORDER BY q.measurement_id, q.position",
+                values,
+            ).fetchall()
+        try:
+            return records_of(rows, parts)
+        except (ValueError, TypeError, KeyError) as error:
+            raise InputError(
+                tr("the records hold something that no measurement is ({reason})").format(
+                    reason=error
+                ),
+                where=str(self.path),
+                advice=tr("Move the file away, or bring back an older copy of it"),
+            ) from error
+
+    def update_note(self, number: int, note: str) -> None:
+        """Change what the person wrote of a measurement.
+
+        Raises
+        ------
+        InputError
+            If there is no such measurement, or it cannot be written.
+        """
+        self._change(number, "note = ?", note)
+
+    def remove(self, number: int) -> None:
+        """Mark a measurement as removed; :meth:`restore` brings it back.
+
+        Raises
+        ------
+        InputError
+            If there is no such measurement, or it cannot be written.
+        """
+        self._change(number, "removed = ?", text_of(datetime.now(UTC)))
+
+    def restore(self, number: int) -> None:
+        """Bring a removed measurement back; harmless for one that is there.
+
+        Raises
+        ------
+        InputError
+            If there is no such measurement, or it cannot be written.
+        """
+        self._change(number, "removed = ?", None)
+
+    def groups(self, serial: str | None = None) -> tuple[Group, ...]:
+        """Return what was measured, each thing once, in the order of its first measurement."""
+        found = (
+            Group(record.serial, record.shape, quantity.name, quantity.truth)
+            for record in self.measurements(serial)
+            for quantity in record.quantities
+        )
+        return tuple(dict.fromkeys(found))
+
+    def statistics(self, group: Group) -> Statistics:
+        """Return the statistics of the measurements of one thing.
+
+        Raises
+        ------
+        InputError
+            If there are none, or they cannot be read.
+        """
+        records = self.measurements(group.serial, group.shape)
+        found = [record.quantity(group.quantity) for record in records]
+        values = [q.value for q in found if q is not None and q.truth == group.truth]
+        if not values:
+            raise InputError(
+                tr("{quantity} of a {shape} was not measured with this sensor").format(
+                    quantity=group.quantity, shape=group.shape
+                ),
+                where=group.serial,
+                advice=tr("Measure one first"),
+            )
+        return statistics_of(values)
+
+    def drift(self, serial: str, quantity: str | None = None) -> Drift:
+        """Return the errors of a sensor's measurements that have a truth, oldest first.
+
+        Parameters
+        ----------
+        serial : str
+            The sensor.
+        quantity : str, optional
+            Only the errors of this one, such as ``height_mm``.
+        """
+        found = [
+            (record, q, q.error_percent)
+            for record in self.measurements(serial)
+            for q in record.quantities
+            if q.error_percent is not None and quantity in (None, q.name)
+        ]
+        return Drift(
+            times=tuple(record.time for record, _, _ in found),
+            times_s=np.array([record.time.timestamp() for record, _, _ in found], np.float64),
+            error_percent=np.array([error for _, _, error in found], np.float64),
+            quantities=tuple(q.name for _, q, _ in found),
+            shapes=tuple(record.shape for record, _, _ in found),
+            calibration_ids=tuple(record.calibration_id for record, _, _ in found),
+            ids=tuple(record.id or 0 for record, _, _ in found),
+        )
+
+    def export_csv(self, path: Path, serial: str | None = None) -> int:
+        """Write a table with one line per measured value; return how many measurements it holds.
+
+        Raises
+        ------
+        InputError
+            If the records cannot be read or the file cannot be written.
+        """
+        records = self.measurements(serial)
+        write_csv(records, path)
+        return len(records)
+
+    def sensors(self) -> tuple[str, ...]:
+        """Return the serials of all sensors that were measured with."""
+        with self._reading() as connection:
+            rows = connection.execute("SELECT serial FROM sensors ORDER BY serial").fetchall()
+        return tuple(row["serial"] for row in rows)
+
+    def know_calibration(
+        self, identity: str, serial: str, *, model: str = "", made: str = "", verdict: str = ""
+    ) -> None:
+        """Keep what is known of a calibration beside its measurements.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        with self._writing() as connection:
+            self._know(connection, serial, identity)
+            connection.execute(
+                "UPDATE calibrations SET model = ?, made = ?, verdict = ? WHERE id = ?",
+                (model, made, verdict, identity),
+            )
+
+    def close(self) -> None:
+        """Give the file back; harmless when it is closed."""
+        with self._lock:
+            self._connection.close()
+
+    def __enter__(self) -> Records:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the file."""
+        self.close()
+
+    def _change(self, number: int, what: str, value: str | None) -> None:
+        with self._writing() as connection:
+            changed = connection.execute(
+                f"UPDATE measurements SET {what} WHERE id = ?", (value, number)
+            )
+            if changed.rowcount != 1:
+                raise InputError(
+                    tr("there is no measurement {number}").format(number=number),
+                    where=str(self.path),
+                    advice=tr("Read the records again"),
+                )
+
+    def _know(self, connection: sqlite3.Connection, serial: str, calibration_id: str) -> None:
+        now = text_of(datetime.now(UTC))
+        connection.execute("INSERT OR IGNORE INTO sensors VALUES (?, ?)", (serial, now))
+        if calibration_id:
+            connection.execute(
+                "INSERT OR IGNORE INTO calibrations (id, serial, first_seen) VALUES (?, ?, ?)",
+                (calibration_id, serial, now),
+            )
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        with self._lock, in_plain_words(self.path):
+            self._connection.execute("BEGIN")  # one state for all that is read
+            try:
+                yield self._connection
+            finally:
+                self._connection.rollback()
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        with self._lock, in_plain_words(self.path):
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._connection
+                self._connection.execute("COMMIT")
+            except BaseException:
+                self._connection.rollback()
+                raise

@@ -1,0 +1,81 @@
+"""Measurements and the rows of the tables that hold them."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+
+
+def text_of(time: datetime) -> str:
+    """Return a time as text that sorts as times do."""
+    return time.astimezone(UTC).isoformat(timespec="microseconds")
+
+
+def row_of(record: MeasurementRecord) -> tuple[str | None, ...]:
+    """Return a measurement as a row, from its time to its note."""
+    return (
+        text_of(record.time),
+        record.serial,
+        record.calibration_id or None,
+        record.shape,
+        record.verdict,
+        record.reason,
+        json.dumps(dict(record.settings), allow_nan=False),
+        json.dumps(dict(record.details), allow_nan=False),
+        record.operator,
+        record.picture,
+        record.note,
+    )
+
+
+def quantity_rows(record: MeasurementRecord) -> list[tuple[object, ...]]:
+    """Return the measured values as rows, without the measurement's number."""
+    return [
+        (k, q.name, q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent)
+        for k, q in enumerate(record.quantities)
+    ]
+
+
+def records_of(
+    rows: Sequence[sqlite3.Row], parts: Sequence[sqlite3.Row]
+) -> tuple[MeasurementRecord, ...]:
+    """Put measurements together from their rows and those of their values.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError
+        If a row holds no measurement.
+    """
+    quantities: dict[int, list[Quantity]] = {}
+    for part in parts:
+        quantities.setdefault(part["measurement_id"], []).append(_quantity(part))
+    return tuple(_record(row, tuple(quantities.get(row["id"], ()))) for row in rows)
+
+
+def _quantity(row: sqlite3.Row) -> Quantity:
+    return Quantity(row["name"], row["value"], row["sd"], row["truth"], row["limit_percent"])
+
+
+def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRecord:
+    settings: dict[str, Any] = json.loads(row["settings"])
+    details: dict[str, Any] = json.loads(row["details"])
+    return MeasurementRecord(
+        serial=row["serial"],
+        calibration_id=row["calibration_id"] or "",
+        shape=row["shape"],
+        quantities=quantities,
+        verdict=row["verdict"],
+        reason=row["reason"],
+        settings=settings,
+        details=details,
+        operator=row["operator"],
+        time=datetime.fromisoformat(row["time"]),
+        picture=row["picture"],
+        note=row["note"],
+        id=row["id"],
+    )

@@ -1,0 +1,106 @@
+"""The tables of the records, version by version."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+# "GPLR": tells our databases from those of other programs.
+APPLICATION_ID = 0x47504C52
+
+_FIRST = (
+    """CREATE TABLE sensors (
+        serial TEXT PRIMARY KEY,
+        first_seen TEXT NOT NULL
+    )""",
+    """CREATE TABLE calibrations (
+        id TEXT PRIMARY KEY,
+        serial TEXT NOT NULL REFERENCES sensors (serial),
+        first_seen TEXT NOT NULL,
+        model TEXT NOT NULL DEFAULT '',
+        made TEXT NOT NULL DEFAULT '',
+        verdict TEXT NOT NULL DEFAULT ''
+    )""",
+    """CREATE TABLE measurements (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        time TEXT NOT NULL,
+        serial TEXT NOT NULL REFERENCES sensors (serial),
+        calibration_id TEXT REFERENCES calibrations (id),
+        shape TEXT NOT NULL,
+        verdict TEXT NOT NULL,
+        reason TEXT NOT NULL,
+        settings TEXT NOT NULL,
+        details TEXT NOT NULL,
+        operator TEXT NOT NULL,
+        picture TEXT NOT NULL,
+        note TEXT NOT NULL,
+        removed TEXT
+    )""",
+    """CREATE TABLE quantities (
+        measurement_id INTEGER NOT NULL REFERENCES measurements (id),
+        position INTEGER NOT NULL,
+        name TEXT NOT NULL,
+        value REAL NOT NULL,
+        sd REAL,
+        truth REAL,
+        error REAL,
+        error_percent REAL,
+        limit_percent REAL,
+        PRIMARY KEY (measurement_id, name)
+    )""",
+    "CREATE INDEX measurements_by_sensor ON measurements (serial, time)",
+)
+
+MIGRATIONS: tuple[tuple[str, ...], ...] = (_FIRST,)
+"""Statements that lead from each version to the next, from an empty file on."""
+
+
+def bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
+    """Make the tables, or change older ones to what this program knows, wholly or not at all.
+
+    Raises
+    ------
+    InputError
+        If the database is another program's, or of a newer version of this one.
+    sqlite3.Error
+        If it cannot be read or written.
+    """
+    if _version(connection, path) == len(MIGRATIONS):
+        return
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        # Another program may have done it while we waited for our turn.
+        for number in range(_version(connection, path), len(MIGRATIONS)):
+            for statement in MIGRATIONS[number]:
+                connection.execute(statement)
+        connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        connection.execute(f"PRAGMA user_version = {len(MIGRATIONS)}")
+        connection.execute("COMMIT")
+    except BaseException:
+        connection.rollback()
+        raise
+
+
+def _version(connection: sqlite3.Connection, path: Path) -> int:
+    """Return the version of the tables, 0 where there are none."""
+    (owner,) = connection.execute("PRAGMA application_id").fetchone()
+    (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if tables and owner != APPLICATION_ID:
+        raise InputError(
+            tr("this is the database of another program"),
+            where=str(path),
+            advice=tr("Move it away, or choose another folder"),
+        )
+    if version > len(MIGRATIONS):
+        raise InputError(
+            tr("the records have version {a} and this program knows {b}").format(
+                a=version, b=len(MIGRATIONS)
+            ),
+            where=str(path),
+            advice=tr("Open them with a newer version of the program"),
+        )
+    return int(version) if tables else 0

@@ -1,0 +1,48 @@
+"""The records as a table for a spreadsheet: one line per measured value."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.records.entry import MeasurementRecord
+
+COLUMNS = (
+    "id", "time_utc", "sensor", "calibration", "shape", "quantity", "value", "sd", "truth",
+    "error", "error_percent", "limit_percent", "verdict", "reason", "operator", "picture", "note",
+    "settings",
+)  # fmt: skip
+
+
+def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
+    """Return the lines of the table, under :data:`COLUMNS`; None where a value is not known."""
+    return [
+        (
+            r.id, r.time.strftime("%Y-%m-%d %H:%M:%S"), r.serial, r.calibration_id, r.shape,
+            q.name, q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent,
+            r.verdict, r.reason, r.operator, r.picture, r.note,
+            json.dumps(dict(r.settings), ensure_ascii=False) if r.settings else "",
+        )
+        for r in records
+        for q in r.quantities
+    ]  # fmt: skip
+
+
+def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:
+    """Write the table, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(COLUMNS)
+    writer.writerows(rows_of(records))
+    # The mark at the beginning tells spreadsheets that this is UTF-8.
+    write_atomically(path, lambda stream: stream.write(text.getvalue().encode("utf-8-sig")))
