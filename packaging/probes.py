@@ -87,12 +87,12 @@ def resident_mb() -> float:
     return pages * 4096 / 1e6
 
 
-def told(name: str, values: list[float], unit: str) -> str:
-    """Return a line with the median, the 99th percentile and the largest of some values."""
+def told(name: str, values: list[float], unit: str, *, high: int = 99) -> str:
+    """Return a line with the median, a high percentile and the largest of some values."""
     if not values:
         return f"{name}: nothing was measured"
-    middle, high = np.percentile(values, [50, 99])
-    return f"{name}: p50 {middle:.1f}, p99 {high:.1f}, largest {max(values):.1f} {unit}"
+    middle, upper = np.percentile(values, [50, high])
+    return f"{name}: p50 {middle:.1f}, p{high} {upper:.1f}, largest {max(values):.1f} {unit}"
 
 
 class Spent:

@@ -75,7 +75,7 @@ class LiveLink(QObject):
         self._show, self._context = show, context
         self.stream: Stream | None = None
         self.last: Shown | None = None
-        self._page_shown = self._paused = False
+        self._page_shown = self._paused = self._resting = False
         self._sentence = ""
         self._shown_s: deque[float] = deque()
         self._maker = Maker(None)
@@ -129,6 +129,16 @@ class LiveLink(QObject):
             (self.stream.remove_tap if on else self.stream.add_tap)(self._inbox.put)
         self._inbox.box.take()
 
+    def rest(self, on: bool) -> None:
+        """Process nothing for a while; the thread of another has the reconstructor then."""
+        if self.stream is None or on == self._resting:
+            return
+        self._resting = on
+        if on:
+            self._processor.stop()
+        else:
+            self._processor.start()
+
     def enter(self, shown: bool) -> None:
         """Follow the page: whether it is shown."""
         self._page_shown = shown
@@ -158,6 +168,7 @@ class LiveLink(QObject):
         if self.stream is not None:
             self.stream.remove_tap(self._inbox.put)
             self._processor.stop()
+            self._resting = False
             self.stream.stop()
             self.stream = None
         self._inbox.box.take()

@@ -9,19 +9,24 @@ from pathlib import Path
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
+from app.inspect.actions import Deeds
 from app.inspect.banner import Banner
 from app.inspect.first_calibration import calibrate_virtual_sensor
 from app.inspect.library import CalibrationBox, Library
 from app.inspect.link import LiveLink
 from app.inspect.place import PixelPlaces, read_at
 from app.inspect.products import Shown
+from app.inspect.record_control import RecordControl
+from app.inspect.replay_bar import ReplayBar
 from app.inspect.views import Views
+from app.inspect.zero import drift_sentence
 from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
 from app.sources.listing import picture_folders
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
 
 WORDS_MS = 250
@@ -51,7 +56,8 @@ class InspectPage(QWidget):
         self._cursor = (math.nan, math.nan)
         self._places: PixelPlaces | None = None
         self._shown: Shown | None = None
-        self._trouble = ""
+        self._trouble = self._recorded = self._drift = ""
+        self._drift_due = False
         self._lay_out()
         self._connect()
         self.views.restore()
@@ -70,10 +76,24 @@ class InspectPage(QWidget):
             keys=("Space",), icon_name="pause", tip=tr("Let the picture stand, with all detail"),
         )  # fmt: skip
         self.pause_action.setCheckable(True)
-        self.views.bar.insertActions(self.views.bar.actions()[0], [self.pause_action])
+        self.recorder = RecordControl(self.link, self, context=self.context)
+        self.deeds = Deeds(self.link, self.views, self.jobs, self, context=self.context)
+        deeds = self.deeds
+        self.views.bar.insertActions(
+            self.views.bar.actions()[0],
+            [
+                self.pause_action,
+                self.recorder.action,
+                deeds.zero_action,
+                deeds.export_action,
+                deeds.picture_action,
+            ],
+        )
         self.views.add_to_bar(self.box)
+        self.replay = ReplayBar()
         column.addWidget(self.banner)
         column.addWidget(self.views, 1)
+        column.addWidget(self.replay)
         column.addWidget(foot)
 
     def _connect(self) -> None:
@@ -83,7 +103,8 @@ class InspectPage(QWidget):
         self.library.loaded.connect(self._use)
         self.context.source.changed.connect(self._on_source)
         self.link.said.connect(self._on_said)
-        self.link.switched.connect(self.views.follow_source)
+        self.link.switched.connect(self._on_switched)
+        self.recorder.told.connect(self._on_recorded)
         self.jobs.progressed.connect(self.banner.show_work)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self.banner.stop_wanted.connect(self.jobs.cancel)
@@ -105,11 +126,13 @@ class InspectPage(QWidget):
     def leave(self) -> None:
         """Let the source go."""
         self._words.stop()
+        self.recorder.stop()
         self.link.enter(False)
         self.views.keep()
 
     def may_close(self) -> bool:
         """Nothing is lost by closing."""
+        self.recorder.stop()
         self.link.enter(False)
         self.views.keep()
         self.jobs.close()
@@ -117,7 +140,10 @@ class InspectPage(QWidget):
         return True
 
     def open_path(self, path: Path) -> None:
-        """Take a folder of pictures as the camera."""
+        """Take a folder of pictures, or a recording, as the camera."""
+        if path.suffix == ENDING:
+            self.context.source.choose_recording(path)
+            return
         for info in picture_folders([path])():
             self.context.source.choose(info)
 
@@ -138,12 +164,31 @@ class InspectPage(QWidget):
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
+        if self._drift_due and shown.frame.settled and shown.heightmap is not None:
+            self._drift_due = False
+            self._look_for_drift(shown)
         self.views.show_frame(shown, still=self.link.paused)
 
+    def _look_for_drift(self, shown: Shown) -> None:
+        """Warn where the untouched sensor has moved from its calibration."""
+        reconstructor = self.link.reconstructor
+        if reconstructor is None or self.jobs.busy:
+            return
+        calibration, rgb = reconstructor.calibration, shown.frame.rgb
+
+        def tell(sentence: str) -> None:
+            self._drift = sentence
+            self._advise()
+
+        self.jobs.submit(
+            Job(tr("Looking at the background"), lambda _: drift_sentence(rgb, calibration), tell)
+        )
+
     def _use(self, reconstructor: Reconstructor | None) -> None:
-        self._places = None
+        self._places, self._drift, self._drift_due = None, "", True
         if reconstructor is not None:
             self._places = PixelPlaces(reconstructor.calibration.table)
+            self.views.prepare()
         self.link.use(reconstructor)
         self.views.forget()
         self._advise()
@@ -170,7 +215,7 @@ class InspectPage(QWidget):
         return None if heightmap is None else heightmap.depth_mm
 
     def _tell(self) -> None:
-        self._rate.setText(self.link.words())
+        self._rate.setText("    ".join(filter(None, (self._recorded, self.link.words()))))
         heightmap = None if self._shown is None else self._shown.heightmap
         text = tr("Point at a view to read the depth there.")
         if heightmap is None:
@@ -183,8 +228,17 @@ class InspectPage(QWidget):
     # What to do next
 
     def _on_source(self) -> None:
+        self.recorder.stop()
         self.link.open()
         self._advise()
+
+    def _on_switched(self) -> None:
+        self.views.follow_source()
+        self.replay.follow(None if self.link.stream is None else self.link.stream.source)
+
+    def _on_recorded(self, words: str) -> None:
+        self._recorded = words
+        self._tell()
 
     def _on_said(self, sentence: str) -> None:
         self._trouble = sentence
@@ -208,7 +262,8 @@ class InspectPage(QWidget):
         elif self._trouble:
             self.banner.advise(self._trouble, self._mend(), role="fail")
         else:
-            self.banner.advise("")
+            act = ("zero", tr("Set to zero")) if self._drift else ("", "")
+            self.banner.advise(self._drift, act, role="warn")
 
     def _mend(self) -> tuple[str, str]:
         """Return what could help with a picture of another size."""
@@ -237,6 +292,8 @@ class InspectPage(QWidget):
                 self.library.use_what_fits((columns, rows))
             case "reopen":
                 self.link.open()
+            case "zero":
+                self.deeds.zero()
 
     def calibrate_now(self) -> None:
         """Calibrate the virtual sensor, so that there is something to see."""

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.inspect import shading
+from app.inspect.cuts import Cut, Section, cut
 from app.inspect.look import LEAST_RANGE_MM, Look, colour_table
 from app.inspect.surface import Surface, surface_of
 from app.sources.source import Frame
+from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
@@ -43,8 +45,10 @@ class Wanted:
         The views that are shown.
     quality : str
         What the quality view shows: ``flags``, ``uncertainty``, or empty where it is hidden.
-    depth : bool
-        Whether the depth is needed for something else, such as a profile.
+    section : Section or None
+        The line that is measured along.
+    region : Rectangle or None
+        The rectangle whose roughness is measured.
     look : Look
         How.
     still : bool
@@ -56,14 +60,16 @@ class Wanted:
     normals: bool = False
     camera: bool = False
     quality: str = ""
-    depth: bool = False
+    section: Section | None = None
+    region: Rectangle | None = None
     look: Look = field(default_factory=Look)
     still: bool = False
 
     @property
     def needs_depth(self) -> bool:
         """Whether the frame must be reconstructed."""
-        return self.surface or self.height or self.normals or bool(self.quality) or self.depth
+        views = self.surface or self.height or self.normals or bool(self.quality)
+        return views or self.section is not None or self.region is not None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +90,8 @@ class Shown:
         Value at the upper end of the quality picture's colours, mm.
     surface : Surface or None
         For the 3D view.
+    cut : Cut or None
+        What was measured along the line.
     depth_ms, total_ms : float
         Time of the reconstruction, and of everything.
     """
@@ -96,6 +104,7 @@ class Shown:
     quality: NDArray[np.uint8] | None = None
     quality_top: float = 0.0
     surface: Surface | None = None
+    cut: Cut | None = None
     depth_ms: float = 0.0
     total_ms: float = 0.0
 
@@ -133,6 +142,7 @@ class Maker:
             quality=quality,
             quality_top=top,
             surface=surface,
+            cut=None if wanted.section is None else cut(heightmap, wanted.section, wanted.region),
             depth_ms=depth_ms,
             total_ms=1e3 * (time.perf_counter() - began),
         )

@@ -110,7 +110,12 @@ class SurfacePanel(QWidget):
         elif self._flat is not None:
             self._flat.show_picture(surface.texture, surface.extent_mm)
             self._stack.setCurrentWidget(self._flat)
-        elif not self._asked:
+        else:
+            self.load()
+
+    def load(self) -> None:
+        """Load VTK beside the window, once."""
+        if not self._asked:
             self._asked = True
             self._words.setText(tr("Loading the 3D view…"))
             self._jobs.submit(

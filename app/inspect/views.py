@@ -13,12 +13,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.inspect.cuts import Section
 from app.inspect.height_panel import HeightPanel, extent_of
 from app.inspect.look import Look
 from app.inspect.look_panel import LookPanel
 from app.inspect.map_view import MapView
 from app.inspect.products import Shown, Wanted
 from app.inspect.quality_panel import QualityPanel
+from app.inspect.section_line import RegionBox, SectionLine
+from app.inspect.section_panel import SectionPanel
 from app.inspect.surface_panel import SurfacePanel, preset_names
 from app.live.overlay import Marker, Overlay
 from app.live.picture_view import PictureView
@@ -31,7 +34,7 @@ from app.widgets.source_button import SourceButton
 from gelpolight_core.translation import tr
 
 # Raised when views are added, so that an older layout is not forced onto them.
-LAYOUT_VERSION = 1
+LAYOUT_VERSION = 2
 AREAS = Qt.DockWidgetArea
 
 
@@ -64,6 +67,8 @@ class Views(QMainWindow):
         self.normals.say(tr("No depth yet."))
         self.quality = QualityPanel()
         self.camera = PictureView()
+        self.section = SectionPanel()
+        self.line, self.region = SectionLine(self.height.map), RegionBox(self.height.map)
         self.look = LookPanel()
         self._bench = QScrollArea()
         self._bench.setWidgetResizable(True)
@@ -101,8 +106,9 @@ class Views(QMainWindow):
             ("camera", tr("Camera"), self.camera, "Alt+3"),
             ("normals", tr("Normals"), self.normals, "Alt+4"),
             ("quality", tr("Quality"), self.quality, "Alt+5"),
-            ("look", tr("Display"), self.look, "Alt+6"),
-            ("bench", tr("Virtual bench"), self._bench, "Alt+7"),
+            ("section", tr("Cross-section"), self.section, "Alt+6"),
+            ("look", tr("Display"), self.look, "Alt+7"),
+            ("bench", tr("Virtual bench"), self._bench, "Alt+8"),
         )
         for name, title, widget, keys in table:
             dock = named(QDockWidget(title, self), f"inspect.dock.{name}", title)
@@ -133,6 +139,7 @@ class Views(QMainWindow):
         self.splitDockWidget(docks["height"], docks["camera"], Qt.Orientation.Vertical)
         self.tabifyDockWidget(docks["camera"], docks["normals"])
         self.tabifyDockWidget(docks["normals"], docks["quality"])
+        self.splitDockWidget(docks["surface"], docks["section"], Qt.Orientation.Vertical)
         self.splitDockWidget(docks["look"], docks["bench"], Qt.Orientation.Vertical)
         for dock in docks.values():
             dock.show()
@@ -142,6 +149,7 @@ class Views(QMainWindow):
             [560, 400, 260],
             Qt.Orientation.Horizontal,
         )
+        self.resizeDocks([docks["surface"], docks["section"]], [460, 200], Qt.Orientation.Vertical)
         self.resizeDocks([docks["look"], docks["bench"]], [290, 400], Qt.Orientation.Vertical)
         self.follow_source()
 
@@ -152,6 +160,9 @@ class Views(QMainWindow):
         self.camera.clicked.connect(self._on_picture_clicked)
         self.look.changed.connect(self._on_look)
         self.quality.chosen.connect(self.wanted_changed)
+        for part in (self.line, self.region):
+            part.moved.connect(self.wanted_changed)
+        self.section.changed.connect(self._on_section)
         for name, (text, keys) in preset_names().items():
             make_action(
                 self, f"inspect.look_{name}", tr("3D: {name}").format(name=text),
@@ -173,8 +184,18 @@ class Views(QMainWindow):
             normals=shown["normals"],
             camera=shown["camera"],
             quality=self.quality.what if shown["quality"] else "",
+            section=self._section() if shown["section"] else None,
+            region=self.region.rectangle if self._measures_region() else None,
             look=self.look.look,
         )
+
+    def _section(self) -> Section:
+        start, end = self.line.ends_mm
+        first, second = self.section.ranges
+        return Section(start, end, self.section.width_mm, first, second)
+
+    def _measures_region(self) -> bool:
+        return self._visible["section"] and self.section.has_region
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show a frame in every view that is shown."""
@@ -190,6 +211,13 @@ class Views(QMainWindow):
             self.normals.show_picture(shown.normals, extent_of(shown.heightmap))
         if self._visible["quality"]:
             self.quality.show_frame(shown, still=still)
+        if shown.cut is not None:
+            self.section.show_cut(shown.cut)
+
+    def prepare(self) -> None:
+        """Load what the shown views need, before the first depth comes."""
+        if self._visible["surface"]:
+            self.surface.load()
 
     def forget(self) -> None:
         """Show no depth: there is another calibration, or none."""
@@ -245,6 +273,15 @@ class Views(QMainWindow):
 
     def _on_visible(self, name: str, on: bool) -> None:
         self._visible[name] = on
+        if name == "section":
+            self._on_section()
+        else:
+            self.wanted_changed.emit()
+
+    def _on_section(self) -> None:
+        self.line.show(self._visible["section"])
+        self.line.set_width(self.section.width_mm)
+        self.region.show(self._measures_region())
         self.wanted_changed.emit()
 
     def _on_look(self) -> None:

@@ -1,0 +1,94 @@
+"""What is measured along the line and in the rectangle that lie on the height map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.profile import (
+    Profile,
+    angle_between,
+    slope,
+    step_height,
+    take_profile,
+    width_at,
+)
+from gelpolight_core.measurement.roughness import roughness
+from gelpolight_core.reconstruction.heightmap import HeightMap
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A line over the height map, and the two ranges of it that are compared.
+
+    Attributes
+    ----------
+    start_mm, end_mm : (x, y)
+        Ends of the line.
+    width_mm : float
+        Over which depth is averaged across the line.
+    first, second : (from, to)
+        Ranges as shares of the line's length.
+    """
+
+    start_mm: Point = (-6.0, 0.0)
+    end_mm: Point = (6.0, 0.0)
+    width_mm: float = 0.2
+    first: Point = (0.02, 0.14)
+    second: Point = (0.44, 0.56)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cut:
+    """What was measured of one frame.
+
+    Attributes
+    ----------
+    profile : Profile or None
+        None where there is none.
+    figures : tuple of Measured
+        Of the profile, then of the rectangle.
+    sentences : tuple of str
+        Why something could not be measured.
+    """
+
+    profile: Profile | None = None
+    figures: tuple[Measured, ...] = ()
+    sentences: tuple[str, ...] = ()
+
+
+def cut(heightmap: HeightMap, section: Section | None, region: Rectangle | None) -> Cut:
+    """Measure along a line and in a rectangle; None: not wanted."""
+    profile, figures, sentences = None, [], []
+    if section is not None:
+        try:
+            profile = take_profile(
+                heightmap, section.start_mm, section.end_mm, width_mm=section.width_mm
+            )
+        except InputError as error:
+            sentences.append(str(error))
+    if section is not None and profile is not None:
+        length = float(profile.along_mm[-1])
+        first = (length * section.first[0], length * section.first[1])
+        second = (length * section.second[0], length * section.second[1])
+        for measure in (
+            lambda: step_height(profile, first_mm=first, second_mm=second),
+            lambda: width_at(profile),
+            lambda: slope(profile, *first),
+            lambda: slope(profile, *second),
+            lambda: angle_between(profile, first, second),
+        ):
+            try:
+                figures.append(measure())
+            except InputError as error:
+                sentences.append(error.found)
+    if region is not None:
+        try:
+            figures.extend(roughness(heightmap, region).figures)
+        except InputError as error:
+            sentences.append(error.found)
+    return Cut(profile, tuple(figures), tuple(dict.fromkeys(sentences)))

@@ -1,0 +1,125 @@
+"""Asks what to export, and where to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.inspect.export import ExportChoice, format_words
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+FIRST_FORMATS = ("npz", "tif")
+
+
+class ExportDialog(QDialog):
+    """Lets a person choose formats, folder and frames.
+
+    Parameters
+    ----------
+    folder : Path
+        Proposed.
+    count : int
+        Frames of the recording that is replayed; 0: there is none.
+    at : int
+        The frame that it is at.
+
+    Signals
+    -------
+    chosen(object)
+        An ExportChoice.
+    """
+
+    chosen = Signal(object)
+
+    def __init__(self, folder: Path, *, count: int = 0, at: int = 0, parent: QWidget) -> None:
+        super().__init__(parent)
+        named(self, "inspect.export.dialog", tr("Export"))
+        self.setWindowTitle(tr("Export the depth"))
+        self._formats: dict[str, QCheckBox] = {}
+        column = QVBoxLayout(self)
+        for name, words in format_words().items():
+            box = named(QCheckBox(words), f"inspect.export.{name}", words)
+            box.setChecked(name in FIRST_FORMATS)
+            box.toggled.connect(self._check)
+            column.addWidget(box)
+            self._formats[name] = box
+        form = QFormLayout()
+        self._stride = named(QSpinBox(), "inspect.export.stride", tr("Every so many-th node"))
+        self._stride.setRange(1, 16)
+        self._stride.setToolTip(tr("Meshes take every so many-th row and column: smaller files"))
+        form.addRow(tr("Mesh: every n-th node"), self._stride)
+        self._folder = named(QLineEdit(str(folder)), "inspect.export.folder", tr("Folder"))
+        self._folder.textChanged.connect(self._check)
+        browse = named(QPushButton(tr("Browse…")), "inspect.export.browse", tr("Choose a folder"))
+        browse.clicked.connect(self._browse)
+        place = QHBoxLayout()
+        place.addWidget(self._folder, 1)
+        place.addWidget(browse)
+        form.addRow(tr("Folder"), place)
+        self._range = named(
+            QCheckBox(tr("Frames")), "inspect.export.range", tr("Export a range of frames")
+        )
+        self._first, self._last = QSpinBox(), QSpinBox()
+        named(self._first, "inspect.export.first", tr("First frame"))
+        named(self._last, "inspect.export.last", tr("Last frame"))
+        for box, value in ((self._first, at + 1), (self._last, count)):
+            box.setRange(1, max(count, 1))
+            box.setValue(value)
+            box.setEnabled(False)
+            self._range.toggled.connect(box.setEnabled)
+        self._range.toggled.connect(self._check)
+        self._first.valueChanged.connect(self._last.setMinimum)
+        span = QHBoxLayout()
+        span.addWidget(self._first)
+        span.addWidget(self._last)
+        form.addRow(self._range, span)
+        form.setRowVisible(self._range, count > 1)
+        column.addLayout(form)
+        self._buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Save | QDialogButtonBox.StandardButton.Cancel
+        )
+        self._buttons.accepted.connect(self._accept)
+        self._buttons.rejected.connect(self.reject)
+        column.addWidget(self._buttons)
+        self._check()
+
+    @property
+    def choice(self) -> ExportChoice:
+        """What is chosen."""
+        frames = None
+        if self._range.isChecked():
+            frames = self._first.value() - 1, self._last.value() - 1
+        return ExportChoice(
+            folder=Path(self._folder.text()).expanduser(),
+            formats=tuple(name for name, box in self._formats.items() if box.isChecked()),
+            stride=self._stride.value(),
+            frames=frames,
+        )
+
+    def _check(self) -> None:
+        good = bool(self.choice.formats) and bool(self._folder.text().strip())
+        self._buttons.button(QDialogButtonBox.StandardButton.Save).setEnabled(good)
+
+    def _browse(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, tr("Folder"), self._folder.text())
+        if chosen:
+            self._folder.setText(chosen)
+
+    def _accept(self) -> None:
+        self.chosen.emit(self.choice)
+        self.accept()

@@ -1,0 +1,120 @@
+"""The transport of a recording: play, step, seek, loop, speed."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QSlider,
+    QToolButton,
+    QWidget,
+)
+
+from app.shell.actions import make_action
+from app.sources.recording import Playback, RecordingSource
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+POLL_MS = 100
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+class ReplayBar(QWidget):
+    """Plays a recording as the person likes; hidden where there is none."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "inspect.replay", tr("Replay"))
+        self._source: RecordingSource | None = None
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 2, 8, 2)
+        for name, text, slot, keys, icon_name in (
+            ("back", tr("One frame back"), lambda: self._step(-1), ",", "step-back"),
+            ("play", tr("Play or stop"), self._toggle, "Ctrl+Space", "play"),
+            ("on", tr("One frame on"), lambda: self._step(1), ".", "step-on"),
+        ):
+            action = make_action(
+                self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name,
+                tip=f"{text} ({keys})",
+            )  # fmt: skip
+            button = named(QToolButton(), f"inspect.replay.{name}", text)
+            button.setDefaultAction(action)
+            button.setAutoRaise(True)
+            row.addWidget(button)
+            if name == "play":
+                action.setCheckable(True)
+                self._play = action
+        self._slider = named(
+            QSlider(Qt.Orientation.Horizontal), "inspect.replay.seek", tr("Place in the recording")
+        )
+        self._slider.valueChanged.connect(self._seek)
+        row.addWidget(self._slider, 1)
+        self._words = named(QLabel(), "inspect.replay.words", tr("Where the recording is"))
+        row.addWidget(self._words)
+        self._loop = named(QCheckBox(tr("Loop")), "inspect.replay.loop", tr("Begin again"))
+        self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
+        self._speed = named(QComboBox(), "inspect.replay.speed", tr("Speed"))
+        for speed in SPEEDS:
+            self._speed.addItem(tr("{s:g} x").format(s=speed), speed)
+        self._speed.activated.connect(self._set_speed)
+        row.addWidget(self._loop)
+        row.addWidget(self._speed)
+        self._timer = QTimer(self)
+        self._timer.setInterval(POLL_MS)
+        self._timer.timeout.connect(self._poll)
+        self.hide()
+
+    def follow(self, source: object) -> None:
+        """Follow a source; one that is no recording hides the bar."""
+        self._source = source if isinstance(source, RecordingSource) else None
+        self.setVisible(self._source is not None)
+        if self._source is None:
+            self._timer.stop()
+        else:
+            self._timer.start()
+            self._poll()
+
+    def _poll(self) -> None:
+        if self._source is None:
+            return
+        now = self._source.playback()
+        with QSignalBlocker(self._slider):
+            self._slider.setRange(0, max(now.count - 1, 0))
+            self._slider.setValue(now.position)
+        with QSignalBlocker(self._loop):
+            self._loop.setChecked(now.loop)
+        with QSignalBlocker(self._speed):
+            self._speed.setCurrentIndex(self._speed.findData(now.speed))
+        self._play.setChecked(now.playing)
+        self._words.setText(playback_text(now))
+
+    def _toggle(self) -> None:
+        if self._source is not None:
+            (self._source.pause if self._source.playback().playing else self._source.play)()
+            self._poll()
+
+    def _step(self, count: int) -> None:
+        if self._source is not None:
+            self._source.step(count)
+            self._poll()
+
+    def _seek(self, index: int) -> None:
+        if self._source is not None:
+            self._source.seek(index)
+
+    def _set_speed(self, index: int) -> None:
+        if self._source is not None:
+            self._source.set("speed", float(self._speed.itemData(index)))
+
+
+def playback_text(now: Playback) -> str:
+    """Return where a player is, for people."""
+    text = tr("{t:.2f} / {d:.2f} s,  frame {k} of {n}").format(
+        t=now.time_s, d=now.duration_s, k=now.position + 1, n=now.count
+    )
+    if now.damaged:
+        text += tr(",  {n} damaged").format(n=now.damaged)
+    return text
