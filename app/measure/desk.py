@@ -27,6 +27,7 @@ from app.inspect.look import Look
 from app.inspect.products import Shown, Wanted
 from app.measure.advice import Situation, advice
 from app.measure.judging import Judged, judge
+from app.measure.keeping import Kept
 from app.measure.measuring import Taken
 from app.measure.side_panel import SidePanel
 from app.measure.steady import SteadyPress
@@ -59,13 +60,13 @@ class Desk(QMainWindow):
 
     Signals
     -------
-    kept(object, object)
-        A ToolResult and how it compares with the truth (tuple of Judged) shall be kept.
+    kept(object)
+        A result (Kept) shall go to the records.
     calibrate_wanted(), indenters_wanted(), limits_wanted()
         The virtual sensor shall be calibrated, a list or the limits be edited.
     """
 
-    kept = Signal(object, object)
+    kept = Signal(object)
     calibrate_wanted = Signal()
     indenters_wanted = Signal()
     limits_wanted = Signal()
@@ -274,6 +275,7 @@ class Desk(QMainWindow):
     def _take(self, taken: Taken, *, propose: bool = False) -> None:
         self.link.pause(True)
         self._trouble = ""
+        self.panel.say_kept("")
         self.work.take(taken, propose=propose)
         if taken.path is not None:
             self.map.say(tr("Reconstructing {name}…").format(name=taken.name))
@@ -312,9 +314,21 @@ class Desk(QMainWindow):
 
     def keep(self) -> None:
         """Send the chosen tool's result to the records."""
-        result = self.work.result
-        if result is not None:
-            self.kept.emit(result, self.judged())
+        result, heightmap = self.work.result, self.work.heightmap
+        entry = next((e for e in self.library.entries if e.in_use), None)
+        if result is None or heightmap is None or entry is None:
+            return
+        kept = Kept(
+            result=result,
+            judged=self.judged(),
+            stated=self.panel.truth.stated,
+            limits=self.context.settings.limits,
+            heightmap=heightmap,
+            serial=entry.serial,
+            operator=self.panel.who.text().strip(),
+            note=self.panel.note.text().strip(),
+        )
+        self.kept.emit(kept)
 
     def judged(self) -> tuple[Judged, ...]:
         """Return how the chosen tool's result compares with what is stated."""

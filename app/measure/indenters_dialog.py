@@ -78,7 +78,9 @@ class IndentersDialog(QDialog):
         table.setHorizontalHeaderLabels(
             [tr("Name"), tr("Shape"), tr("Diameter or side"), tr("Other side"), tr("Depth")]
         )
-        table.horizontalHeader().setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
         table.verticalHeader().hide()
         table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         table.setAlternatingRowColors(True)

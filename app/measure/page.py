@@ -11,7 +11,11 @@ from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 from app.inspect.first_calibration import calibrate_virtual_sensor
 from app.measure.desk import PICTURES, RECORDING, Desk
 from app.measure.indenters_dialog import IndentersDialog
+from app.measure.keeping import Kept, record_of
 from app.measure.limits_dialog import LimitsDialog
+from app.measure.record_book import RecordBook
+from app.measure.record_table import quantity_text, shape_label
+from app.measure.results_view import ResultsView
 from app.shell.context import AppContext
 from app.shell.dropping import dropped_paths
 from app.shell.jobs import Job, Jobs
@@ -41,13 +45,21 @@ class MeasurePage(QWidget):
         self.tabs = named(QTabWidget(), "measure.tabs", tr("Parts of this page"))
         self.tabs.setDocumentMode(True)
         self.tabs.tabBar().setDrawBase(False)
+        self.book = RecordBook(context=context, parent=self)
+        self.results = ResultsView(self.book, context=context)
         self.tabs.addTab(self.desk, tr("Measure"))
+        self.tabs.addTab(self.results, tr("Records"))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.tabs)
         self.desk.calibrate_wanted.connect(self.calibrate_now)
         self.desk.indenters_wanted.connect(self.edit_indenters)
         self.desk.limits_wanted.connect(self.edit_limits)
+        self.desk.kept.connect(self.keep)
+        self.desk.panel.records_wanted.connect(lambda: self.tabs.setCurrentWidget(self.results))
+        self.book.changed.connect(self._show_count)
+        self.book.refused.connect(lambda text: context.toasts.show(text, "fail"))
+        self.book.noticed.connect(lambda text: context.toasts.show(text, "warn"))
         self.jobs.progressed.connect(self.desk.banner.show_work)
         self.jobs.refused.connect(lambda text: context.toasts.show(text, "warn"))
         self.desk.banner.stop_wanted.connect(self.jobs.cancel)
@@ -57,6 +69,7 @@ class MeasurePage(QWidget):
     def enter(self) -> None:
         """Look at the source."""
         self._read_indenters()
+        self.book.refresh()
         self.desk.enter()
 
     def leave(self) -> None:
@@ -67,6 +80,7 @@ class MeasurePage(QWidget):
         """Everything that was kept is on disk."""
         self.desk.close_work()
         self.jobs.close()
+        self.book.close()
         return True
 
     def open_path(self, path: Path) -> None:
@@ -99,6 +113,29 @@ class MeasurePage(QWidget):
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
         event.acceptProposedAction()
+
+    # The records
+
+    def keep(self, kept: Kept) -> None:
+        """Write a result into the records, at once."""
+        record = record_of(kept)
+
+        def done(number: int) -> None:
+            text = tr("Kept as number {n}: {what}, {value}.").format(
+                n=number,
+                what=shape_label(record.shape).lower(),
+                value=quantity_text(record.quantities[0]),
+            )
+            self.desk.panel.note.clear()
+            # No message over the window: it would lie on the button for the next one.
+            self.desk.panel.say_kept(text)
+
+        self.book.add(record, done)
+
+    def _show_count(self) -> None:
+        count = len(self.book.records)
+        place = self.tabs.indexOf(self.results)
+        self.tabs.setTabText(place, tr("Records ({n})").format(n=count) if count else tr("Records"))
 
     # Lists and limits
 
@@ -135,6 +172,7 @@ class MeasurePage(QWidget):
     def _keep_limits(self, limits: Limits) -> None:
         self.context.settings.limits = limits
         self.desk.judge_again()
+        self.results.refresh()
 
     def calibrate_now(self) -> None:
         """Calibrate the virtual sensor, so that there is something to measure with."""

@@ -50,12 +50,15 @@ class SidePanel(QScrollArea):
         The chosen tool shall be taken off.
     keep_wanted()
         The chosen tool's result shall go to the records.
+    records_wanted()
+        The records shall be shown.
     """
 
     propose_wanted = Signal()
     tool_chosen = Signal(int)
     remove_wanted = Signal()
     keep_wanted = Signal()
+    records_wanted = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -81,6 +84,9 @@ class SidePanel(QScrollArea):
         self.keep = _button("keep", tr("&Keep in the records"), "keep", tr("(Ctrl+Return)"))
         self.keep.setMinimumHeight(36)
         self.keep.clicked.connect(self.keep_wanted)
+        self.kept = named(QLabel(), "measure.kept", tr("What was kept last"))
+        self.kept.setWordWrap(True)
+        self.kept.linkActivated.connect(lambda _link: self.records_wanted.emit())
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -101,6 +107,7 @@ class SidePanel(QScrollArea):
             column.addWidget(widget)
         column.addLayout(form)
         column.addWidget(self.keep)
+        column.addWidget(self.kept)
         column.addStretch(1)
         self.setWidget(inside)
 
@@ -129,6 +136,13 @@ class SidePanel(QScrollArea):
             label = tr("mean side") if tool.name == "cuboid" else first.label
             self.truth.show_kind(tool.name, label, first.unit)
         self.keep.setEnabled(isinstance(found, ToolResult))
+
+    def say_kept(self, text: str) -> None:
+        """Say that something is in the records; empty: nothing of this picture is."""
+        colour = theme.colour("pass").name()
+        link = tr("Show the records")
+        words = f"<span style='color:{colour}'>{text}</span> <a href='records'>{link}</a>"
+        self.kept.setText(words if text else "")
 
     def _show_tools(self, work: Work) -> None:
         with QSignalBlocker(self.tools):
