@@ -117,7 +117,9 @@ class Inputs:
             raise InputError(
                 tr("two pictures are named {name}").format(name=twins[0]),
                 where=tr("IMAGE"),
-                advice=tr("Reconstruct them into different folders, so that neither is lost"),
+                advice=tr(
+                    "Reconstruct them into different folders, so that neither is overwritten"
+                ),
             )
 
 

@@ -63,8 +63,11 @@ def code_lengths(counts: NDArray[np.int64]) -> NDArray[np.int64]:
     counts : (257,) int64
         How often each symbol occurs.
     """
+    lengths = np.zeros(counts.size, np.int64)
     while True:
-        lengths: NDArray[np.int64] = _huffman(counts)
+        symbols = np.flatnonzero(counts)
+        symbols = symbols[np.argsort(counts[symbols], kind="stable")]
+        lengths[symbols] = _depths(counts[symbols])
         if lengths.max() <= LONGEST_CODE:
             return lengths
         counts = (counts + 1) // 2  # evens them out, so that the rarest need fewer bits
@@ -83,7 +86,7 @@ def canonical_codes(lengths: NDArray[np.int64]) -> NDArray[np.uint64]:
 
 
 def _occurrences(content: Bytes) -> NDArray[np.int64]:
-    counts = np.append(_count(content), 1)
+    counts = np.append(_count(content).sum(axis=0), 1)
     counts[0] += 1  # so that there are two symbols at least, and no code is empty
     return counts
 
@@ -114,7 +117,7 @@ class _BitWriter:
 
 @_compiled
 def _count(content):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Return how often each byte occurs; four tables, as one would wait for itself."""
+    """Return how often each byte occurs, in four parts, as one would wait for itself."""
     tables = np.zeros((4, 256), np.int64)
     whole = content.size // 4 * 4
     for k in range(0, whole, 4):
@@ -124,18 +127,19 @@ def _count(content):  # type: ignore[no-untyped-def]  # pragma: no cover
         tables[3, content[k + 3]] += 1
     for k in range(whole, content.size):
         tables[0, content[k]] += 1
-    return tables.sum(axis=0)
+    return tables
 
 
 @_compiled
-def _huffman(counts):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Join the two rarest nodes until one is left; return the depth of each symbol."""
-    symbols = np.flatnonzero(counts)
-    symbols = symbols[np.argsort(counts[symbols], kind="mergesort")]
-    leaves = symbols.size
+def _depths(counts):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Join the two rarest nodes until one is left; return how deep each of the first lies.
+
+    Counts come in rising order.
+    """
+    leaves = counts.size
     weights = np.zeros(2 * leaves - 1, np.int64)
     parents = np.zeros(2 * leaves - 1, np.int64)
-    weights[:leaves] = counts[symbols]
+    weights[:leaves] = counts
     leaf, joined = 0, leaves  # the heads of two queues, both in order of weight
     for node in range(leaves, 2 * leaves - 1):
         for _ in range(2):
@@ -148,9 +152,7 @@ def _huffman(counts):  # type: ignore[no-untyped-def]  # pragma: no cover
     depths = np.zeros(2 * leaves - 1, np.int64)
     for node in range(2 * leaves - 3, -1, -1):
         depths[node] = depths[parents[node]] + 1
-    lengths = np.zeros(counts.size, np.int64)
-    lengths[symbols] = depths[:leaves]
-    return lengths
+    return depths[:leaves]
 
 
 @_compiled

@@ -1,0 +1,188 @@
+"""Every frame of a stream is in the recording, or is counted as lost."""
+
+from __future__ import annotations
+
+import resource
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded import noisy
+
+from app.sources.recorder import LEAST_QUEUE, Recorder, RecorderFigures
+from app.sources.source import Frame, Setting
+from app.sources.stream import Stream
+from gelpolight_core.recording.reader import Recording
+from gelpolight_core.recording.recording import RecordingHeader, Rgb
+from gelpolight_core.recording.writer import RecordingWriter
+
+WAIT_S = 20.0
+
+
+class Silent:
+    """A source that makes nothing: the tests hand the frames on themselves."""
+
+    kind, name, size = "virtual", "silent", (32, 24)
+
+    def open(self) -> None:
+        """Do nothing."""
+
+    def frame(self, timeout_s: float) -> Frame | None:
+        """Return none."""
+        return None
+
+    def settings(self) -> tuple[Setting, ...]:
+        """Return none."""
+        return ()
+
+    def set(self, key: str, value: float) -> float:
+        """Change nothing."""
+        return value
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+class HandedOn(Stream):
+    """A stream without a thread."""
+
+    def __init__(self) -> None:
+        super().__init__(Silent())
+
+    def hand_on(self, number: int, rgb: Rgb | None = None) -> None:
+        """Give a frame to the readers, as the capture thread does."""
+        self._hand_on(Frame(noisy(number) if rgb is None else rgb, number, 50.0 + 0.1 * number))
+
+
+@pytest.fixture
+def stream() -> HandedOn:
+    return HandedOn()
+
+
+def ended(recorder: Recorder) -> RecorderFigures:
+    """Wait until a recording has ended by itself."""
+    limit = time.monotonic() + WAIT_S
+    while not recorder.figures().finished and time.monotonic() < limit:
+        time.sleep(0.005)
+    return recorder.figures()
+
+
+def test_every_frame_is_written_and_the_figures_say_so(stream: HandedOn, tmp_path: Path) -> None:
+    path = tmp_path / "a.gplrec"
+    recorder = Recorder(stream, path, RecordingHeader(serial="A"))
+    recorder.start()
+    for number in range(3, 23):
+        stream.hand_on(number)
+    figures = recorder.stop()
+    assert (figures.frames, figures.lost, figures.waiting) == (20, 0, 0)
+    assert figures.failure is None
+    assert figures.finished
+    assert figures.seconds == pytest.approx(1.9)
+    assert figures.size_bytes == path.stat().st_size
+    stream.hand_on(23)
+    with Recording.open(path) as recording:
+        assert recording.numbers.tolist() == list(range(3, 23))
+        assert not recording.truncated
+        assert all(np.array_equal(recording.frame(k).rgb, noisy(k + 3)) for k in range(20))
+
+
+def test_frames_that_the_source_lost_are_counted(stream: HandedOn, tmp_path: Path) -> None:
+    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
+    recorder.start()
+    for number in (0, 1, 5, 6):
+        stream.hand_on(number)
+    figures = recorder.stop()
+    assert (figures.frames, figures.missed, figures.overrun) == (4, 3, 0)
+    with Recording.open(recorder.path) as recording:
+        assert recording.lost == 3
+
+
+def test_a_disk_that_is_too_slow_loses_frames_and_says_how_many(
+    stream: HandedOn,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    busy, free = threading.Event(), threading.Event()
+    append = RecordingWriter.append
+
+    def wait_and_append(writer: RecordingWriter, rgb: Rgb, number: int, time_s: float) -> None:
+        busy.set()
+        assert free.wait(WAIT_S)
+        append(writer, rgb, number, time_s)
+
+    monkeypatch.setattr(RecordingWriter, "append", wait_and_append)
+    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader(), queue_bytes=0)
+    recorder.start()
+    stream.hand_on(0)
+    assert busy.wait(WAIT_S)
+    for number in range(1, 20):
+        stream.hand_on(number)
+    assert recorder.figures().overrun == 20 - LEAST_QUEUE
+    assert "too slow" in caplog.text
+    free.set()
+    figures = recorder.stop()
+    assert (figures.frames, figures.lost) == (LEAST_QUEUE, 20 - LEAST_QUEUE)
+    with Recording.open(recorder.path) as recording:
+        assert (len(recording), recording.lost) == (LEAST_QUEUE, 20 - LEAST_QUEUE)
+
+
+def test_a_source_that_is_opened_anew_goes_on_in_the_same_recording(
+    stream: HandedOn, tmp_path: Path
+) -> None:
+    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
+    recorder.start()
+    for number in (7, 8, 0, 1, 3):
+        stream.hand_on(number)
+    assert recorder.stop().lost == 1
+    with Recording.open(recorder.path) as recording:
+        assert recording.numbers.tolist() == [7, 8, 9, 10, 12]
+
+
+def test_a_camera_that_changes_its_size_ends_the_recording(
+    stream: HandedOn, tmp_path: Path
+) -> None:
+    recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
+    recorder.start()
+    stream.hand_on(0)
+    stream.hand_on(1, noisy(1, (12, 16)))
+    figures = ended(recorder)
+    assert figures.failure is not None
+    assert "the size or the depth of the pictures has changed" in figures.failure
+    assert figures.frames == 1
+    stream.hand_on(2)
+    assert recorder.stop().frames == 1
+
+
+def test_a_full_disk_is_one_sentence_and_what_came_before_is_kept(
+    stream: HandedOn, tmp_path: Path
+) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
+        recorder.start()
+        for number in range(30):
+            stream.hand_on(number)
+        figures = ended(recorder)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    recorder.stop()
+    assert figures.failure is not None
+    assert "too large for this disk" in figures.failure
+    assert 0 < figures.frames < 30
+    with Recording.open(recorder.path) as recording:
+        assert len(recording) == figures.frames
+        last = len(recording) - 1
+        assert np.array_equal(recording.frame(last).rgb, noisy(last))
+
+
+def test_a_place_that_cannot_be_written_is_one_sentence(stream: HandedOn, tmp_path: Path) -> None:
+    recorder = Recorder(stream, tmp_path / "gone" / "a.gplrec", RecordingHeader())
+    recorder.start()
+    failure = ended(recorder).failure
+    assert failure is not None
+    assert "the folder does not exist" in failure
+    recorder.stop()

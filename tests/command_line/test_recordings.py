@@ -1,0 +1,119 @@
+"""Recordings on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from one_line import refusal
+from recorded import noisy, write_recording
+
+from app.command_line.inputs import frame_range
+from app.command_line.main import main
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+
+
+@pytest.fixture
+def recording(press: Path, tmp_path: Path) -> Path:
+    """Return a recording of three frames; the last two are the press, and one got lost."""
+    rgb = np.ascontiguousarray(cv2.imread(str(press))[..., ::-1])
+    path = tmp_path / "day.1.gplrec"
+    header = RecordingHeader(serial="virtual-1", source="bench", settings={"exposure_ms": 3.0})
+    with RecordingWriter(path, header) as writer:
+        writer.append(noisy(0, rgb.shape[:2]), 0, 0.0)
+        writer.append(rgb, 1, 0.1)
+        writer.append(rgb, 3, 0.3)
+    return path
+
+
+def test_a_frame_of_a_recording_gives_what_its_picture_gives(
+    calibration: Path,
+    press: Path,
+    recording: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """To the last bit."""
+    out = tmp_path / "out"
+    both = ["reconstruct", str(calibration), str(press), str(recording), "-o", str(out)]
+    assert main([*both, "--frames", "1:3"]) == 0
+    told = capsys.readouterr()
+    assert "3 depth maps written" in told.out
+    assert "1 frames of the source are not in the recording" in told.err
+    names = ["day.1_000001.npz", "day.1_000002.npz"]
+    assert sorted(p.name for p in out.iterdir()) == sorted([f"{press.stem}.npz", *names])
+    with np.load(out / f"{press.stem}.npz") as one:
+        for name in names:
+            with np.load(out / name) as other:
+                for key in ("depth_mm", "normals", "flags"):
+                    assert one[key].tobytes() == other[key].tobytes()
+
+
+def test_a_recording_of_another_sensor_is_refused_by_name(
+    calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.gplrec"
+    write_recording(path, header=RecordingHeader(serial="B-7"))
+    said = refusal(capsys, "reconstruct", str(calibration), str(path), "-o", str(tmp_path / "out"))
+    assert "the recording is of sensor B-7 and the calibration of sensor virtual-1" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recording_of_another_size_is_refused(
+    calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_recording(tmp_path / "a.gplrec")
+    where = str(tmp_path / "a.gplrec")
+    said = refusal(capsys, "reconstruct", str(calibration), where, "-o", str(tmp_path / "out"))
+    assert "the frames are 32x24 pixels and the calibration is for" in said
+
+
+def test_a_range_of_frames_needs_a_recording(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("reconstruct", str(calibration), str(press), "-o", str(tmp_path / "out"))
+    assert "none of the inputs is a recording" in refusal(capsys, *arguments, "--frames", "0:1")
+
+
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [("", range(5)), ("1:3", range(1, 3)), (":2", range(2)), ("3:", range(3, 5)),
+     (":", range(5)), ("0:99", range(5)), ("4", range(4, 5))],
+)  # fmt: skip
+def test_a_range_of_frames_reads_like_a_slice(text: str, frames: range) -> None:
+    assert frame_range(text, 5, where="a") == frames
+
+
+@pytest.mark.parametrize("text", ["5:", "3:3", "3:1", "-1:2", "a:b", "x", "1:2:3", "5"])
+def test_a_range_without_frames_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="names no frame of the 5"):
+        frame_range(text, 5, where="a")
+
+
+def test_inspect_says_what_a_recording_holds(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["inspect", str(recording)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "sensor virtual-1",
+        "frames 3 in 0.30 s",
+        "frames lost 1",
+        "complete yes",
+        "exposure_ms 3.0",
+    ):
+        assert words in shown
+
+
+def test_inspect_says_that_a_recording_was_cut_short(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording.write_bytes(recording.read_bytes()[:-100])
+    assert main(["inspect", str(recording)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "frames 2 in" in shown
+    assert "complete no" in shown

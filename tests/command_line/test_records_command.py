@@ -1,0 +1,58 @@
+"""The lab's records on the command line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from one_line import refusal
+
+from app.command_line.main import main
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import NAME, Records
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """Return a workspace in which two sensors were measured with."""
+    with Records.open(tmp_path / NAME) as records:
+        for serial, value in (("A-1", 5.1), ("B-2", 4.9)):
+            quantities = (Quantity("diameter_mm", value, 0.01, 5.0, 5.0),)
+            records.add(MeasurementRecord(serial, "c", "ball", quantities, verdict="pass"))
+    return tmp_path
+
+
+def test_a_table_of_all_measurements_is_printed(
+    workspace: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["records", "--workspace", str(workspace)]) == 0
+    head, *lines = capsys.readouterr().out.splitlines()
+    assert "sensor" in head
+    assert [line.split()[3] for line in lines] == ["A-1", "B-2"]
+    assert "+2.00" in lines[0]
+
+
+def test_one_sensor_is_chosen_and_written_as_csv(
+    workspace: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = workspace / "b.csv"
+    chosen = ["--sensor", "B-2", "--csv", str(table)]
+    assert main(["records", "--workspace", str(workspace), *chosen]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 2
+    assert [line.split(",")[2] for line in table.read_text("utf-8-sig").splitlines()[1:]] == ["B-2"]
+
+
+def test_damaged_records_are_said_so_and_kept(
+    workspace: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (workspace / NAME).write_bytes(b"nonsense" * 1000)
+    assert main(["records", "--workspace", str(workspace)]) == 0
+    assert "The records were damaged. They are kept as" in capsys.readouterr().err
+    assert len(list(workspace.glob("records.damaged-*"))) == 1
+
+
+def test_a_folder_without_records_is_refused_and_stays_empty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "there are no records" in refusal(capsys, "records", "--workspace", str(tmp_path))
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,207 @@
+"""A damaged recording gives the right frames or says no; a killed program loses one at most."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import struct
+import subprocess
+import sys
+import textwrap
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from recorded import noisy, write_recording
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording import layout
+from gelpolight_core.recording.reader import Recording, is_recording
+from gelpolight_core.recording.recording import VERSION, RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Return the bytes of a recording of three frames."""
+    path = tmp_path_factory.mktemp("whole") / "a.gplrec"
+    write_recording(path, header=RecordingHeader(serial="A", started="2026-01-01T00:00:00+00:00"))
+    return path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("damaged") / "a.gplrec"
+
+
+def right_frames(path: Path) -> set[int]:
+    """Return which frames can be read; what is read must be right."""
+    found = set()
+    with Recording.open(path) as recording:
+        assert recording.header.serial == "A"
+        for index in range(len(recording)):
+            try:
+                frame = recording.frame(index)
+            except InputError:
+                continue
+            assert np.array_equal(frame.rgb, noisy(frame.number))
+            assert frame.time_s == 100.0 + frame.number / 50.0
+            found.add(frame.number)
+        if len(recording) < 3:
+            assert recording.truncated
+    return found
+
+
+@settings(deadline=None, max_examples=150)
+@given(data=st.data(), value=st.integers(1, 255))
+def test_a_changed_byte_spoils_one_frame_at_most_or_is_refused(
+    whole: bytes, place: Path, data: st.DataObject, value: int
+) -> None:
+    at = data.draw(st.integers(0, len(whole) - 1))
+    spoilt = bytearray(whole)
+    spoilt[at] ^= value
+    place.write_bytes(spoilt)
+    try:
+        assert len(right_frames(place)) >= 2
+    except InputError as error:
+        assert at < whole.index(layout.FRAME_MAGIC), f"byte {at}: {error}"
+
+
+@settings(deadline=None, max_examples=80)
+@given(share=st.floats(0.0, 1.0, exclude_max=True))
+def test_a_file_cut_short_keeps_the_frames_before_the_cut(
+    whole: bytes, place: Path, share: float
+) -> None:
+    size = int(share * len(whole))
+    place.write_bytes(whole[:size])
+    frames, begin = 0, whole.index(layout.FRAME_MAGIC)
+    while (end := whole.find(layout.FRAME_MAGIC, begin + 8)) > 0 and end <= size:
+        frames, begin = frames + 1, end
+    if size < whole.index(layout.FRAME_MAGIC) - 8:
+        with pytest.raises(InputError):
+            Recording.open(place)
+    else:
+        assert right_frames(place) == set(range(frames))
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.binary(max_size=300))
+def test_any_other_file_is_refused(place: Path, content: bytes) -> None:
+    place.write_bytes(content)
+    assert not is_recording(place)
+    with pytest.raises(InputError, match="this is not a recording"):
+        Recording.open(place)
+
+
+def test_a_missing_file_is_said_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"gone\.gplrec: there is no such file"):
+        Recording.open(tmp_path / "gone.gplrec")
+
+
+def test_a_newer_version_is_refused_in_one_line(whole: bytes, place: Path) -> None:
+    newer = bytearray(whole)
+    newer[layout.HEAD_AT + 8 : layout.HEAD_AT + 12] = struct.pack("<I", VERSION + 1)
+    place.write_bytes(newer)
+    with pytest.raises(InputError, match=f"has version {VERSION + 1} and this program knows"):
+        Recording.open(place)
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "strips", "bits"),
+    [(2**31, 2**31, 1, 8), (8000, 8001, 4, 16), (24, 32, 0, 8), (24, 32, 2**31, 8), (24, 32, 4, 12),
+     (0, 32, 4, 8)],
+)  # fmt: skip
+def test_sizes_that_cannot_be_are_not_believed(
+    whole: bytes, place: Path, rows: int, columns: int, strips: int, bits: int
+) -> None:
+    """Their checksum is right: somebody has made such a file."""
+    begin = whole.index(layout.FRAME_MAGIC)
+    mark = bytearray(whole[begin : begin + 132])
+    struct.pack_into("<4I", mark, 32, rows, columns, bits, strips)
+    mark[128:] = struct.pack("<I", zlib.crc32(mark[:128]))
+    place.write_bytes(whole[:begin] + mark + whole[begin + 132 :])
+    with Recording.open(place) as recording:
+        assert recording.numbers.tolist() == [1, 2]
+        assert recording.truncated
+
+
+def test_a_strip_that_unpacks_to_more_than_a_frame_is_refused(whole: bytes, place: Path) -> None:
+    begin = whole.index(layout.FRAME_MAGIC)
+    mark = layout.unpack_mark(whole[begin:])
+    assert mark is not None
+    bomb = zlib.compress(bytes(10**5), 9)
+    strip = mark.strips[0]
+    assert len(bomb) <= strip.size
+    content = bytearray(whole)
+    content[strip.place : strip.place + len(bomb)] = bomb
+    crc = zlib.crc32(content[strip.place : strip.place + strip.size])
+    struct.pack_into("<I", content, begin + 48 + 64, crc)
+    struct.pack_into("<I", content, begin + 128, zlib.crc32(content[begin : begin + 128]))
+    place.write_bytes(content)
+    with Recording.open(place) as recording, pytest.raises(InputError, match="frame 0 is damaged"):
+        recording.frame(0)
+
+
+WRITE_FOR_EVER = """
+import sys
+from pathlib import Path
+from recorded import noisy
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+
+writer = RecordingWriter(Path(sys.argv[1]), RecordingHeader(serial="A"))
+for number in range(10**6):
+    writer.append(noisy(number % 50, (120, 160)), number, float(number))
+    print(number, flush=True)
+"""
+
+
+def test_a_killed_program_loses_no_frame_that_it_said_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "a.gplrec"
+    program = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(WRITE_FOR_EVER), str(path)],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])},
+        text=True,
+    )
+    assert program.stdout is not None
+    for line in program.stdout:
+        if int(line) >= 40:
+            break
+    program.send_signal(signal.SIGKILL)
+    said = [int(line) for line in program.stdout.read().split()]
+    program.stdout.close()
+    program.wait()
+    with Recording.open(path) as recording:
+        assert recording.truncated
+        assert len(recording) > max([40, *said])
+        for index in range(len(recording)):
+            frame = recording.frame(index)
+            assert frame.number == index
+            assert np.array_equal(frame.rgb, noisy(index % 50, (120, 160)))
+
+
+def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path: Path) -> None:
+    path = tmp_path / "a.gplrec"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    writer = RecordingWriter(path, RecordingHeader(serial="A"))
+    writer.append(noisy(0), 0, 100.0)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (writer.size_bytes + 500, before[1]))
+    try:
+        with pytest.raises(InputError, match=r"a\.gplrec: the file is too large for this disk"):
+            writer.append(noisy(1), 1, 100.02)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    writer.close(1)
+    with Recording.open(path) as recording:
+        assert recording.numbers.tolist() == [0]
+        assert recording.lost == 1
+        assert not recording.truncated
+        assert np.array_equal(recording.frame(0).rgb, noisy(0))

@@ -1,0 +1,254 @@
+"""The lab's records keep what was measured, for every program that asks."""
+
+from __future__ import annotations
+
+import csv
+import math
+import threading
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.result import Measurement, Truth, compare
+from gelpolight_core.records.entry import (
+    MeasurementRecord,
+    Quantity,
+    indenter_record,
+    verdict_of,
+)
+from gelpolight_core.records.records import NAME, Group, Records
+from gelpolight_core.records.statistics import statistics_of
+
+NOON = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
+
+
+def cylinder(height_mm: float, *, hours: float = 0.0, serial: str = "A-1") -> MeasurementRecord:
+    """Return a measurement of a cylinder of 5 mm, 1 mm high."""
+    return MeasurementRecord(
+        serial,
+        "c1",
+        "cylinder",
+        (
+            Quantity("diameter_mm", 5.05, 0.01, 5.0, 5.0),
+            Quantity("height_mm", height_mm, 0.01, 1.0, 8.0),
+        ),
+        time=NOON + timedelta(hours=hours),
+    )
+
+
+@pytest.fixture
+def records(tmp_path: Path):  # type: ignore[no-untyped-def]
+    """Return empty records."""
+    with Records.open(tmp_path / NAME) as records:
+        yield records
+
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+known = st.none() | numbers
+texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
+plain = st.dictionaries(texts, numbers | texts | st.booleans() | st.lists(numbers), max_size=3)
+made_quantities = st.builds(
+    Quantity, texts, numbers, known, st.none() | numbers.filter(bool), known
+)
+made_records = st.builds(
+    MeasurementRecord,
+    serial=texts.filter(bool),
+    calibration_id=texts,
+    shape=texts,
+    quantities=st.lists(
+        made_quantities, min_size=1, max_size=3, unique_by=lambda q: q.name
+    ).map(tuple),
+    verdict=texts,
+    reason=texts,
+    settings=plain,
+    details=plain,
+    operator=texts,
+    time=st.datetimes(timezones=st.sampled_from([UTC, timezone(timedelta(hours=-7))])).filter(
+        lambda time: 1 < time.year < 9999
+    ),
+    picture=texts,
+    note=texts,
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=25)
+@given(made_records)
+def test_whatever_was_kept_comes_back(
+    tmp_path_factory: pytest.TempPathFactory, record: MeasurementRecord
+) -> None:
+    path = tmp_path_factory.mktemp("kept") / NAME
+    with Records.open(path) as records:
+        number = records.add(record)
+    with Records.open(path) as records:
+        assert records.measurements() == (replace(record, id=number),)
+        assert not records.notice
+
+
+def test_measurements_are_found_by_sensor_shape_and_time(records: Records) -> None:
+    second = records.add(cylinder(1.01, hours=2.0))
+    first = records.add(cylinder(1.02))
+    other = records.add(replace(cylinder(1.03, hours=1.0, serial="B-2"), shape="ball"))
+    assert [r.id for r in records.measurements()] == [first, other, second]
+    assert [r.id for r in records.measurements("A-1")] == [first, second]
+    assert [r.id for r in records.measurements(shape="ball")] == [other]
+    since = (NOON + timedelta(hours=1)).astimezone(timezone(timedelta(hours=5)))
+    assert [r.id for r in records.measurements("A-1", since=since)] == [second]
+    assert records.sensors() == ("A-1", "B-2")
+
+
+def test_what_was_removed_can_be_brought_back(records: Records) -> None:
+    kept, removed = records.add(cylinder(1.0)), records.add(cylinder(2.0))
+    records.remove(removed)
+    assert [r.id for r in records.measurements()] == [kept]
+    assert [r.id for r in records.measurements(removed=True)] == [removed]
+    assert records.statistics(Group("A-1", "cylinder", "height_mm", 1.0)).n == 1
+    records.restore(removed)
+    assert [r.id for r in records.measurements()] == [kept, removed]
+
+
+def test_a_note_can_be_written_later(records: Records) -> None:
+    number = records.add(cylinder(1.0))
+    records.update_note(number, "the gel was warm")
+    assert records.measurements()[0].note == "the gel was warm"
+    with pytest.raises(InputError, match="there is no measurement 99"):
+        records.update_note(99, "?")
+
+
+def test_statistics_are_of_one_thing_only(records: Records) -> None:
+    heights = [1.00, 1.02, 1.05, 0.99]
+    for height in heights:
+        records.add(cylinder(height))
+    records.add(cylinder(3.0, serial="B-2"))
+    records.add(MeasurementRecord("A-1", "", "distance", (Quantity("height_mm", 9.0),)))
+    assert records.groups("A-1") == (
+        Group("A-1", "cylinder", "diameter_mm", 5.0),
+        Group("A-1", "cylinder", "height_mm", 1.0),
+        Group("A-1", "distance", "height_mm", None),
+    )
+    found = records.statistics(Group("A-1", "cylinder", "height_mm", 1.0))
+    assert found.n == 4
+    assert found.mean == pytest.approx(np.mean(heights))
+    assert found.sd == pytest.approx(np.std(heights, ddof=1))
+    assert found.spread == pytest.approx(0.06)
+    with pytest.raises(InputError, match="was not measured with this sensor"):
+        records.statistics(Group("A-1", "ball", "height_mm", 1.0))
+
+
+def test_two_measurements_differ_by_less_than_the_repeatability_in_95_of_100() -> None:
+    pairs = np.random.default_rng(4).normal(7.0, 0.3, (50_000, 2))
+    limit = statistics_of(pairs.ravel().tolist()).repeatability
+    assert np.mean(np.abs(pairs[:, 0] - pairs[:, 1]) < limit) == pytest.approx(0.95, abs=0.005)
+
+
+def test_one_measurement_says_nothing_of_scatter() -> None:
+    found = statistics_of([2.0])
+    assert (found.n, found.mean, found.spread) == (1, 2.0, 0.0)
+    assert math.isnan(found.sd)
+    assert math.isnan(found.repeatability)
+
+
+def test_the_error_over_time_is_that_of_measurements_with_a_truth(records: Records) -> None:
+    for hours, height in ((5.0, 1.05), (0.0, 1.01), (2.0, 0.98)):
+        records.add(cylinder(height, hours=hours))
+    records.add(MeasurementRecord("A-1", "", "distance", (Quantity("distance_mm", 9.0),)))
+    drift = records.drift("A-1", "height_mm")
+    assert drift.error_percent == pytest.approx([1.0, -2.0, 5.0])
+    assert np.diff(drift.times_s) == pytest.approx([7200.0, 10800.0])
+    assert drift.times[0] == NOON
+    assert set(drift.quantities) == {"height_mm"}
+    assert len(records.drift("A-1").times) == 6
+    assert records.drift("unknown").error_percent.shape == (0,)
+
+
+def test_the_table_opens_in_a_spreadsheet(records: Records, tmp_path: Path) -> None:
+    records.add(replace(cylinder(1.04), note='too "soft", said Zoë', operator="Zoë"))
+    records.add(cylinder(1.0, serial="B-2"))
+    assert records.export_csv(tmp_path / "a.csv", "A-1") == 1
+    with (tmp_path / "a.csv").open(encoding="utf-8-sig", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["quantity"] for row in rows] == ["diameter_mm", "height_mm"]
+    assert rows[1]["note"] == 'too "soft", said Zoë'
+    assert float(rows[1]["error_percent"]) == pytest.approx(4.0)
+    assert float(rows[1]["error"]) == pytest.approx(0.04)
+    assert rows[0]["time_utc"] == "2026-03-01 12:00:00"
+
+
+def test_several_threads_may_keep_measurements(records: Records) -> None:
+    threads = [
+        threading.Thread(target=lambda: [records.add(cylinder(1.0)) for _ in range(5)])
+        for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(records.measurements()) == 20
+
+
+def test_what_is_known_of_a_calibration_is_kept(records: Records) -> None:
+    records.add(cylinder(1.0))
+    records.know_calibration("c1", "A-1", model="full", made="2026-01-01", verdict="pass")
+    assert records.measurements()[0].calibration_id == "c1"
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "verdict"), [(1.05, 8.0, "pass"), (1.1, 8.0, "fail"), (1.1, None, "")]
+)
+def test_the_verdict_is_the_worst_one(value: float, limit: float | None, verdict: str) -> None:
+    good = Quantity("diameter_mm", 5.0, None, 5.0, limit)
+    assert verdict_of([good, Quantity("height_mm", value, None, 1.0, limit)]) == verdict
+    assert verdict_of([good], doubtful=True) == "doubtful"
+
+
+def test_what_no_measurement_is_is_refused() -> None:
+    for wrong in (math.nan, math.inf):
+        with pytest.raises(ValueError, match="not finite"):
+            Quantity("height_mm", wrong)
+    with pytest.raises(ValueError, match="truth of 0"):
+        Quantity("height_mm", 1.0, truth=0.0)
+    twice = (Quantity("height_mm", 1.0), Quantity("height_mm", 2.0))
+    for quantities in ((), twice):
+        with pytest.raises(ValueError, match="different names"):
+            MeasurementRecord("A", "", "ball", quantities)
+    with pytest.raises(ValueError, match="sensor"):
+        MeasurementRecord("", "", "ball", twice[:1])
+    with pytest.raises(ValueError, match="zone"):
+        MeasurementRecord("A", "", "ball", twice[:1], time=datetime(2026, 1, 1))
+
+
+def test_a_fitted_cuboid_is_kept_with_its_errors_and_all_that_it_says() -> None:
+    measurement = Measurement(
+        shape="cuboid", diameter_mm=None, side_mm=(4.0, 4.2), height_mm=1.1, centre_mm=(0.0, 1.0),
+        yaw_deg=3.0, drape_decay_mm=0.5, sd={"side_mm": (0.02, 0.04), "height_mm": 0.01},
+        edge_radius_mm=0.1, blur_mm=0.1, baseline_mm=0.0, residual_rms_mm=0.01,
+        correlated_pixels=4.0, outline_mm=np.zeros((3, 2)), verdict="ok", reason="",
+    )  # fmt: skip
+    comparison = compare(measurement, Truth("cuboid", 4.0, 1.0))
+    record = indenter_record(
+        measurement, comparison, serial="A", calibration_id="c", size_limit_percent=5.0,
+        height_limit_percent=8.0,
+    )  # fmt: skip
+    side, height = record.quantities
+    assert (side.name, height.name) == ("side_mm", "height_mm")
+    assert side.error_percent == pytest.approx(comparison.size_error_percent)
+    assert height.error_percent == pytest.approx(comparison.height_error_percent)
+    assert side.sd == pytest.approx(0.03)
+    assert record.verdict == "fail"
+    assert record.details["side_mm"] == [4.0, 4.2]
+    doubtful = replace(
+        measurement,
+        verdict="doubtful",
+        reason="no edge",
+        sd={**measurement.sd, "height_mm": math.nan},
+    )
+    record = indenter_record(
+        doubtful, serial="A", calibration_id="c", size_limit_percent=5.0, height_limit_percent=8.0
+    )
+    assert (record.verdict, record.reason) == ("doubtful", "no edge")
+    assert record.quantities[1].sd is None

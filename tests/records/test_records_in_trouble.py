@@ -1,0 +1,238 @@
+"""Nothing that was kept is lost: by a crash, a second program, damage, or a full disk."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.records import schema
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import NAME, Records
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORD = MeasurementRecord(
+    "A-1",
+    "c1",
+    "ball",
+    (Quantity("diameter_mm", 3.05, 0.01, 3.0),),
+    time=datetime(2026, 1, 1, tzinfo=UTC),
+)
+
+ADD_FOR_EVER = """
+import sys
+from pathlib import Path
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import Records
+
+records = Records.open(Path(sys.argv[1]))
+while True:
+    values = tuple(Quantity(f"q{k}_mm", 1.0) for k in range(20))
+    print(records.add(MeasurementRecord("A", "c", "cylinder", values)), flush=True)
+"""
+
+
+def adding(path: Path) -> subprocess.Popen[str]:
+    """Start a program that keeps measurements and says the number of each."""
+    return subprocess.Popen(
+        [sys.executable, "-c", ADD_FOR_EVER, str(path)],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        text=True,
+    )
+
+
+def test_a_killed_program_loses_no_measurement_and_halves_none(tmp_path: Path) -> None:
+    """Two at once, both killed while they write."""
+    path = tmp_path / NAME
+    programs = [adding(path), adding(path)]
+    said: set[int] = set()
+    for program in programs:
+        assert program.stdout is not None
+        for _ in range(8):
+            said.add(int(program.stdout.readline()))
+    for program in programs:
+        program.send_signal(signal.SIGKILL)
+    for program in programs:
+        assert program.stdout is not None
+        said.update(int(line) for line in program.stdout.read().split())
+        program.stdout.close()
+        program.wait()
+    assert len(said) >= 16
+    with Records.open(path) as records:
+        assert not records.notice
+        found = records.measurements()
+        assert said <= {record.id for record in found}
+        assert all(len(record.quantities) == 20 for record in found)
+        records.add(RECORD)
+
+
+def test_two_programs_use_the_records_at_once(tmp_path: Path) -> None:
+    with Records.open(tmp_path / NAME) as ours, Records.open(tmp_path / NAME) as theirs:
+        first, second = ours.add(RECORD), theirs.add(RECORD)
+        assert [r.id for r in ours.measurements()] == [first, second]
+        assert [r.id for r in theirs.measurements()] == [first, second]
+
+
+def test_a_program_that_holds_the_records_too_long_is_told_of(tmp_path: Path) -> None:
+    path = tmp_path / NAME
+    with Records.open(path, busy_s=0.05) as records:
+        records.add(RECORD)
+        other = sqlite3.connect(path, isolation_level=None)
+        other.execute("BEGIN EXCLUSIVE")
+        for use in (lambda: records.add(RECORD), records.measurements):
+            with pytest.raises(InputError, match="another program is holding the records"):
+                use()
+        with pytest.raises(InputError, match="another program is holding the records"):
+            Records.open(path, busy_s=0.05)
+        other.execute("ROLLBACK")
+        other.close()
+        records.add(RECORD)
+        assert len(records.measurements()) == 2
+    assert [p.name for p in tmp_path.iterdir()] == [NAME]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Return the bytes of records with some measurements."""
+    path = tmp_path_factory.mktemp("whole") / NAME
+    with Records.open(path) as records:
+        for number in range(30):
+            records.add(replace(RECORD, note=f"note {number} " * 20))
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("kind", ["text", "half", "holes"])
+def test_damaged_records_are_kept_aside_and_new_ones_begun(
+    whole: bytes, tmp_path: Path, kind: str
+) -> None:
+    path = tmp_path / NAME
+    content = {
+        "text": b"this was a database once " * 100,
+        "half": whole[: len(whole) // 2 // 4096 * 4096],
+        "holes": whole[:8192] + bytes(len(whole) - 8192),
+    }[kind]
+    path.write_bytes(content)
+    with Records.open(path) as records:
+        assert "damaged" in records.notice
+        assert records.measurements() == ()
+        records.add(RECORD)
+    (aside,) = (p for p in tmp_path.iterdir() if p.name != NAME)
+    assert aside.name in records.notice
+    assert aside.read_bytes() == content
+    with Records.open(path) as records:
+        assert not records.notice
+        assert len(records.measurements()) == 1
+
+
+@settings(deadline=None, max_examples=60)
+@given(data=st.data())
+def test_whatever_is_damaged_ends_in_a_sentence_or_in_new_records(
+    whole: bytes, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    path = tmp_path_factory.mktemp("damaged") / NAME
+    spoilt = bytearray(whole)
+    for _ in range(data.draw(st.integers(1, 4))):
+        spoilt[data.draw(st.integers(0, len(whole) - 1))] ^= data.draw(st.integers(1, 255))
+    path.write_bytes(spoilt[: data.draw(st.integers(0, 2 * len(whole)))])
+    try:
+        with Records.open(path) as records:
+            records.measurements()
+            records.add(RECORD)
+    except InputError as error:
+        assert str(path) in str(error)
+
+
+def test_the_database_of_another_program_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / NAME
+    other = sqlite3.connect(path)
+    other.execute("CREATE TABLE songs (title TEXT)")
+    other.commit()
+    other.close()
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="the database of another program"):
+        Records.open(path)
+    assert path.read_bytes() == before
+
+
+def test_newer_records_are_refused_and_left_as_they_are(tmp_path: Path) -> None:
+    path = tmp_path / NAME
+    with Records.open(path) as records:
+        records.add(RECORD)
+    newer = sqlite3.connect(path)
+    newer.execute("PRAGMA user_version = 9")
+    newer.commit()
+    newer.close()
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="have version 9 and this program knows"):
+        Records.open(path)
+    assert path.read_bytes() == before
+
+
+def test_older_records_are_brought_up_to_date_with_all_that_they_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Records.open(tmp_path / NAME) as records:
+        number = records.add(RECORD)
+    later = ("ALTER TABLE sensors ADD COLUMN colour TEXT NOT NULL DEFAULT 'red'",)
+    monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, later))
+    with Records.open(tmp_path / NAME) as records:
+        assert records.measurements() == (replace(RECORD, id=number),)
+    changed = sqlite3.connect(tmp_path / NAME)
+    assert changed.execute("SELECT serial, colour FROM sensors").fetchall() == [("A-1", "red")]
+    changed.close()
+
+
+def test_a_change_of_the_tables_that_fails_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / NAME
+    with Records.open(path) as records:
+        records.add(RECORD)
+    before = path.read_bytes()
+    wrong = ("ALTER TABLE sensors ADD COLUMN colour TEXT", "ALTER TABLE nothing ADD COLUMN x")
+    monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, wrong))
+    with pytest.raises(InputError, match="the records cannot be used"):
+        Records.open(path)
+    assert path.read_bytes() == before
+
+
+def test_a_folder_that_is_not_there_is_said_so(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the records cannot be opened or made here"):
+        Records.open(tmp_path / "gone" / NAME)
+
+
+def test_records_that_can_only_be_read_are_read(tmp_path: Path) -> None:
+    """As on a disk that is mounted so; permissions would not keep an administrator out."""
+    path = tmp_path / NAME
+    with Records.open(path) as records:
+        records.add(RECORD)
+    with Records.open(path) as records:
+        records._connection.execute("PRAGMA query_only = ON")
+        assert len(records.measurements()) == 1
+        with pytest.raises(InputError, match="the records can only be read here"):
+            records.add(RECORD)
+
+
+def test_a_full_disk_loses_the_new_measurement_only(tmp_path: Path) -> None:
+    path = tmp_path / NAME
+    with Records.open(path) as records:
+        number = records.add(RECORD)
+        (pages,) = records._connection.execute("PRAGMA page_count").fetchone()
+        records._connection.execute(f"PRAGMA max_page_count = {pages}")
+        with pytest.raises(InputError, match="the disk is full"):
+            records.add(replace(RECORD, note="x" * 100_000))
+        records.add(RECORD)
+        assert records.measurements()[0].id == number
+        assert len(records.measurements()) == 2
