@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import tempfile
 import traceback
@@ -93,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _open_closed_streams()
     warnings.showwarning = _log_warning
     try:
-        given = sys.argv[1:] if arguments is None else list(arguments)
+        given = _split_places(sys.argv[1:] if arguments is None else list(arguments))
         # The window is up before the commands, which it does not need, would be loaded.
         options = _WINDOW.get(tuple(given)) or build_parser().parse_args(given)
         status: int = options.run(options)
@@ -124,6 +125,16 @@ def _open_desktop(options: argparse.Namespace) -> int:
     return run([DEMO] if options.demo else [])
 
 
+def _split_places(arguments: list[str]) -> list[str]:
+    """Split places such as ``-1,2``, which would be taken for an option, into two numbers."""
+    return [
+        part
+        for argument in arguments
+        for part in (argument.split(",") if _PLACE.fullmatch(argument) else [argument])
+    ]
+
+
+_PLACE = re.compile(r"-\d*\.?\d+(,-?\d*\.?\d+)+")
 _WINDOW = {
     (): argparse.Namespace(run=_open_desktop, demo=False),
     (DEMO,): argparse.Namespace(run=_open_desktop, demo=True),

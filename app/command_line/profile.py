@@ -34,7 +34,7 @@ def add_parser(commands: Any) -> None:
             nargs="+",
             required=True,
             metavar="X Y",
-            help=tr("an end of the line, in mm (--{name}=X,Y also works)").format(name=name),
+            help=tr("an end of the line, in mm"),
         )
     parser.add_argument(
         "--width", type=float, default=0.0, metavar="MM", help=tr("average over this width")

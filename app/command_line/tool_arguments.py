@@ -41,10 +41,7 @@ def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
         nargs="+",
         metavar="X Y",
         default=[],
-        help=tr(
-            "the tool's places in mm: ends, centres, apex and arms, or points of a rim "
-            "(write --at=-1,2 where a pair with a comma begins with a minus)"
-        ),
+        help=tr("the tool's places in mm: ends, centres, apex and arms, or points of a rim"),
     )
     parser.add_argument("--width", type=float, metavar="MM", help=tr("across a profile"))
     parser.add_argument("--level", type=float, metavar="MM", help=tr("depth of a profile's width"))

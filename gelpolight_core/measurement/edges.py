@@ -1,4 +1,8 @@
-"""Where the surface is steepest near a drawn circle or rectangle, and the shape through there."""
+"""Where the surface is steepest near a drawn circle or rectangle, and the shape through there.
+
+Where a membrane leaves an object's edge, the map's blur moves the steepest place outwards, by about
+a node; that is part of what is stated.
+"""
 
 from __future__ import annotations
 
@@ -33,6 +37,8 @@ FLAT_SHARE = 0.3
 """A place less steep than this share of the median is no edge."""
 LEAST_SLOPE = 0.02
 """Nor is any place that is flatter than this (mm per mm)."""
+ROUNDS = 3
+"""Of a rectangle."""
 LEAST_POINTS = 5
 
 
@@ -45,8 +51,8 @@ class FittedCircle:
     centre_mm : (float, float)
     radius_mm : float
     sd_mm : (float, float, float)
-        Standard deviations of the centre's x and y and of the radius, from the points' scatter;
-        zero for three points, which a circle always meets.
+        Standard deviations of the centre's x and y and of the radius: the points' scatter (zero
+        for three points, which a circle always meets), and the map's blur at the steepest places.
     rms_mm : float
         Departure of the points from the circle.
     points_mm : (N, 2)
@@ -68,7 +74,7 @@ class FittedRectangle:
     ----------
     rectangle : Rectangle
     sides_sd_mm : (float, float)
-        Standard deviations of the sides, from the points' scatter.
+        Standard deviations of the sides, from the points' scatter and the map's blur.
     points_mm : (N, 2)
         The points that count.
     """
@@ -136,19 +142,29 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
     radius = drawn.radius_mm + offset[there]
     centre = np.array(drawn.centre_mm)
     away = radius[:, None] * np.stack([np.cos(turns[there]), np.sin(turns[there])], axis=1)
-    return fit_circle(centre + away)
+    found = fit_circle(centre + away)
+    x_sd, y_sd, radius_sd = found.sd_mm
+    return replace(found, sd_mm=(x_sd, y_sd, math.hypot(radius_sd, heightmap.pitch_mm)))
 
 
 def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
     """Return the rectangle through the steepest places near the sides of a drawn one.
 
-    A straight line is fitted to each side; the four turn together.
+    A straight line is fitted to each side; the four turn together. It is looked for again from
+    where it was found, since the middle of a side is better seen once the sides are in place.
 
     Raises
     ------
     InputError
         If a side has no edge near it.
     """
+    found = _rectangle_round(heightmap, drawn)
+    for _ in range(ROUNDS - 1):
+        found = _rectangle_round(heightmap, found.rectangle)
+    return found
+
+
+def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
     half = (0.5 * drawn.sides_mm[0], 0.5 * drawn.sides_mm[1])
     shifts, turns, spreads, points = [], [], [], []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
@@ -178,7 +194,9 @@ def rectangle_at_steepest(heightmap: HeightMap, drawn: Rectangle) -> FittedRecta
         sides_mm=sides,
         yaw_deg=drawn.yaw_deg + math.degrees(math.atan(turn)),
     )
-    sd = (math.hypot(*spreads[:2]), math.hypot(*spreads[2:]))
+    # Blur moves both edges outwards alike.
+    blur = 2.0 * heightmap.pitch_mm
+    sd = (math.hypot(*spreads[:2], blur), math.hypot(*spreads[2:], blur))
     return FittedRectangle(fitted, sd, np.concatenate(points))
 
 

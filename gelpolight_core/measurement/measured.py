@@ -129,9 +129,7 @@ def map_errors(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> MapErrors | No
     first = 0.5 * (factor - 1)
     place = np.stack([row - first, column - first]) / factor
     examples = np.array([map_coordinates(e, place, order=1, mode="nearest") for e in noise])
-    model_sd = map_coordinates(
-        heightmap.depth_model_sd_mm, np.stack([row, column]), order=1, mode="nearest"
-    )
+    model_sd = value_at(heightmap, heightmap.depth_model_sd_mm, x_mm, y_mm)
     examples = examples + model_sd * _smooth_fields(len(noise), x_mm, y_mm)
     return MapErrors(examples, heightmap.depth_scale_sd or 0.0, heightmap.lateral_scale_sd or 0.0)
 
@@ -171,6 +169,13 @@ def index_of(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> tuple[Array, Arr
     column = (np.asarray(x_mm, np.float64) - heightmap.x_mm[0]) / heightmap.pitch_mm
     row = (np.asarray(y_mm, np.float64) - heightmap.y_mm[0]) / heightmap.pitch_mm
     return column, row
+
+
+def value_at(heightmap: HeightMap, values: NDArray[np.floating], x_mm: Array, y_mm: Array) -> Array:
+    """Return the values of a map (rows, columns) at places, bilinear; beyond it the nearest."""
+    column, row = index_of(heightmap, x_mm, y_mm)
+    place = np.stack([row, column])
+    return np.asarray(map_coordinates(values, place, order=1, mode="nearest"), np.float64)
 
 
 def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from gelpolight_core.measurement.measured import (
     flags_at,
     map_errors,
     measured,
+    value_at,
 )
 from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.translation import tr
@@ -51,6 +52,10 @@ class Profile:
         map states none.
     flags : (n,) uint8
         Every flag that is set anywhere across the width.
+    pitch_mm : float
+        Of the map.
+    slope_model_sd : (n,) or None
+        Standard deviation of slopes from what the model does not explain.
     errors : MapErrors or None
         Errors of `depth_mm` that belong together, for figures read off the profile.
     """
@@ -62,6 +67,8 @@ class Profile:
     depth_mm: Array
     depth_sd_mm: Array | None
     flags: NDArray[np.uint8]
+    pitch_mm: float
+    slope_model_sd: Array | None = None
     errors: MapErrors | None = None
 
     @property
@@ -109,8 +116,19 @@ def take_profile(
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
     flags = np.bitwise_or.reduce(flags_at(heightmap, x, y), axis=0)
     errors = _profile_errors(heightmap, start_mm, end_mm, along, width_mm)
-    sd = None if errors is None else errors.sd_mm(mean)
-    return Profile(start_mm, end_mm, width_mm, along, mean, sd, flags, errors)
+    model = heightmap.slope_model_sd
+    return Profile(
+        start_mm=start_mm,
+        end_mm=end_mm,
+        width_mm=width_mm,
+        along_mm=along,
+        depth_mm=mean,
+        depth_sd_mm=None if errors is None else errors.sd_mm(mean),
+        flags=flags,
+        pitch_mm=heightmap.pitch_mm,
+        slope_model_sd=None if model is None else value_at(heightmap, model, x, y).mean(axis=0),
+        errors=errors,
+    )
 
 
 def _check_line(length: float, width_mm: float, step: float) -> None:
@@ -196,6 +214,10 @@ def width_at(
     InputError
         If the range holds no point of the map, or the profile does not cross the level and come
         back.
+
+    Notes
+    -----
+    A map shows a wall no sharper than its nodes: each end is taken to be known to one of them.
     """
     left, right, _ = _crossings(profile, level_mm, between)
 
@@ -203,7 +225,10 @@ def width_at(
         level = level_mm if level_mm is not None else _half_level(left, depth)
         return stretch * (right.place(depth, level) - left.place(depth, level))
 
-    return measured("width", "mm", compute, profile.depth_mm, profile.errors)
+    found = measured("width", "mm", compute, profile.depth_mm, profile.errors)
+    if found.sd is None:
+        return found
+    return replace(found, sd=math.hypot(found.sd, math.sqrt(2.0) * profile.pitch_mm))
 
 
 def width_ends(
@@ -237,7 +262,8 @@ def slope(profile: Profile, a: float, b: float) -> Measured:
     def compute(depth: Array, stretch: float) -> float:
         return _slope_deg(profile.along_mm[part], depth[part], stretch)
 
-    return measured("slope", "deg", compute, profile.depth_mm, profile.errors)
+    found = measured("slope", "deg", compute, profile.depth_mm, profile.errors)
+    return _with_model(found, profile, part)
 
 
 def angle_between(profile: Profile, first_mm: Point, second_mm: Point) -> Measured:
@@ -261,7 +287,23 @@ def angle_between(profile: Profile, first_mm: Point, second_mm: Point) -> Measur
         turns = [_slope_deg(profile.along_mm[p], depth[p], stretch) for p in (first, second)]
         return abs(turns[1] - turns[0])
 
-    return measured("angle", "deg", compute, profile.depth_mm, profile.errors)
+    found = measured("angle", "deg", compute, profile.depth_mm, profile.errors)
+    return _with_model(found, profile, first, second)
+
+
+def _with_model(found: Measured, profile: Profile, *parts: Mask) -> Measured:
+    """Add what the model leaves open of the slopes, which hang together over such ranges."""
+    model = profile.slope_model_sd
+    if found.sd is None or model is None:
+        return found
+    angles = [
+        math.radians(_slope_deg(profile.along_mm[p], profile.depth_mm[p], 1.0)) for p in parts
+    ]
+    spread = [
+        math.degrees(float(model[p].mean()) * math.cos(a) ** 2)
+        for p, a in zip(parts, angles, strict=True)
+    ]
+    return replace(found, sd=math.hypot(found.sd, *spread))
 
 
 @dataclass(frozen=True, slots=True)

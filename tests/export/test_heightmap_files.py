@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
 from gelpolight_core.export.mesh import mesh_of
 from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, Flag, HeightMap
 
@@ -61,7 +61,7 @@ def test_one_file_per_format_named_after_the_picture(tmp_path: Path, heightmap: 
     paths = write_heightmap(heightmap, folder, formats=["tif", "npz"])
     assert paths == [folder / "press_03.tif", folder / "press_03.npz"]
     write_heightmap(heightmap, folder, formats=FORMATS)
-    assert sorted(os.listdir(folder)) == sorted(f"press_03.{name}" for name in FORMATS)
+    assert sorted(os.listdir(folder)) == sorted(f"press_03.{ending(name)}" for name in FORMATS)
 
 
 def test_npz_holds_standard_deviations_where_there_are_any(
