@@ -102,8 +102,8 @@ class Measurement:
         if context.source.bench is not None and not options.still:
             self._move.timeout.connect(dragger(context.source.bench))
             self._move.start(DRAG_MS)
-        reconstructor = Reconstructor(calibration, model=options.model)
-        self.page.library.loaded.emit(reconstructor)
+        live = Reconstructor(calibration, model=options.model, effort=options.effort)
+        self.page.library.loaded.emit(live, live)
 
     def _choose(self, source: Path | None, width: int, context: AppContext) -> None:
         if source is None:
@@ -162,6 +162,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--calibration", type=Path, required=True)
     parser.add_argument("--model", choices=("paper", "full"))
+    parser.add_argument("--effort", default="balanced")
     parser.add_argument("--source", type=Path, help="folder of pictures, or recording")
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--warm-up", type=float, default=12.0, help="seconds not measured")

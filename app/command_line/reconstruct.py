@@ -9,7 +9,13 @@ from typing import Any
 
 from tqdm import tqdm
 
-from app.command_line.common import add_model, load_reconstructor, refuse_overwriting
+from app.command_line.common import (
+    add_effort,
+    add_model,
+    load_reconstructor,
+    plan_lines,
+    refuse_overwriting,
+)
 from app.command_line.inputs import Inputs
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
@@ -48,6 +54,12 @@ def add_parser(commands: Any) -> None:
         metavar="A:B",
         help=tr("of a recording, the frames from A, counted from 0, up to but not with B"),
     )
+    parser.add_argument(
+        "--explain",
+        action="store_true",
+        help=tr("say which steps each picture needed, and why the others were left out"),
+    )
+    add_effort(parser)
     add_model(parser)
     parser.set_defaults(run=run)
 
@@ -72,7 +84,9 @@ def run(options: argparse.Namespace) -> int:
     with Inputs(options.images, options.frames) as inputs:
         outputs = [options.output / f"{item.stem}.{e}" for item in inputs.items for e in endings]
         refuse_overwriting(outputs, [options.calibration, *options.images])
-        reconstructor = load_reconstructor(options.calibration, model=options.model)
+        reconstructor = load_reconstructor(
+            options.calibration, model=options.model, effort=options.effort
+        )
         inputs.require_match(reconstructor.calibration)
         make_folder(options.output)
         for item in inputs:
@@ -81,6 +95,8 @@ def run(options: argparse.Namespace) -> int:
                 picture.rgb, name=item.name, uncertainty=options.uncertainty
             )
             write_heightmap(heightmap, options.output, formats=formats)
+            if options.explain and heightmap.plan is not None:
+                tqdm.write("\n".join([f"{item.where}:", *plan_lines(heightmap.plan)]))
             for note in heightmap.notes:
                 tqdm.write(f"{item.where}: {note}", file=sys.stderr)
             if options.pictures:

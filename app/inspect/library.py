@@ -56,11 +56,11 @@ class Library(QObject):
 
     Signals
     -------
-    loaded(object)
-        The Reconstructor of the calibration in use, or None.
+    loaded(object, object)
+        Reconstructors of the calibration in use, for live and for standing pictures, or None.
     """
 
-    loaded = Signal(object)
+    loaded = Signal(object, object)
 
     def __init__(self, jobs: Jobs, box: CalibrationBox, *, context: AppContext) -> None:
         super().__init__(box)
@@ -86,7 +86,7 @@ class Library(QObject):
             return
         self._state = state
         if used is None:
-            self.loaded.emit(None)
+            self.loaded.emit(None, None)
             return
         self._read(used.path)
 
@@ -114,11 +114,13 @@ class Library(QObject):
             from gelpolight_core.calibration.file import read_calibration
             from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-            return path, Reconstructor(read_calibration(path))
+            calibration = read_calibration(path)
+            live = Reconstructor(calibration, effort="balanced")
+            return path, live, Reconstructor(calibration)
 
-        def done(found: tuple[Path, object]) -> None:
+        def done(found: tuple[Path, object, object]) -> None:
             if self._state[:1] == found[:1]:
-                self.loaded.emit(found[1])
+                self.loaded.emit(*found[1:])
 
         title = tr("Reading the calibration")
         self._jobs.submit(Job(title, work, done, lambda s: self._context.toasts.show(s, "fail")))

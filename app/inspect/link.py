@@ -104,12 +104,12 @@ class LiveLink(QObject):
 
     @property
     def reconstructor(self) -> Reconstructor | None:
-        """What makes depth of the frames."""
-        return self._maker.reconstructor
+        """What makes depth of a standing picture, as good as it can."""
+        return self._maker.best
 
-    def use(self, reconstructor: Reconstructor | None) -> None:
-        """Reconstruct with this from now on; what is under way is dropped."""
-        wanted, self._maker = self._maker.wanted, Maker(reconstructor)
+    def use(self, live: Reconstructor | None, best: Reconstructor | None = None) -> None:
+        """Reconstruct with these from now on; what is under way is dropped."""
+        wanted, self._maker = self._maker.wanted, Maker(live, best)
         self._maker.wanted = wanted
         self._processor.replace(self._maker)
         self._again()
@@ -219,5 +219,14 @@ class LiveLink(QObject):
         if self.last is None or self.last.heightmap is None:
             return ""
         words = tr("{hz:.0f} shown/s, {ms:.0f} ms").format(hz=self.shown_hz, ms=self.last.total_ms)
-        plan = getattr(self.last.heightmap, "plan", "") or self.last.heightmap.model
-        return f"{words}, {plan}"
+        plan = self.last.heightmap.plan
+        how = (
+            self.last.heightmap.model if plan is None else f"{plan.effort}, {len(plan.done)} steps"
+        )
+        return f"{words}, {how}"
+
+    def plan_words(self) -> str:
+        """Return which steps the frame shown needed, one a line."""
+        if self.last is None or self.last.heightmap is None or self.last.heightmap.plan is None:
+            return ""
+        return "\n".join(step.sentence for step in self.last.heightmap.plan.steps)

@@ -184,12 +184,12 @@ class InspectPage(QWidget):
             Job(tr("Looking at the background"), lambda _: drift_sentence(rgb, calibration), tell)
         )
 
-    def _use(self, reconstructor: Reconstructor | None) -> None:
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         self._places, self._drift, self._drift_due = None, "", True
-        if reconstructor is not None:
-            self._places = PixelPlaces(reconstructor.calibration.table)
+        if live is not None:
+            self._places = PixelPlaces(live.calibration.table)
             self.views.prepare()
-        self.link.use(reconstructor)
+        self.link.use(live, best)
         self.views.forget()
         self._advise()
 
@@ -216,6 +216,7 @@ class InspectPage(QWidget):
 
     def _tell(self) -> None:
         self._rate.setText("    ".join(filter(None, (self._recorded, self.link.words()))))
+        self._rate.setToolTip(self.link.plan_words())
         heightmap = None if self._shown is None else self._shown.heightmap
         text = tr("Point at a view to read the depth there.")
         if heightmap is None:

@@ -114,19 +114,21 @@ class Maker:
 
     Parameters
     ----------
-    reconstructor : Reconstructor or None
-        None: only the camera's picture.
+    live : Reconstructor or None
+        For moving pictures; None: only the camera's picture.
+    best : Reconstructor or None
+        For a standing one; by default the same.
     """
 
-    def __init__(self, reconstructor: Reconstructor | None) -> None:
-        self.reconstructor = reconstructor
+    def __init__(self, live: Reconstructor | None, best: Reconstructor | None = None) -> None:
+        self.live, self.best = live, best or live
         self.wanted = Wanted()
-        self._last: tuple[Frame, bool, bool, HeightMap, float] | None = None
+        self._last: tuple[Frame, tuple[Reconstructor, bool], HeightMap, float] | None = None
 
     def __call__(self, frame: Frame) -> Shown:
         """Make what is wanted of a frame."""
         wanted = self.wanted
-        if self.reconstructor is None or not wanted.needs_depth:
+        if self.live is None or not wanted.needs_depth:
             return Shown(frame)
         began = time.perf_counter()
         heightmap, depth_ms = self._heightmap(frame, wanted)
@@ -149,18 +151,19 @@ class Maker:
 
     def _heightmap(self, frame: Frame, wanted: Wanted) -> tuple[HeightMap, float]:
         """Return the frame's height map; that of a standing picture is kept."""
-        assert self.reconstructor is not None
+        reconstructor = self.best if wanted.still else self.live
+        assert reconstructor is not None
         uncertainty = wanted.still and wanted.quality == "uncertainty"
         if self._last is not None:
-            last, has_normals, has_uncertainty, heightmap, depth_ms = self._last
-            if last is frame and has_normals >= wanted.normals and has_uncertainty >= uncertainty:
+            same, made, heightmap, depth_ms = self._last
+            has = (heightmap.normals is not None, heightmap.depth_sd_mm is not None)
+            enough = has[0] >= wanted.normals and (has[1] or made[1] >= uncertainty)
+            if same is frame and made[0] is reconstructor and enough:
                 return heightmap, depth_ms
         began = time.perf_counter()
-        heightmap = self.reconstructor.depth(
-            frame.rgb, normals=wanted.normals, uncertainty=uncertainty
-        )
+        heightmap = reconstructor.depth(frame.rgb, normals=wanted.normals, uncertainty=uncertainty)
         depth_ms = 1e3 * (time.perf_counter() - began)
-        self._last = frame, wanted.normals, uncertainty, heightmap, depth_ms
+        self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
 
 
