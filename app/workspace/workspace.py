@@ -5,6 +5,7 @@
     workspace.json                       which calibration is in use
     sensors/SERIAL/NAME.gplcal           calibrations, and NAME.validation.json beside them
     sensors/SERIAL/sessions/NAME/        session folders
+    sensors/SERIAL/protocols/NAME/       runs of the evaluation protocol
     trash/TIME-NUMBER/                   what was removed, with its old place
 """
 
@@ -76,6 +77,24 @@ class Workspace:
     def sessions_folder(self, serial: str) -> Path:
         """Return where the sessions of a sensor are kept."""
         return self.sensor_folder(serial) / "sessions"
+
+    def protocols_folder(self, serial: str) -> Path:
+        """Return where the runs of the evaluation protocol on a sensor are kept."""
+        return self.sensor_folder(serial) / "protocols"
+
+    def protocols(self) -> tuple[Path, ...]:
+        """Return the folder of every run of the evaluation protocol, the newest first.
+
+        Raises
+        ------
+        InputError
+            If the workspace is there but cannot be read.
+        """
+        try:
+            found = [p.parent for p in self.sensors_folder.glob("*/protocols/[!.]*/protocol.toml")]
+        except OSError as error:
+            raise self._unreadable(error) from error
+        return tuple(sorted(found, key=lambda folder: folder.name, reverse=True))
 
     def calibration_path(self, serial: str, name: str) -> Path:
         """Return a place for a new calibration that no other file has; its folder is made."""

@@ -101,15 +101,9 @@ class PressWorker:
         design = self._sensor.design
         indenter = _indenter(press.truth)
         settled = self._settled_on(indenter) if isinstance(indenter, Cuboid) else None
-        rng = np.random.default_rng([self._equipment.seed, *press.file.encode()])
-        dx, dy, turn = rng.standard_normal(3) * (HAND_MM, HAND_MM, HAND_DEG)
+        x_mm, y_mm, yaw_deg = placed_by_hand(press, self._equipment.seed)
         state = pressed_membrane(
-            design,
-            indenter,
-            x_mm=press.place_mm[0] + dx,
-            y_mm=press.place_mm[1] + dy,
-            yaw_deg=press.yaw_deg + turn,
-            settled=settled,
+            design, indenter, x_mm=x_mm, y_mm=y_mm, yaw_deg=yaw_deg, settled=settled
         )
         write_picture(self._sensor.frame(state, stream=f"protocol/{press.file}"), picture)
 
@@ -132,6 +126,21 @@ class PressWorker:
                 self._settled.clear()
             self._settled[indenter] = settled_membrane(self._sensor.design, indenter)
         return self._settled[indenter]
+
+
+def placed_by_hand(press: PressWanted, seed: int = 0) -> tuple[float, float, float]:
+    """Return where a hand puts a press: x and y in mm, and how it is turned in degrees.
+
+    Parameters
+    ----------
+    press : PressWanted
+        Where it should go.
+    seed : int, optional
+        Of the hand.
+    """
+    rng = np.random.default_rng([seed, *press.file.encode()])
+    dx, dy, turn = rng.standard_normal(3) * (HAND_MM, HAND_MM, HAND_DEG)
+    return press.place_mm[0] + dx, press.place_mm[1] + dy, press.yaw_deg + turn
 
 
 def work_through(
