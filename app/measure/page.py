@@ -13,6 +13,7 @@ from app.measure.desk import PICTURES, RECORDING, Desk
 from app.measure.indenters_dialog import IndentersDialog
 from app.measure.keeping import Kept, record_of
 from app.measure.limits_dialog import LimitsDialog
+from app.measure.protocol_view import ProtocolView
 from app.measure.record_book import RecordBook
 from app.measure.record_table import quantity_text, shape_label
 from app.measure.results_view import ResultsView
@@ -49,9 +50,13 @@ class MeasurePage(QWidget):
         self.results = ResultsView(self.book, context=context)
         self.tabs.addTab(self.desk, tr("Measure"))
         self.tabs.addTab(self.results, tr("Records"))
+        self.protocol = ProtocolView(context=context)
+        self.tabs.addTab(self.protocol, tr("Evaluation protocol"))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.tabs)
+        self._shown = False
+        self.tabs.currentChanged.connect(lambda _index: self._on_tab())
         self.desk.calibrate_wanted.connect(self.calibrate_now)
         self.desk.indenters_wanted.connect(self.edit_indenters)
         self.desk.limits_wanted.connect(self.edit_limits)
@@ -68,17 +73,32 @@ class MeasurePage(QWidget):
 
     def enter(self) -> None:
         """Look at the source."""
+        self._shown = True
         self._read_indenters()
         self.book.refresh()
-        self.desk.enter()
+        self._on_tab()
 
     def leave(self) -> None:
         """Let the source go."""
+        self._shown = False
         self.desk.leave()
+        self.protocol.leave()
+
+    def _on_tab(self) -> None:
+        """Have only the part that is shown hold the source."""
+        if not self._shown:
+            return
+        shown = self.tabs.currentWidget()
+        for part in (self.desk, self.protocol):
+            if part is not shown:
+                part.leave()
+        if shown in (self.desk, self.protocol):
+            shown.enter()
 
     def may_close(self) -> bool:
         """Everything that was kept is on disk."""
         self.desk.close_work()
+        self.protocol.may_close()
         self.jobs.close()
         self.book.close()
         return True

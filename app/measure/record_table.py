@@ -31,8 +31,8 @@ _VERDICTS = {PASSED: ("pass", "pass"), FAILED: ("fail", "fail"), DOUBTFUL: ("war
 def headers() -> tuple[str, ...]:
     """Return what stands above the columns."""
     return (
-        tr("When"), tr("Sensor"), tr("What"), tr("Size or figure"), tr("Error (mm, %)"), tr("Depth"),
-        tr("Error (mm, %)"), tr("Verdict"), tr("Who"), tr("Note"), tr("Picture"),
+        tr("When"), tr("Sensor"), tr("What"), tr("Size or figure"), tr("Error (mm, %)"),
+        tr("Depth"), tr("Error (mm, %)"), tr("Verdict"), tr("Who"), tr("Note"), tr("Picture"),
     )  # fmt: skip
 
 
