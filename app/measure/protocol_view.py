@@ -10,14 +10,14 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
-from app.shell.jobs import Job, Jobs
-from app.widgets.source_button import SourceButton
 from app.measure.protocol_press import PressingView
 from app.measure.protocol_result import ResultView
 from app.measure.protocol_setup import KnownRun, ProtocolSetup
 from app.measure.protocol_work import Equipped, ProtocolWork, equip
 from app.shell.context import AppContext
+from app.shell.jobs import Job, Jobs
 from app.widgets.naming import named
+from app.widgets.source_button import SourceButton
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.evaluation import Evaluation

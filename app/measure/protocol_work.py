@@ -11,8 +11,8 @@ from typing import Any
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from app.shell.jobs import Job, Jobs
 from app.measure.protocol_look import PictureMap
+from app.shell.jobs import Job, Jobs
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.virtual_protocol import evaluate_run, run_ledger
