@@ -77,6 +77,18 @@ def add_effort(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_workers(parser: argparse.ArgumentParser, *, default: int) -> None:
+    """Add ``--workers``: how many pictures are worked on at a time."""
+    parser.add_argument(
+        "--workers",
+        type=int,
+        choices=range(1, 65),
+        default=default,
+        metavar="N",
+        help=tr("pictures that are worked on at a time, each by a process ({n})").format(n=default),
+    )
+
+
 def load_reconstructor(
     path: Path, *, model: str | None = None, effort: str = EFFORTS[-1]
 ) -> Reconstructor:

@@ -7,6 +7,7 @@
     sensors/SERIAL/sessions/NAME/        session folders
     sensors/SERIAL/recordings/TIME.gplrec
     records.sqlite                       what was measured
+    sensors/SERIAL/protocols/NAME/       runs of the evaluation protocol
     trash/TIME-NUMBER/                   what was removed, with its old place
 """
 
@@ -117,6 +118,24 @@ class Workspace:
         make_folder(folder)
         stamp = datetime.now().astimezone().strftime("%Y-%m-%d_%H-%M-%S")
         return _free(folder / f"{stamp}{RECORDING_ENDING}")
+
+    def protocols_folder(self, serial: str) -> Path:
+        """Return where the runs of the evaluation protocol on a sensor are kept."""
+        return self.sensor_folder(serial) / "protocols"
+
+    def protocols(self) -> tuple[Path, ...]:
+        """Return the folder of every run of the evaluation protocol, the newest first.
+
+        Raises
+        ------
+        InputError
+            If the workspace is there but cannot be read.
+        """
+        try:
+            found = [p.parent for p in self.sensors_folder.glob("*/protocols/[!.]*/protocol.toml")]
+        except OSError as error:
+            raise self._unreadable(error) from error
+        return tuple(sorted(found, key=lambda folder: folder.name, reverse=True))
 
     def calibration_path(self, serial: str, name: str) -> Path:
         """Return a place for a new calibration that no other file has; its folder is made."""

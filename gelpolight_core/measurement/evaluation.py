@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.truth import PressTruth, read_truth
 from gelpolight_core.translation import tr
 
@@ -44,6 +45,31 @@ class HeightMapLike(Protocol):
     @property
     def flags(self) -> NDArray[np.uint8]:
         """(rows, columns) flags."""
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """Where the paper's two series of objects cross.
+
+    Planar errors are those of objects of one height, depth errors those of objects of one size: an
+    object of the other series would give its one size or height a weight of many.
+
+    Attributes
+    ----------
+    size_mm : float
+        Size of all objects of the depth series.
+    height_mm : float
+        Height of all objects of the planar series.
+    """
+
+    size_mm: float
+    height_mm: float
+
+    def holds(self, truth: Truth, direction: str) -> bool:
+        """Return whether an object belongs to the series of a direction."""
+        if direction == "planar":
+            return math.isclose(truth.height_mm, self.height_mm, abs_tol=1e-6)
+        return math.isclose(truth.size_mm, self.size_mm, abs_tol=1e-6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,12 +179,15 @@ class Evaluation:
         Empty where nothing was repeated.
     skipped : tuple of str
         Files of shapes without a size.
+    crossing : Crossing or None
+        Which presses count in which direction; None: all in both.
     """
 
     results: tuple[PressResult, ...]
     groups: tuple[Group, ...]
     repeatability: tuple[Repeatability, ...]
     skipped: tuple[str, ...] = ()
+    crossing: Crossing | None = None
 
     @property
     def failed(self) -> tuple[PressResult, ...]:
@@ -166,8 +195,14 @@ class Evaluation:
         return tuple(result for result in self.results if result.measurement is None)
 
     def overall(self, direction: str) -> Statistic:
-        """Return the statistic of all presses in one direction."""
-        return _statistic([r.error_percent(direction) for r in self.results])
+        """Return the statistic of all presses that count in one direction."""
+        return _statistic([r.error_percent(direction) for r in self.series(direction)])
+
+    def series(
+        self, direction: str, results: Sequence[PressResult] | None = None
+    ) -> tuple[PressResult, ...]:
+        """Return those of `results` (by default all) that count in one direction."""
+        return _series(self.results if results is None else results, direction, self.crossing)
 
 
 def evaluate_presses(
@@ -175,6 +210,8 @@ def evaluate_presses(
     reconstruct: Callable[[Path], HeightMapLike],
     *,
     progress: Progress | None = None,
+    crossing: Crossing | None = None,
+    ledger: Ledger | None = None,
 ) -> Evaluation:
     """Measure every press of a folder with ``truth.csv`` and compare it with the truth.
 
@@ -186,6 +223,10 @@ def evaluate_presses(
         The reconstruction under test.
     progress : callable, optional
         Told the file's name and the share done, 0..1.
+    crossing : Crossing, optional
+        Of the series, where a protocol was pressed.
+    ledger : Ledger, optional
+        What is written there is not measured again; what is measured is written there.
 
     Raises
     ------
@@ -207,10 +248,10 @@ def evaluate_presses(
     for k, row in enumerate(table.rows):
         if progress is not None:
             progress(row.file, k / len(table.rows))
-        outcomes.append(_measured(folder / row.file, row.truth.shape, reconstruct))
+        outcomes.append(measure_press(folder / row.file, row.truth.shape, reconstruct, ledger))
     if progress is not None:
         progress("", 1.0)
-    return evaluate(table.rows, outcomes, skipped=table.skipped)
+    return evaluate(table.rows, outcomes, skipped=table.skipped, crossing=crossing)
 
 
 def evaluate(
@@ -218,6 +259,7 @@ def evaluate(
     outcomes: Sequence[Measurement | str],
     *,
     skipped: Sequence[str] = (),
+    crossing: Crossing | None = None,
 ) -> Evaluation:
     """Compare measurements with the truth.
 
@@ -229,9 +271,42 @@ def evaluate(
         For every row its measurement, or why there is none.
     skipped : sequence of str, optional
         Files without a true size, to be reported.
+    crossing : Crossing, optional
+        Of the series, where a protocol was pressed.
     """
     results = tuple(_result(row, outcome) for row, outcome in zip(rows, outcomes, strict=True))
-    return Evaluation(results, _groups(results), _repeatability(results), tuple(skipped))
+    groups = _groups(results, crossing)
+    return Evaluation(results, groups, _repeatability(results), tuple(skipped), crossing)
+
+
+def measure_press(
+    path: Path,
+    shape: str,
+    reconstruct: Callable[[Path], HeightMapLike],
+    ledger: Ledger | None = None,
+) -> Measurement | str:
+    """Measure the object in a picture, or return as a sentence why it cannot be measured.
+
+    Parameters
+    ----------
+    path : Path
+        The picture.
+    shape : str
+        What is pressed.
+    reconstruct : callable (picture's path) -> height map
+        The reconstruction.
+    ledger : Ledger, optional
+        Holds what was measured before.
+    """
+    key = None if ledger is None else ledger.key(path, shape)
+    if ledger is not None and key is not None:
+        known = ledger.find(key)
+        if known is not None:
+            return known
+    outcome = _measured(path, shape, reconstruct)
+    if ledger is not None and key is not None:
+        ledger.keep(key, outcome)
+    return outcome
 
 
 def _measured(
@@ -311,11 +386,20 @@ def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]
     return kinds
 
 
-def _groups(results: Sequence[PressResult]) -> tuple[Group, ...]:
+def _series(
+    results: Sequence[PressResult], direction: str, crossing: Crossing | None
+) -> tuple[PressResult, ...]:
+    if crossing is None:
+        return tuple(results)
+    return tuple(r for r in results if crossing.holds(r.press.truth, direction))
+
+
+def _groups(results: Sequence[PressResult], crossing: Crossing | None) -> tuple[Group, ...]:
     groups: list[Group] = []
-    for regions, presses in region_kinds(results).items():
-        shapes = sorted({r.press.truth.shape for r in presses})
+    for regions, everything in region_kinds(results).items():
         for direction in DIRECTIONS:
+            presses = _series(everything, direction, crossing)
+            shapes = sorted({r.press.truth.shape for r in presses})
             groups.append(_group(presses, direction, ALL, None, regions))
             for shape in shapes:
                 own = [r for r in presses if r.press.truth.shape == shape]

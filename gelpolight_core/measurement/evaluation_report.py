@@ -147,7 +147,7 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     panels = figure.subplots(len(series), 2, squeeze=False)
     for row, name in zip(panels, series, strict=True):
         for axes, direction in zip(row, DIRECTIONS, strict=True):
-            _panel(axes, kinds[name], direction, name)
+            _panel(axes, evaluation.series(direction, kinds[name]), direction, name)
     handles, labels = panels[0][0].get_legend_handles_labels()
     note = tr("bars: mean, whiskers: one standard deviation, dots: presses")
     if evaluation.failed:

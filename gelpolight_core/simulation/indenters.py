@@ -143,6 +143,26 @@ class Relief:
 Indenter = Ball | Cylinder | Cuboid | Relief
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """The membrane on a shape without an axis, in the shape's own frame, its middle at (0, 0).
+
+    Attributes
+    ----------
+    depth_mm, contact : (2 count + 1, 2 count + 1)
+        Depth, and where the shape is touched.
+    step_mm : float
+        Distance between cells.
+    count : int
+        Cells from the middle to the border.
+    """
+
+    depth_mm: Array
+    contact: NDArray[np.bool_]
+    step_mm: float
+    count: int
+
+
 def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
     """Return how far a rounded edge has dropped at a distance inside the outline, and its slope."""
     if edge_mm <= 0.0:
@@ -161,6 +181,7 @@ def press(
     decay_mm: float = 0.7,
     pitch_mm: float = PITCH_MM,
     margin_mm: float = 0.0,
+    settled: Settled | None = None,
     interrupt: Interrupt = never,
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
@@ -180,6 +201,9 @@ def press(
         Cell of the surface.
     margin_mm : float, optional
         Room around the indenter; at least as much as the membrane needs to come to rest.
+    settled : Settled, optional
+        From :func:`settle` with the same indenter, decay length and cell, which saves solving it
+        for every place anew.
     interrupt : callable, optional
         Called now and then; what it raises stops the work.
     """
@@ -194,7 +218,9 @@ def press(
         yaw = math.radians(yaw_deg)
         along = dx * math.cos(yaw) + dy * math.sin(yaw)
         across = dy * math.cos(yaw) - dx * math.sin(yaw)
-        depth, contact = _turned_drape(indenter, along, across, decay_mm, pitch_mm, interrupt)
+        if settled is None:
+            settled = settle(indenter, decay_mm=decay_mm, pitch_mm=pitch_mm, interrupt=interrupt)
+        depth, contact = _turned_drape(indenter, along, across, settled)
     return PressedSurface(depth, contact, float(xs[0]), float(ys[0]), pitch_mm)
 
 
@@ -220,15 +246,20 @@ def _round_drape(
     return np.where(contact, indenter.obstacle(radius, zeros), outside), contact
 
 
-def _turned_drape(
+def settle(
     indenter: Cuboid | Relief,
-    along: Array,
-    across: Array,
-    decay_mm: float,
-    pitch_mm: float,
-    interrupt: Interrupt,
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Solve in the indenter's frame, then read the solution at turned positions."""
+    *,
+    decay_mm: float = 0.7,
+    pitch_mm: float = PITCH_MM,
+    interrupt: Interrupt = never,
+) -> Settled:
+    """Return how the membrane settles on a shape without an axis, in the shape's own frame.
+
+    Parameters
+    ----------
+    indenter, decay_mm, pitch_mm, interrupt
+        As in :func:`press`.
+    """
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
     # The outline falls on cells, so that the block has its nominal side.
     count = math.ceil(half / pitch_mm)
@@ -237,9 +268,18 @@ def _turned_drape(
     depth, contact = solve_drape(
         indenter.obstacle, cells, cells, decay_mm=decay_mm, interrupt=interrupt
     )
-    place = [across / step + count, along / step + count]
-    turned = map_coordinates(depth, place, order=3, mode="constant", cval=0.0, prefilter=True)
-    touched = map_coordinates(contact.astype(np.float64), place, order=1, cval=0.0) > 0.5
+    return Settled(depth, contact, step, count)
+
+
+def _turned_drape(
+    indenter: Cuboid | Relief, along: Array, across: Array, settled: Settled
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Read the solution in the indenter's frame at turned positions."""
+    place = [across / settled.step_mm + settled.count, along / settled.step_mm + settled.count]
+    turned = map_coordinates(
+        settled.depth_mm, place, order=3, mode="constant", cval=0.0, prefilter=True
+    )
+    touched = map_coordinates(settled.contact.astype(np.float64), place, order=1, cval=0.0) > 0.5
     return np.clip(turned, 0.0, indenter.depth_mm), touched
 
 

@@ -32,9 +32,12 @@ from gelpolight_core.simulation.indenters import (
     Cuboid,
     Cylinder,
     Indenter,
+    Relief,
+    Settled,
     coin,
     nut,
     press,
+    settle,
 )
 from gelpolight_core.simulation.plan import (
     AVERAGED,
@@ -204,6 +207,7 @@ def pressed_membrane(
     x_mm: float,
     y_mm: float,
     yaw_deg: float = 0.0,
+    settled: Settled | None = None,
     interrupt: Interrupt = never,
 ) -> PressedMembrane:
     """Return the sensor with an indenter in its membrane, as fine as its picture calls for.
@@ -216,10 +220,11 @@ def pressed_membrane(
         What is pressed.
     x_mm, y_mm, yaw_deg : float
         Where, and how turned.
+    settled : Settled, optional
+        From :func:`settled_membrane` with the same design and indenter.
     interrupt : callable, optional
         Called now and then; what it raises stops the work.
     """
-    pixel = design.layers.top_distance_mm / design.camera.fx
     return PressedMembrane(
         press(
             indenter,
@@ -227,10 +232,30 @@ def pressed_membrane(
             y_mm=y_mm,
             yaw_deg=yaw_deg,
             decay_mm=design.membrane.decay_length_mm,
-            pitch_mm=max(PITCH_MM, 0.7 * pixel),
+            pitch_mm=_pitch_mm(design),
+            settled=settled,
             interrupt=interrupt,
         )
     )
+
+
+def settled_membrane(design: SensorDesign, indenter: Cuboid | Relief) -> Settled:
+    """Return how a sensor's membrane settles on a shape without an axis, wherever it is pressed.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The sensor.
+    indenter : Cuboid or Relief
+        What is pressed.
+    """
+    decay_mm = design.membrane.decay_length_mm
+    return settle(indenter, decay_mm=decay_mm, pitch_mm=_pitch_mm(design))
+
+
+def _pitch_mm(design: SensorDesign) -> float:
+    """Return the cell of a pressed surface that a design's picture calls for."""
+    return max(PITCH_MM, 0.7 * design.layers.top_distance_mm / design.camera.fx)
 
 
 def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:

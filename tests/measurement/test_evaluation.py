@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scene
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
@@ -17,6 +18,7 @@ from gelpolight_core.measurement.drape import cylinder_depth
 from gelpolight_core.measurement.evaluation import (
     RANDOM,
     SAME,
+    Crossing,
     Evaluation,
     evaluate,
     evaluate_presses,
@@ -27,8 +29,12 @@ from gelpolight_core.measurement.evaluation_report import (
     evaluation_table,
     write_evaluation,
 )
+from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.measurement.truth import PressTruth, read_truth
+from gelpolight_core.quality import Verdict
+from gelpolight_core.report.evaluation_document import evaluation_document
+from gelpolight_core.report.evaluation_files import write_evaluation_files
 
 HEADER = "file,shape,diameter_mm,side_mm,height_mm\n"
 
@@ -247,3 +253,69 @@ def test_a_missing_truth_file_or_picture_is_refused(tmp_path: Path) -> None:
     (tmp_path / "truth.csv").write_text(HEADER + "a.png,ball,6,,1\n")
     with pytest.raises(InputError, match=r"1 of 1 pictures are missing, first a\.png"):
         evaluate_presses(tmp_path, lambda path: heights(2.0))
+
+
+def test_each_direction_counts_its_own_series_of_a_protocol() -> None:
+    """Heights of 5 mm objects would count four times as much as any other size."""
+    rows = [press("cylinder", 4.0, 1.0), press("cylinder", 5.0, 1.0), press("cylinder", 5.0, 0.5)]
+    found = [
+        measurement("cylinder", 4.04, 1.5),
+        measurement("cylinder", 5.1, 1.01),
+        measurement("cylinder", 6.0, 0.49),
+    ]
+    evaluation = evaluate(rows, found, crossing=Crossing(size_mm=5.0, height_mm=1.0))
+    assert evaluation.overall("planar").mean_percent == pytest.approx((1.0 + 2.0) / 2)
+    assert evaluation.overall("depth").mean_percent == pytest.approx((1.0 - 2.0) / 2)
+    dimensions = {(g.direction, g.dimension_mm) for g in evaluation.groups if g.dimension_mm}
+    assert dimensions == {("planar", 4.0), ("planar", 5.0), ("depth", 1.0), ("depth", 0.5)}
+    panels = evaluation_figure(evaluation).axes
+    assert [label.get_text() for label in panels[1].get_xticklabels()] == ["0.5", "1"]
+
+
+def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -> None:
+    rows = [press("cuboid", 5.0, 1.0, region="same", repeat=str(k)) for k in range(3)]
+    rows += [press("cuboid", 5.0, 1.0, region=f"r{k}") for k in range(3)]
+    heights_mm = [0.99, 1.0, 1.01, 0.95, 1.0, 1.05]
+    found: list[Measurement | str] = [measurement("cuboid", 5.0, h) for h in heights_mm]
+    planar, depth = gauge_rows(evaluate(rows, found))
+    assert (depth.same.count, depth.random.count) == (3, 3)
+    assert depth.true_mm == 1.0 and planar.true_mm == 5.0
+    assert depth.same.mean_mm == pytest.approx(1.0)
+    assert depth.same.sd_mm == pytest.approx(0.01)
+    assert depth.random.sd_mm == pytest.approx(0.05)
+    assert depth.reproducibility_mm == pytest.approx(math.sqrt(0.05**2 - 0.01**2))
+    assert planar.reproducibility_mm == 0.0
+    found[3:] = ["no object is pressed"] * 3
+    _, depth = gauge_rows(evaluate(rows, found))
+    assert depth.random.count == 0
+    assert math.isnan(depth.reproducibility_mm)
+    assert gauge_rows(evaluate([press("cuboid", 5.0, 1.0)], found[:1])) == ()
+
+
+def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
+    evaluation = paper_protocol()
+    written = write_evaluation_files(evaluation, tmp_path, calibration=scene.calibration())
+    assert {path.name for path in written} == {
+        *(f"evaluation.{ending}" for ending in ("txt", "csv", "json", "png", "html", "pdf")),
+        "gauge.csv",
+    }
+    page = (tmp_path / "evaluation.html").read_text()
+    for said in ("T-1", "Repeatability, depth", "300 of 300 presses", "cuboid_7_1_r24_29.png"):
+        assert said in page
+    assert (tmp_path / "evaluation.pdf").read_bytes().startswith(b"%PDF")
+    with (tmp_path / "gauge.csv").open() as file:
+        gauge = list(csv.DictReader(file))
+    assert len(gauge) == 2 * 2 * 5
+    assert {row["same_region_n"] for row in gauge} == {"5"}
+    assert evaluation_document(evaluation).verdict is Verdict.PASS
+    strict = evaluation_document(evaluation, limits_percent=(5.0, 0.1))
+    assert strict.verdict is Verdict.FAIL
+
+
+def test_a_report_without_regions_or_measurements_says_so(tmp_path: Path) -> None:
+    evaluation = evaluate([press("ball", 6.0, 0.8)], ["the picture is all black"])
+    written = write_evaluation_files(evaluation, tmp_path)
+    assert "gauge.csv" not in {path.name for path in written}
+    page = (tmp_path / "evaluation.html").read_text()
+    assert "None of 1 presses could be measured" in page
+    assert "the picture is all black" in page

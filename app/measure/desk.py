@@ -1,0 +1,447 @@
+"""Where a press is measured: the picture live or held, tools on it, and what is known of them."""
+
+from __future__ import annotations
+
+import getpass
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDockWidget,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QMainWindow,
+    QScrollArea,
+    QToolBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.inspect.banner import Banner
+from app.inspect.library import CalibrationBox, Library
+from app.inspect.link import LiveLink
+from app.inspect.look import Look
+from app.inspect.products import Shown, Wanted
+from app.measure.advice import Situation, advice
+from app.measure.judging import Judged, judge
+from app.measure.keeping import Kept
+from app.measure.measuring import Taken
+from app.measure.side_panel import SidePanel
+from app.measure.steady import SteadyPress
+from app.measure.tool_map import ToolMap
+from app.measure.work import Work
+from app.shell import theme
+from app.shell.actions import make_action
+from app.shell.context import AppContext
+from app.shell.jobs import Jobs
+from app.widgets.naming import named
+from app.widgets.source_button import SourceButton
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.proposal import Proposal
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.recording import ENDING as RECORDING
+from gelpolight_core.translation import tr
+
+PICTURES = (".png", ".tif", ".tiff")
+
+
+class Desk(QMainWindow):
+    """Measures what is pressed.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        For long work.
+    context : AppContext
+        The program's.
+
+    Signals
+    -------
+    kept(object)
+        A result (Kept) shall go to the records.
+    calibrate_wanted(), indenters_wanted(), limits_wanted()
+        The virtual sensor shall be calibrated, a list or the limits be edited.
+    """
+
+    kept = Signal(object)
+    calibrate_wanted = Signal()
+    indenters_wanted = Signal()
+    limits_wanted = Signal()
+
+    def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "measure.desk", tr("Measure a press"))
+        self.setWindowFlags(Qt.WindowType.Widget)
+        self.context = context
+        self.work = Work(self)
+        self.link = LiveLink(self._on_live, context=context, parent=self)
+        self.box = CalibrationBox()
+        self.box.setObjectName("measure.calibration")
+        self.library = Library(jobs, self.box, context=context)
+        self.banner = Banner()
+        self.map = ToolMap(self.work)
+        self.panel = SidePanel()
+        self.panel.who.setText(getpass.getuser())
+        self.validated = named(QLabel(), "measure.validated", tr("Validated or not"))
+        self.auto = named(
+            QCheckBox(tr("Hold when steady")),
+            "measure.auto",
+            tr("Hold the picture and say what is pressed when a press is steady"),
+        )
+        self.auto.setChecked(True)
+        self._steady = SteadyPress()
+        self._has_calibration = False
+        self._trouble = ""
+        self._build()
+        self._connect()
+
+    # Layout
+
+    def _build(self) -> None:
+        middle = QWidget()
+        across = QHBoxLayout()
+        across.setSpacing(0)
+        across.addWidget(self.map, 1)
+        across.addWidget(self.panel)
+        column = QVBoxLayout(middle)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.banner)
+        column.addLayout(across, 1)
+        self.setCentralWidget(middle)
+        self._build_bar()
+        self._bench = QDockWidget(tr("Virtual bench"), self)
+        named(self._bench, "measure.bench", tr("Virtual bench"))
+        self.addDockWidget(Qt.DockWidgetArea.LeftDockWidgetArea, self._bench)
+        self._bench.hide()
+
+    def _build_bar(self) -> None:
+        bar = named(QToolBar(tr("Measure")), "measure.bar", tr("Measure"))
+        bar.setMovable(False)
+        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        self.hold_action = make_action(
+            self, "measure.hold", tr("Hold"), self.toggle_hold, keys=("Space",),
+            icon_name="hold", tip=tr("Hold the picture and measure on it, or go on (Space)"),
+        )  # fmt: skip
+        self.hold_action.setCheckable(True)
+        open_action = make_action(
+            self, "measure.open", tr("Open a picture…"), self.choose_file, keys=("Ctrl+P",),
+            icon_name="folder", tip=tr("Measure on a picture from a file (Ctrl+P)"),
+        )  # fmt: skip
+        stack = self.work.undo
+        undo = make_action(
+            self, "measure.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",), icon_name="undo",
+            tip=tr("Undo (Ctrl+Z)"),
+        )  # fmt: skip
+        redo = make_action(
+            self, "measure.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"),
+            icon_name="redo", tip=tr("Redo (Ctrl+Y)"),
+        )  # fmt: skip
+        for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
+            action.setEnabled(False)
+            can.connect(action.setEnabled)
+        self.source = SourceButton(context=self.context, page="measure", none=tr("No camera"))
+        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        bar.addWidget(self.source)
+        bar.addAction(open_action)
+        bar.addSeparator()
+        bar.addWidget(self.box)
+        bar.addWidget(self.validated)
+        bar.addSeparator()
+        bar.addAction(self.hold_action)
+        bar.addWidget(self.auto)
+        bar.addSeparator()
+        bar.addActions([undo, redo])
+        for action in (undo, redo):
+            bar.widgetForAction(action).setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
+        self.addToolBar(bar)
+        make_action(self, "measure.propose", tr("What is pressed?"), self.propose, keys=("Q",))
+        make_action(self, "measure.fit", tr("Whole map"), self.map.view.fit, keys=("F",))
+        make_action(
+            self, "measure.keep_result", tr("Keep in the records"), self.keep,
+            keys=("Ctrl+Return",),
+        )  # fmt: skip
+
+    def _connect(self) -> None:
+        self.library.loaded.connect(self._use)
+        self.context.source.changed.connect(self._on_source)
+        self.link.said.connect(self._on_said)
+        self.banner.act_wanted.connect(self._on_act)
+        self.work.changed.connect(self._refresh)
+        self.work.picture_changed.connect(self._refresh)
+        self.work.busy_changed.connect(self._advise)
+        self.work.refused.connect(self._on_refused)
+        self.work.proposed.connect(self._on_proposed)
+        self.map.hold_wanted.connect(lambda: self.hold(True))
+        self.map.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
+        panel = self.panel
+        panel.propose_wanted.connect(self.propose)
+        panel.tool_chosen.connect(self.work.choose)
+        panel.remove_wanted.connect(lambda: self.work.remove(self.work.chosen))
+        panel.keep_wanted.connect(self.keep)
+        panel.truth.changed.connect(self.judge_again)
+        panel.truth.indenters_wanted.connect(self.indenters_wanted)
+        panel.truth.limits_wanted.connect(self.limits_wanted)
+
+    # What the page asks
+
+    def enter(self) -> None:
+        """Look at the source through the calibration in use."""
+        self.library.refresh()
+        self._show_validated()
+        self.link.want(Wanted(height=True))
+        self.link.enter(True)
+        self._follow_bench()
+        self._advise()
+
+    def leave(self) -> None:
+        """Let the source go; a picture that is held stays."""
+        self.link.enter(False)
+
+    def close_work(self) -> None:
+        """End every thread."""
+        self.link.enter(False)
+        self.work.close()
+
+    def open_file(self, path: Path) -> None:
+        """Measure on a picture, or play a recording as the camera.
+
+        Raises
+        ------
+        InputError
+            If it is neither.
+        """
+        if path.suffix.lower() == RECORDING:
+            self.context.source.choose_recording(path)
+            self.release()
+            return
+        if path.suffix.lower() not in PICTURES:
+            raise InputError(
+                tr("this is neither a picture nor a recording"),
+                where=str(path),
+                advice=tr("Open a PNG or TIFF picture of the calibrated sensor"),
+            )
+        self.context.settings.last_folder = path.parent
+        self._take(Taken(path.name, path=path))
+
+    def choose_file(self) -> None:
+        """Let the person choose a picture or a recording."""
+        endings = " ".join(f"*{ending}" for ending in (*PICTURES, RECORDING))
+        chosen, _ = QFileDialog.getOpenFileName(
+            self,
+            tr("Open a picture or a recording"),
+            str(self.context.settings.last_folder),
+            tr("Pictures and recordings ({endings})").format(endings=endings),
+        )
+        if chosen:
+            self._try_file(Path(chosen))
+
+    def _try_file(self, path: Path) -> None:
+        try:
+            self.open_file(path)
+        except InputError as error:
+            self.context.toasts.show(str(error), "fail")
+
+    # Live and held
+
+    def toggle_hold(self) -> None:
+        """Hold the picture, or go on."""
+        if self.work.taken is None:
+            self.hold()
+        else:
+            self.release()
+
+    def hold(self, by_hand: bool = True) -> None:
+        """Hold the picture that is shown, to measure on it."""
+        shown = self.link.last
+        if self.work.taken is None and shown is not None and shown.heightmap is not None:
+            now = datetime.now().astimezone()
+            name = tr("{camera}, {time:%H:%M:%S}").format(camera=self._camera(), time=now)
+            self._take(Taken(name, frame=shown.frame), propose=not by_hand)
+        self._follow_hold()
+
+    def release(self) -> None:
+        """Go on with the live picture."""
+        self._steady.hold_off()
+        self.work.take(None)
+        self.link.pause(False)
+        self._follow_hold()
+        if self.link.stream is None:
+            self.map.say(tr("No depth yet."))
+
+    def _take(self, taken: Taken, *, propose: bool = False) -> None:
+        self.link.pause(True)
+        self._trouble = ""
+        self.panel.say_kept("")
+        self.work.take(taken, propose=propose)
+        if taken.path is not None:
+            self.map.say(tr("Reconstructing {name}…").format(name=taken.name))
+        self._follow_hold()
+
+    def _follow_hold(self) -> None:
+        held = self.work.taken is not None
+        self.hold_action.setChecked(held)
+        self.hold_action.setText(tr("Held") if held else tr("Hold"))
+        self._refresh()
+
+    def _on_live(self, shown: Shown) -> None:
+        if self.work.taken is not None:
+            return
+        self.map.show_live(shown, Look())
+        heightmap = shown.heightmap
+        if heightmap is None:
+            return
+        frame = shown.frame
+        steady = self._steady.update(heightmap.depth_mm, frame.time_s, settled=frame.settled)
+        if steady and self.auto.isChecked():
+            self.hold(by_hand=False)
+
+    def _camera(self) -> str:
+        info = self.context.source.info
+        return tr("picture") if info is None else info.name
+
+    # Measuring
+
+    def propose(self) -> None:
+        """Say what is pressed."""
+        if self.work.taken is None:
+            self.hold(by_hand=False)
+        else:
+            self.work.propose()
+
+    def keep(self) -> None:
+        """Send the chosen tool's result to the records."""
+        result, heightmap = self.work.result, self.work.heightmap
+        entry = next((e for e in self.library.entries if e.in_use), None)
+        if result is None or heightmap is None or entry is None:
+            return
+        kept = Kept(
+            result=result,
+            judged=self.judged(),
+            stated=self.panel.truth.stated,
+            limits=self.context.settings.limits,
+            heightmap=heightmap,
+            serial=entry.serial,
+            operator=self.panel.who.text().strip(),
+            note=self.panel.note.text().strip(),
+        )
+        self.kept.emit(kept)
+
+    def judged(self) -> tuple[Judged, ...]:
+        """Return how the chosen tool's result compares with what is stated."""
+        result = self.work.result
+        if result is None:
+            return ()
+        return judge(result, self.panel.truth.stated, self.context.settings.limits)
+
+    def judge_again(self) -> None:
+        """Compare with the truth again: it, the result or the limits are others."""
+        try:
+            rows = self.judged()
+        except InputError as error:
+            self.panel.truth.show_refusal(str(error))
+            return
+        self.panel.truth.show_verdict(rows, self.work.result)
+
+    def _refresh(self) -> None:
+        known = self.work.heightmap is not None or self._can_hold
+        self.panel.show_work(self.work, known=known)
+        self.map.tools.allow(known)
+        self.hold_action.setEnabled(self.work.taken is not None or self._can_hold)
+        self.judge_again()
+        self._advise()
+
+    @property
+    def _can_hold(self) -> bool:
+        return self.link.last is not None and self.link.last.heightmap is not None
+
+    def _on_proposed(self, proposal: Proposal | None) -> None:
+        if proposal is None:
+            text = tr("No ball, cylinder or cuboid was found: press one, or use the other tools.")
+            self.context.toasts.show(text)
+        elif len(proposal.candidates) > 1:
+            names = tr(" and ").join(proposal.candidates)
+            text = tr("Not clear which: {names} fit alike. Choose the tool that is right.")
+            self.context.toasts.show(text.format(names=names), "warn")
+
+    def _on_refused(self, sentence: str) -> None:
+        self._trouble = sentence
+        self.map.say(tr("This picture cannot be measured on."))
+        self._advise()
+
+    # The calibration and the source
+
+    def _use(self, reconstructor: Reconstructor | None) -> None:
+        self._has_calibration = reconstructor is not None
+        self._trouble = ""
+        self.link.use(reconstructor)
+        self.work.use(reconstructor)
+        if self.work.taken is None:
+            self.map.say(tr("No depth yet."))
+        self._show_validated()
+        self._refresh()
+
+    def _show_validated(self) -> None:
+        entry = next((e for e in self.library.entries if e.in_use), None)
+        text, role = "", "muted"
+        if entry is not None:
+            text, role = (
+                (tr("validated"), "pass") if entry.validated else (tr("not validated"), "warn")
+            )
+        self.validated.setText(f"  {text}  ")
+        self.validated.setStyleSheet(f"color: {theme.colour(role).name()};")
+
+    def _on_source(self) -> None:
+        self.link.open()
+        self._follow_bench()
+        if self.work.taken is None:
+            self.map.say(tr("No depth yet."))
+        self._advise()
+
+    def _follow_bench(self) -> None:
+        """Have the bench beside the map where the virtual sensor is the camera."""
+        source = self.context.source
+        virtual = source.info is not None and source.info.kind == "virtual"
+        if virtual and source.bench is not None and self._bench.widget() is None:
+            from app.bench.bench_panel import BenchPanel  # only the demo needs it
+
+            scroll = QScrollArea()
+            scroll.setWidgetResizable(True)
+            scroll.setWidget(BenchPanel(bench=source.bench))
+            self._bench.setWidget(scroll)
+        self._bench.setVisible(virtual)
+
+    # What to do next
+
+    def _on_said(self, sentence: str) -> None:
+        self._trouble = sentence
+        self._advise()
+
+    def _advise(self) -> None:
+        info = self.context.source.info
+        situation = Situation(
+            kind="" if info is None else info.kind,
+            has_calibration=self._has_calibration,
+            held=self.work.taken is not None,
+            busy=self.work.busy,
+            has_tools=bool(self.work.sheet.items),
+            trouble=self._trouble,
+        )
+        text, act, role = advice(situation)
+        self.banner.advise(text, act, role=role)
+
+    def _on_act(self, name: str) -> None:
+        match name:
+            case "virtual":
+                self.context.source.choose_virtual_sensor()
+            case "calibrate":
+                self.calibrate_wanted.emit()
+            case "sensors":
+                self.context.requests.page.emit("sensors")
+            case "live":
+                self.release()
+            case "reopen":
+                self.link.open()

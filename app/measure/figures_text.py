@@ -1,0 +1,40 @@
+"""Measured values as people write them: no more digits than the standard deviation allows."""
+
+from __future__ import annotations
+
+import math
+
+from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.translation import tr
+
+MOST_DECIMALS = 4
+WITHOUT_SD = {"mm": 3, "um": 1, "deg": 2, "%": 2}
+UNITS = {"mm": " mm", "um": " \N{MICRO SIGN}m", "deg": "°", "%": " %"}
+
+
+def decimals_for(sd: float | None, unit: str) -> int:
+    """Return how many decimals a value may have: two digits of its standard deviation."""
+    usual = WITHOUT_SD.get(unit, 3)
+    if sd is None or not math.isfinite(sd) or sd <= 0.0:
+        return usual
+    wanted = max(1 - math.floor(math.log10(sd)), 0)
+    return wanted if wanted <= MOST_DECIMALS else usual
+
+
+def value_text(value: float, sd: float | None, unit: str) -> str:
+    """Return ``5.012 ± 0.024 mm``, or the value alone where no standard deviation is stated."""
+    decimals = decimals_for(sd, unit)
+    behind = UNITS.get(unit, f" {unit}")
+    if not math.isfinite(value):
+        return tr("unknown")
+    number = f"{value:.{decimals}f}"
+    if sd is None or not math.isfinite(sd):
+        return f"{number}{behind}"
+    smallest = 10.0**-decimals
+    spread = f"{sd:.{decimals}f}" if sd >= 0.5 * smallest else f"<{smallest:.{decimals}f}"
+    return f"{number} ± {spread}{behind}"
+
+
+def figure_text(figure: Measured) -> str:
+    """Return a figure as people write it."""
+    return value_text(figure.value, figure.sd, figure.unit)

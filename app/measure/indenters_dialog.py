@@ -1,0 +1,163 @@
+"""The list of known indenters, to be edited like a small spreadsheet."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QDialog,
+    QDialogButtonBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.measure.placing import INDENTERS, kind_label
+from app.shell import theme
+from app.shell.icons import icon
+from app.widgets.naming import named
+from app.workspace.indenters import Indenter
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+NAME, SHAPE, SIZE, SECOND, HEIGHT = range(5)
+
+
+class IndentersDialog(QDialog):
+    """Edits the list; what cannot be is said below it, and the list is not taken.
+
+    Attributes
+    ----------
+    indenters : tuple of Indenter
+        As accepted.
+    """
+
+    def __init__(self, indenters: tuple[Indenter, ...], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "measure.indenters", tr("Known indenters"))
+        self.setWindowTitle(tr("Known indenters"))
+        self.resize(680, 480)
+        self.indenters = indenters
+        self.table = self._make_table()
+        self.problem = named(QLabel(), "measure.indenters.problem", tr("What is wrong"))
+        self.problem.setWordWrap(True)
+        self.problem.setStyleSheet(f"color: {theme.colour('fail').name()};")
+        add = _button("add", tr("&Add"))
+        add.clicked.connect(lambda: self.add_row(Indenter(tr("New cylinder"), "cylinder", 5.0)))
+        remove = _button("remove", tr("&Remove"))
+        remove.clicked.connect(self.remove_rows)
+        kinds = QDialogButtonBox.StandardButton
+        buttons = QDialogButtonBox(kinds.Save | kinds.Cancel)
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        row = QHBoxLayout()
+        row.addWidget(add)
+        row.addWidget(remove)
+        row.addStretch(1)
+        row.addWidget(buttons)
+        words = QLabel(
+            tr("Lengths in mm. The depth is how far it goes in until its base touches, if it has.")
+        )
+        words.setWordWrap(True)
+        column = QVBoxLayout(self)
+        for widget in (words, self.table, self.problem):
+            column.addWidget(widget)
+        column.addLayout(row)
+        for indenter in indenters:
+            self.add_row(indenter)
+        self.table.setCurrentCell(0, NAME)
+
+    def _make_table(self) -> QTableWidget:
+        table = named(QTableWidget(0, 5), "measure.indenters.table", tr("Known indenters"))
+        table.setHorizontalHeaderLabels(
+            [tr("Name"), tr("Shape"), tr("Diameter or side"), tr("Other side"), tr("Depth")]
+        )
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        table.verticalHeader().hide()
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setAlternatingRowColors(True)
+        return table
+
+    def add_row(self, indenter: Indenter) -> None:
+        """Add an indenter at the end."""
+        row = self.table.rowCount()
+        self.table.insertRow(row)
+        texts = {
+            NAME: indenter.name,
+            SIZE: f"{indenter.size_mm:g}",
+            SECOND: "" if indenter.second_mm is None else f"{indenter.second_mm:g}",
+            HEIGHT: "" if indenter.height_mm is None else f"{indenter.height_mm:g}",
+        }
+        for column, text in texts.items():
+            item = QTableWidgetItem(text)
+            if column != NAME:
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.table.setItem(row, column, item)
+        shape = named(QComboBox(), f"measure.indenters.shape{row}", tr("Shape"))
+        for name in INDENTERS:
+            shape.addItem(kind_label(name), name)
+        shape.setCurrentIndex(shape.findData(indenter.shape))
+        self.table.setCellWidget(row, SHAPE, shape)
+        self.table.setCurrentCell(row, NAME)
+
+    def remove_rows(self) -> None:
+        """Take the selected ones out."""
+        rows = {index.row() for index in self.table.selectedIndexes()}
+        for row in sorted(rows, reverse=True):
+            self.table.removeRow(row)
+
+    def accept(self) -> None:
+        """Take the list, or say what is wrong with it."""
+        try:
+            found = tuple(self._indenter(row) for row in range(self.table.rowCount()))
+        except InputError as error:
+            self.problem.setText(str(error))
+            return
+        self.indenters = found
+        super().accept()
+
+    def _indenter(self, row: int) -> Indenter:
+        name = self._text(row, NAME)
+        shape = self.table.cellWidget(row, SHAPE)
+        assert isinstance(shape, QComboBox)
+        size = self._length(row, SIZE)
+        if size is None:
+            raise InputError(
+                tr("the size is missing"),
+                where=tr("indenter {name}").format(name=name),
+                advice=tr("Give its diameter or side in mm"),
+            )
+        second = self._length(row, SECOND) if shape.currentData() == "cuboid" else None
+        return Indenter(name, shape.currentData(), size, second, self._length(row, HEIGHT))
+
+    def _text(self, row: int, column: int) -> str:
+        item = self.table.item(row, column)
+        return "" if item is None else item.text().strip()
+
+    def _length(self, row: int, column: int) -> float | None:
+        text = self._text(row, column)
+        if not text:
+            return None
+        try:
+            return float(text.replace(",", "."))
+        except ValueError as error:
+            raise InputError(
+                tr("'{text}' is no number").format(text=text),
+                where=tr("indenter {name}").format(name=self._text(row, NAME)),
+                advice=tr("Give lengths in mm, such as 5 or 3.5"),
+            ) from error
+
+
+def _button(name: str, text: str) -> QPushButton:
+    button = named(QPushButton(text), f"measure.indenters.{name}", text.replace("&", ""))
+    button.setIcon(icon(name))
+    button.setAutoDefault(False)
+    return button

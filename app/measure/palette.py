@@ -1,0 +1,70 @@
+"""The palette of measuring tools: one button each, with a key of its own."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
+
+from app.measure.placing import Kind, kinds
+from app.shell.icons import icon
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+SIDE = 26
+
+
+class Palette(QWidget):
+    """One button for each kind of tool; a second press lets it go.
+
+    Signals
+    -------
+    chosen(str)
+        Name of the kind; empty when none is chosen any more.
+    """
+
+    chosen = Signal(str)
+
+    def __init__(self, owner: QWidget) -> None:
+        super().__init__()
+        named(self, "measure.palette", tr("Measuring tools"))
+        self.buttons: dict[str, QToolButton] = {}
+        column = QVBoxLayout(self)
+        column.setContentsMargins(4, 6, 4, 6)
+        column.setSpacing(3)
+        for kind in kinds():
+            column.addWidget(self._make_button(kind, owner))
+            if kind.name in ("angle", "rectangle"):
+                column.addSpacing(8)
+        column.addStretch(1)
+
+    def _make_button(self, kind: Kind, owner: QWidget) -> QToolButton:
+        tip = f"{kind.label} ({kind.key})"
+        button = named(QToolButton(), f"measure.tool.{kind.name}", kind.label, tip)
+        button.setAutoRaise(True)
+        button.setIconSize(QSize(SIDE, SIDE))
+        button.setIcon(icon(f"tool-{kind.name}"))
+        button.setCheckable(True)
+        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        button.clicked.connect(lambda on, name=kind.name: self._on_clicked(name, on))
+        shortcut = QShortcut(QKeySequence(kind.key), owner)
+        shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        shortcut.activated.connect(button.click)
+        self.buttons[kind.name] = button
+        return button
+
+    def let_go(self) -> None:
+        """Choose none."""
+        for button in self.buttons.values():
+            button.setChecked(False)
+
+    def allow(self, on: bool) -> None:
+        """Offer the tools, or none."""
+        for button in self.buttons.values():
+            button.setEnabled(on)
+
+    def _on_clicked(self, name: str, on: bool) -> None:
+        for other, button in self.buttons.items():
+            if other != name:
+                button.setChecked(False)
+        self.chosen.emit(name if on else "")

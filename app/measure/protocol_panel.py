@@ -1,0 +1,241 @@
+"""Beside the live picture: what to press next, how it goes, and how far the run is."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QCheckBox,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.measure.protocol_look import object_name
+from app.shell import theme
+from app.widgets.naming import named
+from gelpolight_core.measurement.protocol import SAME_REGION, PressWanted
+from gelpolight_core.measurement.protocol_run import RunProgress
+from gelpolight_core.measurement.result import Measurement, compare
+from gelpolight_core.translation import tr
+
+WIDTH = 372
+LIVE_LINES = 3
+MOST_ROWS = 200
+
+
+class RunPanel(QWidget):
+    """Shows the next press and the last ones.
+
+    Signals
+    -------
+    bare_wanted()
+        The membrane is bare: take its picture.
+    capture_wanted()
+        Take this press now, steady or not.
+    take_back_wanted()
+        Make the last press again.
+    bench_wanted(bool)
+        Let the virtual bench press, or stop it.
+    evaluate_wanted()
+        Show the result of what is pressed so far.
+    leave_wanted()
+        Leave the run; it can be gone on with.
+    """
+
+    bare_wanted = Signal()
+    capture_wanted = Signal()
+    take_back_wanted = Signal()
+    bench_wanted = Signal(bool)
+    evaluate_wanted = Signal()
+    leave_wanted = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "protocol.panel", tr("The next press"))
+        self.setFixedWidth(WIDTH)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(12, 10, 12, 10)
+        column.setSpacing(8)
+        self._build_task(column)
+        self._build_buttons(column)
+        self._build_progress(column)
+        self._build_last(column)
+        self._build_foot(column)
+
+    def _build_task(self, column: QVBoxLayout) -> None:
+        self.title = named(QLabel(), "protocol.title", tr("What to press next"))
+        font = self.title.font()
+        font.setPointSizeF(font.pointSizeF() * 1.35)
+        font.setBold(True)
+        self.title.setFont(font)
+        self.title.setWordWrap(True)
+        self.where = named(QLabel(), "protocol.where", tr("Where to press it"))
+        self.where.setWordWrap(True)
+        self.live = named(QLabel(), "protocol.live", tr("What the live picture shows"))
+        self.live.setWordWrap(True)
+        self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
+        # Room that is always there, so that nothing below moves when a sentence changes.
+        self.live.setMinimumHeight(LIVE_LINES * self.live.fontMetrics().lineSpacing() + 12)
+        self.where.setMinimumHeight(2 * self.where.fontMetrics().lineSpacing() + 2)
+        self.where.setAlignment(Qt.AlignmentFlag.AlignTop)
+        for label in (self.title, self.where, self.live):
+            column.addWidget(label)
+
+    def _build_buttons(self, column: QVBoxLayout) -> None:
+        self.bare = named(
+            QPushButton(tr("The membrane is &bare: begin")),
+            "protocol.bare",
+            tr("Take the picture of the bare membrane, and begin"),
+        )
+        self.bare.setMinimumHeight(38)
+        self.bare.clicked.connect(self.bare_wanted)
+        self.capture = named(
+            QPushButton(tr("&Capture now")),
+            "protocol.capture",
+            tr("Capture this press now"),
+            tr("It is taken by itself once it is steady; it is refused if it is not"),
+        )
+        self.capture.clicked.connect(self.capture_wanted)
+        self.take_back = named(
+            QPushButton(tr("&Repeat the last")),
+            "protocol.take_back",
+            tr("Make the last press again"),
+            tr("Its picture is kept in the folder discarded"),
+        )
+        self.take_back.clicked.connect(self.take_back_wanted)
+        self.bench = named(
+            QCheckBox(tr("&Let the bench do it")),
+            "protocol.bench",
+            tr("Let the virtual bench press by itself"),
+        )
+        self.bench.toggled.connect(self.bench_wanted)
+        column.addWidget(self.bare)
+        row = QHBoxLayout()
+        row.addWidget(self.capture)
+        row.addWidget(self.take_back)
+        column.addLayout(row)
+        column.addWidget(self.bench)
+
+    def _build_progress(self, column: QVBoxLayout) -> None:
+        self.progress = named(QProgressBar(), "protocol.progress", tr("How far the run is"))
+        self.progress.setTextVisible(False)
+        self.counts = named(QLabel(), "protocol.counts", tr("Presses done, refused and measured"))
+        self.counts.setWordWrap(True)
+        column.addWidget(self.progress)
+        column.addWidget(self.counts)
+
+    def _build_last(self, column: QVBoxLayout) -> None:
+        self.last = named(QTableWidget(0, 3), "protocol.last", tr("Presses measured, newest first"))
+        self.last.setHorizontalHeaderLabels([tr("Press"), tr("Size"), tr("Height")])
+        self.last.verticalHeader().hide()
+        self.last.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.last.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.last.setShowGrid(False)
+        self.last.setTabKeyNavigation(False)
+        header = self.last.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        column.addWidget(self.last, 1)
+
+    def _build_foot(self, column: QVBoxLayout) -> None:
+        self.leave = named(
+            QPushButton(tr("Lea&ve")),
+            "protocol.leave",
+            tr("Leave the run"),
+            tr("Every press is kept: it goes on where you leave it"),
+        )
+        self.leave.clicked.connect(self.leave_wanted)
+        self.evaluate = named(
+            QPushButton(tr("Show the &result")),
+            "protocol.evaluate",
+            tr("Evaluate what is pressed so far"),
+        )
+        self.evaluate.clicked.connect(self.evaluate_wanted)
+        row = QHBoxLayout()
+        row.addWidget(self.leave)
+        row.addWidget(self.evaluate, 1)
+        column.addLayout(row)
+
+    def show_press(self, press: PressWanted | None, repeats: int) -> None:
+        """Say what to press next; None: all is done."""
+        if press is None:
+            self.title.setText(tr("All presses are made"))
+            self.where.setText(tr("Show the result."))
+            return
+        self.title.setText(object_name(press.truth))
+        region = region_name(press)
+        if press.region == SAME_REGION:
+            region = tr("{region}, press {n} of {all}").format(
+                region=region, n=press.repeat, all=repeats
+            )
+        x, y = press.place_mm
+        text = tr("{region}: at ({x:.1f}, {y:.1f}) mm").format(region=region, x=x, y=y)
+        if press.truth.shape == "cuboid":
+            text += tr(", turned as drawn")
+        self.where.setText(text + ".")
+
+    def show_live(self, sentence: str, *, good: bool = False) -> None:
+        """Say what the live picture shows."""
+        self.live.setText(sentence)
+        colour = theme.colour("pass" if good else "text").name()
+        self.live.setStyleSheet(f"color: {colour}; font-size: 15px;")
+
+    def show_progress(self, progress: RunProgress, measured: int) -> None:
+        """Say how far the run is."""
+        self.progress.setRange(0, progress.total)
+        self.progress.setValue(progress.done)
+        text = tr("{done} of {total} presses, {measured} measured").format(
+            done=progress.done, total=progress.total, measured=measured
+        )
+        if progress.refused:
+            text += tr(", {n} refused").format(n=progress.refused)
+        if progress.object_total:
+            text += tr("\nThis object: {done} of {total}").format(
+                done=progress.object_done, total=progress.object_total
+            )
+        else:
+            text += "\n"
+        self.counts.setText(text)
+        self.take_back.setEnabled(progress.done > 0)
+        self.evaluate.setEnabled(progress.done > 0)
+
+    def show_measured(self, press: PressWanted, outcome: Measurement | str) -> None:
+        """Add a measured press to the top of the list."""
+        texts = [_press_name(press), tr("not measured"), ""]
+        tip = outcome if isinstance(outcome, str) else outcome.reason
+        if not isinstance(outcome, str):
+            found = compare(outcome, press.truth)
+            texts[1] = f"{found.size_error_percent:+.1f} %"
+            texts[2] = f"{found.height_error_percent:+.1f} %"
+        self.last.insertRow(0)
+        for column, text in enumerate(texts):
+            item = QTableWidgetItem(text)
+            item.setToolTip(tip or texts[0])
+            if column:
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            if isinstance(outcome, str) or outcome.reason:
+                item.setForeground(theme.colour("warn"))
+            self.last.setItem(0, column, item)
+        self.last.setRowCount(min(self.last.rowCount(), MOST_ROWS))
+
+
+def region_name(press: PressWanted) -> str:
+    """Return what people call a press's region."""
+    if press.region == SAME_REGION:
+        return tr("Same region")
+    return tr("Random region {n}").format(n=press.region.removeprefix("r").lstrip("0"))
+
+
+def _press_name(press: PressWanted) -> str:
+    truth = press.truth
+    shape = {"cylinder": tr("Cylinder"), "cuboid": tr("Cuboid")}[truth.shape]
+    return tr("{shape} {size:g} x {height:g}, {region}").format(
+        shape=shape, size=truth.size_mm, height=truth.height_mm, region=region_name(press).lower()
+    )

@@ -1,0 +1,163 @@
+"""The paper's Fig. 13 on screen: absolute errors by size and by height."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from app.shell import theme
+from app.widgets.naming import named
+from app.widgets.plots import without_menus
+from gelpolight_core.measurement.evaluation import (
+    ALL,
+    DIRECTIONS,
+    PAPER_PERCENT,
+    Evaluation,
+    PressResult,
+    dimension_mm,
+    region_kinds,
+)
+from gelpolight_core.translation import tr
+
+# Okabe and Ito's, the light theme's and the dark theme's; the shapes' signs differ too.
+COLOURS = {"cylinder": ("#0072b2", "#56b4e9"), "cuboid": ("#d55e00", "#e69f00")}
+SIGNS = {"cylinder": "o", "cuboid": "s"}
+WORDS = {"cylinder": "\N{BLACK CIRCLE}", "cuboid": "\N{BLACK SQUARE}"}
+BAR_WIDTH = 0.34
+FILL_ALPHA = 110
+
+
+class Fig13(QWidget):
+    """Bars are means, whiskers one standard deviation, signs the presses, the line the paper's."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "protocol.figure", tr("Errors by size and height, as in the paper's Fig. 13"))
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        head = QHBoxLayout()
+        self.legend = named(QLabel(), "protocol.legend", tr("What the signs mean"))
+        head.addWidget(self.legend, 1)
+        column.addLayout(head)
+        self._grid = QGridLayout()
+        self._grid.setSpacing(6)
+        column.addLayout(self._grid, 1)
+        self._plots: list[pg.PlotWidget] = []
+        self._evaluation: Evaluation | None = None
+
+    def show_evaluation(self, evaluation: Evaluation) -> None:
+        """Draw an evaluation."""
+        self._evaluation = evaluation
+        self._draw()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and self._evaluation is not None:
+            self._draw()
+
+    def _draw(self) -> None:
+        evaluation = self._evaluation
+        assert evaluation is not None
+        for old in self._plots:
+            self._grid.removeWidget(old)
+            old.deleteLater()
+        self._plots = []
+        kinds = region_kinds(evaluation.results)
+        series = [name for name in kinds if name != ALL] or [ALL]
+        for row, name in enumerate(series):
+            for column, direction in enumerate(DIRECTIONS):
+                plot = self._panel(evaluation.series(direction, kinds[name]), direction, name)
+                self._grid.addWidget(plot, row, column)
+                self._plots.append(plot)
+        parts = [
+            f"<span style='color:{_colour(shape).name()}'>{WORDS[shape]}</span> {tr(shape)}"
+            for shape in COLOURS
+            if any(r.press.truth.shape == shape for r in evaluation.results)
+        ]
+        parts.append(tr("bars: mean, whiskers: one standard deviation, dashes: the paper's mean"))
+        self.legend.setText("&nbsp;&nbsp;&nbsp;".join(parts))
+
+    def _panel(self, results: Sequence[PressResult], direction: str, regions: str) -> pg.PlotWidget:
+        plot = without_menus(
+            pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False), background=theme.colour("base"))
+        )
+        named(plot, f"protocol.figure.{direction}.{regions.replace(' ', '_')}", regions)
+        text = theme.colour("text")
+        for name in ("left", "bottom"):
+            plot.getAxis(name).setPen(theme.colour("line"))
+            plot.getAxis(name).setTextPen(text)
+        dimensions = sorted({dimension_mm(r, direction) for r in results})
+        plot.getAxis("bottom").setTicks([[(k, f"{d:g}") for k, d in enumerate(dimensions)]])
+        across = tr("diameter or side (mm)") if direction == "planar" else tr("height (mm)")
+        plot.setLabel("bottom", across, color=text.name())
+        plot.setLabel("left", tr("absolute error (%)"), color=text.name())
+        title = tr("Planar direction") if direction == "planar" else tr("Depth direction")
+        plot.setTitle(title if regions == ALL else f"{title}, {tr(regions)}", color=text.name())
+        top = PAPER_PERCENT[direction]
+        for k, (shape, sign) in enumerate(SIGNS.items()):
+            own = [r for r in results if r.press.truth.shape == shape]
+            for place, dimension in enumerate(dimensions):
+                errors = _errors(own, direction, dimension)
+                if errors.size:
+                    _bar(plot, place + (k - 0.5) * BAR_WIDTH * 1.1, errors, _colour(shape), sign)
+                    top = max(top, float(errors.max()))
+        dashes = pg.mkPen(text, width=1.2, dash=[5, 4])
+        plot.addItem(pg.InfiniteLine(PAPER_PERCENT[direction], angle=0, pen=dashes))
+        plot.setMouseEnabled(x=False, y=False)
+        plot.hideButtons()
+        places = (-0.6, max(len(dimensions), 1) - 0.4)
+        plot.setRange(xRange=places, yRange=(0.0, 1.1 * top), padding=0)
+        return plot
+
+
+def _colour(shape: str) -> QColor:
+    return QColor(COLOURS[shape][theme.is_dark()])
+
+
+def _errors(
+    results: Sequence[PressResult], direction: str, dimension: float
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    found = [
+        abs(r.error_percent(direction)) for r in results if dimension_mm(r, direction) == dimension
+    ]
+    errors = np.array(found, np.float64)
+    return errors[np.isfinite(errors)]
+
+
+def _bar(
+    plot: pg.PlotWidget,
+    place: float,
+    errors: np.ndarray[tuple[int], np.dtype[np.float64]],
+    colour: QColor,
+    sign: str,
+) -> None:
+    fill = QColor(colour)
+    fill.setAlpha(FILL_ALPHA)
+    mean = float(errors.mean())
+    plot.addItem(
+        pg.BarGraphItem(x=[place], height=[mean], width=BAR_WIDTH, brush=fill, pen=pg.mkPen(None))
+    )
+    if errors.size > 1:
+        spread = float(errors.std(ddof=1))
+        plot.addItem(
+            pg.ErrorBarItem(
+                x=np.array([place]),
+                y=np.array([mean]),
+                top=np.array([spread]),
+                bottom=np.array([min(spread, mean)]),
+                beam=0.12,
+                pen=pg.mkPen(theme.colour("text"), width=1.3),
+            )
+        )
+    jitter = np.linspace(-0.3, 0.3, errors.size) * BAR_WIDTH if errors.size > 1 else np.zeros(1)
+    plot.addItem(
+        pg.ScatterPlotItem(
+            place + jitter, errors, symbol=sign, size=5, brush=colour, pen=pg.mkPen(None)
+        )
+    )

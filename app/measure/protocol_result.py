@@ -1,0 +1,219 @@
+"""The result of a run: the figure, the gauge's table, every press, and the report's files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFileDialog,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSplitter,
+    QTableWidget,
+    QTableWidgetItem,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.measure.protocol_plot import Fig13
+from app.measure.protocol_work import REPORT, ProtocolWork
+from app.shell import theme
+from app.shell.context import AppContext
+from app.widgets.naming import named
+from app.widgets.quality_table import QualityTableWidget
+from gelpolight_core.measurement.evaluation import Evaluation
+from gelpolight_core.quality import verdict_word
+from gelpolight_core.report.document import Listing, Report
+from gelpolight_core.report.evaluation_document import evaluation_document
+from gelpolight_core.translation import tr
+
+
+class ResultView(QWidget):
+    """Shows an evaluation and writes its report.
+
+    Signals
+    -------
+    back_wanted()
+        Go back to pressing.
+    left()
+        Leave the run.
+    """
+
+    back_wanted = Signal()
+    left = Signal()
+
+    def __init__(self, work: ProtocolWork, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "protocol.result", tr("Result of the evaluation"))
+        self._work, self._context = work, context
+        self._evaluation: Evaluation | None = None
+        column = QVBoxLayout(self)
+        column.setContentsMargins(12, 10, 12, 10)
+        column.setSpacing(8)
+        column.addLayout(self._build_head())
+        self.sentence = named(QLabel(), "protocol.sentence", tr("What came out"))
+        self.sentence.setWordWrap(True)
+        column.addWidget(self.sentence)
+        self.figure = Fig13()
+        self._tabs = named(QTabWidget(), "protocol.tables", tr("Tables"))
+        split = QSplitter(Qt.Orientation.Vertical)
+        split.addWidget(self.figure)
+        split.addWidget(self._tabs)
+        split.setStretchFactor(0, 3)
+        split.setStretchFactor(1, 2)
+        split.setChildrenCollapsible(False)
+        column.addWidget(split, 1)
+        self.progress = named(QProgressBar(), "protocol.result.progress", tr("Work that runs"))
+        keep = self.progress.sizePolicy()
+        keep.setRetainSizeWhenHidden(True)
+        self.progress.setSizePolicy(keep)
+        column.addWidget(self.progress)
+        self.show_work("", 0.0)
+
+    def _build_head(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        self.verdict = named(QLabel(), "protocol.verdict", tr("Verdict"))
+        font = self.verdict.font()
+        font.setPointSizeF(font.pointSizeF() * 1.45)
+        font.setBold(True)
+        self.verdict.setFont(font)
+        row.addWidget(self.verdict, 1)
+        self.buttons = {
+            name: named(QPushButton(text), f"protocol.{name}", said)
+            for name, text, said in (
+                ("back", tr("&Go on pressing"), tr("Go back to the presses")),
+                ("save", tr("&Save the report"), tr("Write CSV, HTML and PDF beside the run")),
+                ("save_as", tr("Save &as…"), tr("Write CSV, HTML and PDF into another folder")),
+                ("leave_result", tr("Lea&ve"), tr("Leave the run; everything is kept")),
+            )
+        }
+        for button in self.buttons.values():
+            row.addWidget(button)
+        self.buttons["back"].clicked.connect(self.back_wanted)
+        self.buttons["save"].clicked.connect(lambda: self.save(self._work.run.folder / REPORT))
+        self.buttons["save_as"].clicked.connect(self._save_as)
+        self.buttons["leave_result"].clicked.connect(self.left)
+        return row
+
+    def wait(self) -> None:
+        """Say that the evaluation is on its way."""
+        self.verdict.setText(tr("Measuring what is not measured yet"))
+        self.verdict.setStyleSheet("")
+
+    def show_evaluation(self, evaluation: Evaluation) -> None:
+        """Show what came out."""
+        self._evaluation = evaluation
+        limits = self._context.settings.limits
+        document = evaluation_document(
+            evaluation, limits_percent=(limits.size_percent, limits.height_percent)
+        )
+        progress = self._work.run.progress
+        word = verdict_word(document.verdict)
+        state = (
+            tr("all {n} presses").format(n=progress.total)
+            if progress.done == progress.total
+            else tr("{done} of {n} presses so far").format(done=progress.done, n=progress.total)
+        )
+        serial = self._work.run.content.serial
+        self.verdict.setText(f"{serial}: {word} ({state})")
+        self.verdict.setStyleSheet(f"color: {theme.colour(document.verdict.value).name()};")
+        self.sentence.setText(document.validation.sentence + ".")
+        self.figure.show_evaluation(evaluation)
+        self._show_tables(document)
+        self.buttons["back"].setEnabled(self._work.run.next() is not None)
+
+    def _show_tables(self, document: Report) -> None:
+        chosen = self._tabs.currentIndex()
+        while self._tabs.count():
+            old = self._tabs.widget(0)
+            self._tabs.removeTab(0)
+            old.deleteLater()
+        quality = QualityTableWidget("protocol.errors", tr("Errors and their limits"))
+        quality.set_table(document.sections[0].quality)
+        holder = QWidget()
+        inside = QVBoxLayout(holder)
+        inside.addWidget(quality)
+        inside.addStretch(1)
+        self._tabs.addTab(holder, tr("Summary"))
+        groups = document.sections[0].listings[0]
+        self._tabs.addTab(listing_table("protocol.groups", groups), tr("By size and height"))
+        if len(document.sections) > 1:
+            gauge = document.sections[1]
+            table = listing_table("protocol.gauge", gauge.listings[0])
+            holder = QWidget()
+            inside = QVBoxLayout(holder)
+            pooled = QLabel("      ".join(f"{label}: {value}" for label, value in gauge.facts))
+            named(pooled, "protocol.pooled", tr("Repeatability of all objects"))
+            pooled.setWordWrap(True)
+            inside.addWidget(pooled)
+            inside.addWidget(table, 1)
+            self._tabs.addTab(holder, tr("Repeatability"))
+        self._tabs.addTab(listing_table("protocol.presses", document.sources), tr("Every press"))
+        self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))
+
+    def show_work(self, title: str, share: float) -> None:
+        """Show what runs; an empty title: nothing."""
+        self.progress.setVisible(bool(title))
+        self.progress.setFormat(f"{title} %p %")
+        # A single evaluation has no share to tell.
+        self.progress.setRange(0, 100 if share > 0.0 else 0)
+        self.progress.setValue(round(100 * share))
+
+    def save(self, folder: Path) -> None:
+        """Write every file of the report into a folder."""
+        if self._evaluation is None:
+            return
+
+        def done(written: tuple[Path, ...]) -> None:
+            url = QUrl.fromLocalFile(str(folder))
+            self._context.toasts.show(
+                tr("Report written: {n} files in {folder}").format(n=len(written), folder=folder),
+                "pass",
+                actions=((tr("Open the folder"), lambda: QDesktopServices.openUrl(url)),),
+            )
+
+        self._work.write_report(self._evaluation, folder, done)
+
+    def _save_as(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(
+            self, tr("Folder of the report"), str(self._context.settings.last_folder)
+        )
+        if chosen:
+            self._context.settings.last_folder = Path(chosen)
+            self.save(Path(chosen))
+
+
+def listing_table(name: str, listing: Listing) -> QTableWidget:
+    """Return a report's table as a widget.
+
+    Parameters
+    ----------
+    name : str
+        Object name.
+    listing : Listing
+        The table.
+    """
+    table = named(QTableWidget(len(listing.rows), len(listing.heads)), name, listing.title)
+    table.setHorizontalHeaderLabels(list(listing.heads))
+    table.verticalHeader().hide()
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+    table.setAlternatingRowColors(True)
+    table.setTabKeyNavigation(False)
+    for i, row in enumerate(listing.rows):
+        for j, cell in enumerate(row):
+            item = QTableWidgetItem(cell)
+            item.setToolTip(cell)
+            if cell[:1].isdigit() or cell[:1] in "+-\N{EM DASH}":
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            table.setItem(i, j, item)
+    table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    table.horizontalHeader().setStretchLastSection(True)
+    return table

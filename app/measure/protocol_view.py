@@ -1,0 +1,230 @@
+"""The evaluation protocol: set it up or go on with a run, press it, and see what came out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
+
+from app.measure.protocol_press import PressingView
+from app.measure.protocol_result import ResultView
+from app.measure.protocol_setup import KnownRun, ProtocolSetup
+from app.measure.protocol_work import Equipped, ProtocolWork, equip
+from app.shell.context import AppContext
+from app.shell.jobs import Job, Jobs
+from app.widgets.naming import named
+from app.widgets.source_button import SourceButton
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.evaluation import Evaluation
+from gelpolight_core.measurement.protocol import Protocol, check_protocol, protocol_reach_mm
+from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.translation import tr
+
+NAME_FORMAT = "%Y-%m-%d-%H%M%S"
+
+
+class ProtocolView(QWidget):
+    """The whole of the evaluation protocol, for a page to hold.
+
+    Parameters
+    ----------
+    context : AppContext
+        The program's.
+    """
+
+    def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "protocol", tr("Evaluation protocol"))
+        self.context = context
+        self.work: ProtocolWork | None = None
+        self.pressing: PressingView | None = None
+        self.result: ResultView | None = None
+        self._shown = False
+        self._jobs = Jobs("protocol set-up", self)
+        self._jobs.refused.connect(self._on_refused)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(self._build_bar())
+        self._stack = QStackedWidget()
+        column.addWidget(self._stack, 1)
+        self.setup = ProtocolSetup()
+        self._stack.addWidget(self.setup)
+        self.setup.begin_wanted.connect(lambda path: self.begin(Path(path)))
+        self.setup.run_wanted.connect(lambda folder: self.open_run(Path(folder)))
+        context.requests.calibrations_changed.connect(self._refresh)
+
+    def _build_bar(self) -> QHBoxLayout:
+        row = QHBoxLayout()
+        row.setContentsMargins(12, 6, 12, 6)
+        self.heading = named(QLabel(), "protocol.heading", tr("The run"))
+        row.addWidget(self.heading, 1)
+        row.addWidget(SourceButton(context=self.context, page="protocol", none=tr("No camera")))
+        return row
+
+    # What the page around it asks
+
+    def enter(self) -> None:
+        """Show what is new, and look at the camera."""
+        self._shown = True
+        self._refresh()
+        if self.pressing is not None and self._stack.currentWidget() is self.pressing:
+            self.pressing.enter()
+
+    def leave(self) -> None:
+        """Let the camera go."""
+        self._shown = False
+        if self.pressing is not None:
+            self.pressing.leave()
+
+    def may_close(self) -> bool:
+        """Everything is on disk; work that runs is stopped."""
+        self._close_run(wait=True)
+        self._jobs.close()
+        return True
+
+    # Ways to begin
+
+    def begin(self, calibration: Path) -> None:
+        """Begin a new run of what is chosen."""
+        wanted = self.setup.protocol()
+
+        def work(tell: Callable[[float], None]) -> Equipped:
+            tell(0.0)
+            return self._new_run(calibration, wanted)
+
+        self._start(tr("Reading the calibration"), work)
+
+    def open_run(self, folder: Path) -> None:
+        """Go on with a run where it was left."""
+
+        def work(tell: Callable[[float], None]) -> Equipped:
+            tell(0.0)
+            run = open_run(folder)
+            return equip(run, self._calibration_of(run.content.calibration))
+
+        self._start(tr("Opening the run"), work)
+
+    def _start(self, title: str, work: Callable[[Callable[[float], None]], Equipped]) -> None:
+        self.setup.show_problem("")
+        self.setup.begin.setEnabled(False)
+        self._jobs.submit(Job(title, work, self._show_run, self._on_refused))
+
+    def _new_run(self, path: Path, wanted: Protocol) -> Equipped:
+        calibration = read_calibration(path)
+        reach_mm = math.floor(100.0 * protocol_reach_mm(calibration)) / 100.0
+        protocol = check_protocol(replace(wanted, reach_mm=reach_mm), where=tr("choice"))
+        serial = calibration.sensor.serial
+        name = datetime.now().astimezone().strftime(NAME_FORMAT)
+        folder = self.context.workspace.protocols_folder(serial) / name
+        run = begin_run(folder, protocol, serial=serial, calibration=calibration.identity)
+        return equip(run, path)
+
+    def _calibration_of(self, identity: str) -> Path:
+        """Return the file of the calibration that a run was begun with."""
+        for entry in self.context.workspace.entries():
+            if entry.summary is not None and entry.summary.identity == identity:
+                return entry.path
+        raise InputError(
+            tr("the calibration {id} of this run is not in the library").format(id=identity),
+            where=str(self.context.workspace.sensors_folder),
+            advice=tr("Import its file on the Sensors page"),
+        )
+
+    # The run
+
+    def _show_run(self, equipped: Equipped) -> None:
+        self._close_run()
+        self._refresh()
+        run = equipped.run
+        self.heading.setText(
+            tr("{serial}, run {name}").format(serial=run.content.serial, name=run.folder.name)
+        )
+        self.work = ProtocolWork(equipped, self)
+        self.work.refused.connect(lambda text: self.context.toasts.show(text, "fail"))
+        self.work.evaluated.connect(self._show_result)
+        self.pressing = PressingView(self.work, context=self.context)
+        self.pressing.left.connect(self._leave_run)
+        self.pressing.result_wanted.connect(self._want_result)
+        self.result = ResultView(self.work, context=self.context)
+        self.result.back_wanted.connect(self._show_pressing)
+        self.result.left.connect(self._leave_run)
+        self.work.busy.connect(self.result.show_work)
+        self._stack.addWidget(self.pressing)
+        self._stack.addWidget(self.result)
+        self.work.catch_up()
+        if run.next() is None:
+            self._want_result()
+        else:
+            self._show_pressing()
+
+    def _show_pressing(self) -> None:
+        if self.pressing is not None:
+            self._stack.setCurrentWidget(self.pressing)
+            if self._shown:
+                self.pressing.enter()
+
+    def _want_result(self) -> None:
+        if self.work is None or self.result is None or self.pressing is None:
+            return
+        self.pressing.leave()
+        self._stack.setCurrentWidget(self.result)
+        self.result.wait()
+        self.work.evaluate()
+
+    def _show_result(self, evaluation: Evaluation) -> None:
+        if self.result is not None:
+            self.result.show_evaluation(evaluation)
+
+    def _leave_run(self) -> None:
+        self._close_run()
+        self._refresh()
+        self._stack.setCurrentWidget(self.setup)
+
+    def _close_run(self, *, wait: bool = False) -> None:
+        if self.work is None or self.pressing is None or self.result is None:
+            return
+        self.pressing.close_run()
+        self.work.busy.disconnect(self.result.show_work)
+        if wait:
+            self.work.close()
+        else:
+            self.work.retire()
+        for view in (self.pressing, self.result):
+            self._stack.removeWidget(view)
+            view.deleteLater()
+        self.work = self.pressing = self.result = None
+        self.heading.setText("")
+
+    # The set-up
+
+    def _refresh(self) -> None:
+        """Show the calibrations and the runs that there are now."""
+        try:
+            self.setup.show_entries(self.context.workspace.entries())
+            self.setup.show_runs([_known(folder) for folder in self.context.workspace.protocols()])
+        except InputError as refusal:
+            self.setup.show_problem(str(refusal))
+
+    def _on_refused(self, sentence: str) -> None:
+        self.setup.show_problem(sentence)
+        self._refresh()
+
+
+def _known(folder: Path) -> KnownRun:
+    """Return a run as it is offered; a damaged one says so when it is opened."""
+    name = f"{folder.parent.parent.name}, {folder.name}"
+    try:
+        progress = open_run(folder).progress
+    except InputError:
+        return KnownRun(folder, tr("{name}\ndamaged: open it to see why").format(name=name))
+    if progress.done == progress.total:
+        state = tr("complete, {n} presses").format(n=progress.total)
+    else:
+        state = tr("{done} of {n} presses").format(done=progress.done, n=progress.total)
+    return KnownRun(folder, f"{name}\n{state}")

@@ -1,0 +1,161 @@
+"""The lab's records behind the page: read and written beside the window, removals undone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoCommand, QUndoStack
+
+from app.shell.context import AppContext
+from app.shell.jobs import Job, Jobs
+from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.translation import tr
+
+Change = Callable[[Records], object]
+
+
+class RecordBook(QObject):
+    """The records of the workspace.
+
+    Attributes
+    ----------
+    undo : QUndoStack
+        History of what was removed and written on.
+    records : tuple of MeasurementRecord
+        All that are there, oldest first.
+
+    Signals
+    -------
+    changed()
+        `records` are others.
+    refused(str)
+        A sentence: why something could not be read or written.
+    noticed(str)
+        What the person should know of the file.
+    """
+
+    changed = Signal()
+    refused = Signal(str)
+    noticed = Signal(str)
+
+    def __init__(self, *, context: AppContext, parent: QObject) -> None:
+        super().__init__(parent)
+        self.undo = QUndoStack(self)
+        self.records: tuple[MeasurementRecord, ...] = ()
+        self._context = context
+        self._jobs = Jobs("records", self)
+        self._jobs.refused.connect(self.refused)
+        self._folder: Path | None = None
+        self._told = ""
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything is being read or written."""
+        return self._jobs.busy
+
+    def refresh(self) -> None:
+        """Read what is there; of another workspace if that was chosen meanwhile."""
+        folder = self._context.workspace.folder
+        if folder != self._folder:
+            self._folder = folder
+            self.undo.clear()
+        if (folder / NAME).exists():
+            self._do(tr("Reading the records"), lambda _records: None)
+        else:
+            self._take(())
+
+    def add(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
+        """Keep a measurement; `done` is told its number once it is on the disk."""
+        self._do(tr("Keeping the measurement"), lambda records: records.add(record), done)
+
+    def remove(self, numbers: tuple[int, ...]) -> None:
+        """Remove measurements; it can be undone."""
+        if numbers:
+            self.undo.push(_Removal(self, numbers))
+
+    def write_note(self, number: int, note: str) -> None:
+        """Write another note on a measurement; it can be undone."""
+        before = next((r.note for r in self.records if r.id == number), "")
+        if note != before:
+            self.undo.push(_Note(self, number, before, note))
+
+    def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
+        """Write a table of all measurements, or of one sensor's."""
+        self._do(tr("Writing the table"), lambda records: records.export_csv(path, serial), done)
+
+    def change(self, title: str, change: Change) -> None:
+        """Change the records, beside the window."""
+        self._do(title, change)
+
+    def close(self) -> None:
+        """Finish what was begun."""
+        self._jobs.close()
+
+    def _do(self, title: str, change: Change, done: Callable[[int], object] | None = None) -> None:
+        def work(_tell: object) -> tuple[object, tuple[MeasurementRecord, ...], str]:
+            records = self._context.workspace.records
+            result = change(records)
+            return result, records.measurements(), records.notice
+
+        def finish(found: tuple[int, tuple[MeasurementRecord, ...], str]) -> None:
+            result, records, notice = found
+            if notice and notice != self._told:
+                self._told = notice
+                self.noticed.emit(notice)
+            self._take(records)
+            if done is not None:
+                done(result)
+
+        self._jobs.submit(Job(title, work, finish, must=True))
+
+    def _take(self, records: tuple[MeasurementRecord, ...]) -> None:
+        if records != self.records:
+            self.records = records
+            self.changed.emit()
+
+
+class _Removal(QUndoCommand):
+    """Measurements removed."""
+
+    def __init__(self, book: RecordBook, numbers: tuple[int, ...]) -> None:
+        super().__init__(tr("remove {n} measurements").format(n=len(numbers)))
+        self._book, self._numbers = book, numbers
+
+    def redo(self) -> None:
+        """Remove them."""
+        self._each(tr("Removing"), Records.remove)
+
+    def undo(self) -> None:
+        """Bring them back."""
+        self._each(tr("Bringing back"), Records.restore)
+
+    def _each(self, title: str, change: Callable[[Records, int], None]) -> None:
+        def run(records: Records) -> None:
+            for number in self._numbers:
+                change(records, number)
+
+        self._book.change(title, run)
+
+
+class _Note(QUndoCommand):
+    """Another note on a measurement."""
+
+    def __init__(self, book: RecordBook, number: int, before: str, after: str) -> None:
+        super().__init__(tr("write a note"))
+        self._book, self._number = book, number
+        self._before, self._after = before, after
+
+    def redo(self) -> None:
+        """Write it."""
+        self._write(self._after)
+
+    def undo(self) -> None:
+        """Write the old one again."""
+        self._write(self._before)
+
+    def _write(self, note: str) -> None:
+        number = self._number
+        self._book.change(tr("Writing the note"), lambda r: r.update_note(number, note))

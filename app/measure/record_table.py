@@ -1,0 +1,207 @@
+"""The records as a table: a line for each measurement, sorted and filtered."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QSortFilterProxyModel,
+    Qt,
+    Signal,
+)
+
+from app.measure.figures_text import value_text
+from app.measure.placing import kind_label
+from app.shell import theme
+from app.shell.icons import icon
+from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord, Quantity
+from gelpolight_core.translation import tr
+
+Index = QModelIndex | QPersistentModelIndex
+NOWHERE = QModelIndex()
+SORT = Qt.ItemDataRole.UserRole
+TIME, SENSOR, WHAT, FIRST, FIRST_ERROR, DEPTH, DEPTH_ERROR, VERDICT, WHO, NOTE, PICTURE = range(11)
+_RIGHT = (FIRST, FIRST_ERROR, DEPTH, DEPTH_ERROR)
+_VERDICTS = {PASSED: ("pass", "pass"), FAILED: ("fail", "fail"), DOUBTFUL: ("warn", "warn")}
+
+
+def headers() -> tuple[str, ...]:
+    """Return what stands above the columns."""
+    return (
+        tr("When"), tr("Sensor"), tr("What"), tr("Size or figure"), tr("Error (mm, %)"),
+        tr("Depth"), tr("Error (mm, %)"), tr("Verdict"), tr("Who"), tr("Note"), tr("Picture"),
+    )  # fmt: skip
+
+
+def verdict_word(verdict: str) -> str:
+    """Return what people read for a verdict."""
+    words = {PASSED: tr("within"), FAILED: tr("beyond"), DOUBTFUL: tr("doubtful")}
+    return words.get(verdict, tr("no truth"))
+
+
+def shape_label(shape: str) -> str:
+    """Return what people call what was measured."""
+    return kind_label(shape.replace("_", "-"))
+
+
+def quantity_text(quantity: Quantity) -> str:
+    """Return a value as people write it."""
+    return value_text(quantity.value, quantity.sd, quantity.name.rpartition("_")[2])
+
+
+def error_text(quantity: Quantity | None) -> str:
+    """Return an error in its unit and in percent; empty where no truth is known."""
+    if quantity is None or quantity.error is None or quantity.error_percent is None:
+        return ""
+    return f"{quantity.error:+.3f}, {quantity.error_percent:+.2f} %"
+
+
+class RecordModel(QAbstractTableModel):
+    """All records.
+
+    Signals
+    -------
+    note_written(int, str)
+        A note was typed: the measurement's number and the note.
+    """
+
+    note_written = Signal(int, str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.records: tuple[MeasurementRecord, ...] = ()
+
+    def show(self, records: tuple[MeasurementRecord, ...]) -> None:
+        """Show other records."""
+        self.beginResetModel()
+        self.records = records
+        self.endResetModel()
+
+    def rowCount(self, parent: Index = NOWHERE) -> int:  # noqa: D102
+        return 0 if parent.isValid() else len(self.records)
+
+    def columnCount(self, parent: Index = NOWHERE) -> int:  # noqa: D102
+        return 0 if parent.isValid() else len(headers())
+
+    def headerData(  # noqa: D102
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        if role == Qt.ItemDataRole.DisplayRole and orientation == Qt.Orientation.Horizontal:
+            return headers()[section]
+        return None
+
+    def flags(self, index: Index) -> Qt.ItemFlag:  # noqa: D102
+        usual = super().flags(index)
+        return usual | Qt.ItemFlag.ItemIsEditable if index.column() == NOTE else usual
+
+    def setData(  # noqa: D102
+        self, index: Index, value: Any, role: int = Qt.ItemDataRole.EditRole
+    ) -> bool:
+        number = self.records[index.row()].id
+        if index.column() != NOTE or role != Qt.ItemDataRole.EditRole or number is None:
+            return False
+        self.note_written.emit(number, str(value))
+        return True
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:  # noqa: D102
+        record, column = self.records[index.row()], index.column()
+        if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.EditRole):
+            return _text(record, column)
+        if role == SORT:
+            return _sort_value(record, column)
+        if role == Qt.ItemDataRole.TextAlignmentRole and column in _RIGHT:
+            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        if role == Qt.ItemDataRole.DecorationRole and column == WHAT:
+            name = f"tool-{record.shape.replace('_', '-')}"
+            return icon(name)
+        if role == Qt.ItemDataRole.DecorationRole and column == VERDICT:
+            found = _VERDICTS.get(record.verdict)
+            return None if found is None else icon(*found)
+        if role == Qt.ItemDataRole.ForegroundRole and column in (FIRST_ERROR, DEPTH_ERROR):
+            quantity = _quantity(record, column)
+            passed = None if quantity is None else quantity.passed
+            return None if passed is None else theme.colour("pass" if passed else "fail")
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return _tip(record)
+        return None
+
+
+class RecordFilter(QSortFilterProxyModel):
+    """Shows those of one sensor and shape, or all."""
+
+    def __init__(self, model: RecordModel) -> None:
+        super().__init__()
+        self._model = model
+        self.serial, self.shape = "", ""
+        self.setSourceModel(model)
+        self.setSortRole(SORT)
+
+    def choose(self, serial: str, shape: str) -> None:
+        """Show those of this sensor and shape; empty: of all."""
+        self.serial, self.shape = serial, shape
+        self.invalidateFilter()
+
+    def filterAcceptsRow(self, row: int, parent: Index) -> bool:  # noqa: D102
+        record = self._model.records[row]
+        return self.serial in ("", record.serial) and self.shape in ("", record.shape)
+
+    @property
+    def shown(self) -> tuple[MeasurementRecord, ...]:
+        """The records that are shown, in the order of the table."""
+        rows = range(self.rowCount())
+        return tuple(
+            self._model.records[self.mapToSource(self.index(row, 0)).row()] for row in rows
+        )
+
+
+def _depth(record: MeasurementRecord) -> Quantity | None:
+    return record.quantity("height_mm")
+
+
+def _quantity(record: MeasurementRecord, column: int) -> Quantity | None:
+    return record.quantities[0] if column in (FIRST, FIRST_ERROR) else _depth(record)
+
+
+def _text(record: MeasurementRecord, column: int) -> str:
+    quantity = _quantity(record, column) if column in _RIGHT else None
+    match column:
+        case 0:
+            return record.time.astimezone().strftime("%Y-%m-%d %H:%M")
+        case 1:
+            return record.serial
+        case 2:
+            return shape_label(record.shape)
+        case 3 | 5:
+            return "" if quantity is None else quantity_text(quantity)
+        case 4 | 6:
+            return error_text(quantity)
+        case 7:
+            return verdict_word(record.verdict)
+        case 8:
+            return record.operator
+        case 9:
+            return record.note
+    return record.picture
+
+
+def _sort_value(record: MeasurementRecord, column: int) -> Any:
+    quantity = _quantity(record, column) if column in _RIGHT else None
+    if column == TIME:
+        return record.time.timestamp()
+    if column in (FIRST, DEPTH):
+        return -1e9 if quantity is None else quantity.value
+    if column in (FIRST_ERROR, DEPTH_ERROR):
+        error = None if quantity is None else quantity.error_percent
+        return -1e9 if error is None else error
+    return _text(record, column)
+
+
+def _tip(record: MeasurementRecord) -> str:
+    lines = [f"{quantity.name}: {quantity_text(quantity)}" for quantity in record.quantities]
+    lines.append(tr("calibration {identity}").format(identity=record.calibration_id))
+    if record.reason:
+        lines.append(tr("doubtful: {reason}").format(reason=record.reason))
+    return "\n".join(lines)

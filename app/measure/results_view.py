@@ -1,0 +1,308 @@
+"""What was measured: the table, its statistics, the error over time, and the way out as CSV."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QFileDialog,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QSplitter,
+    QStackedWidget,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.measure.drift_plot import DriftPlot
+from app.measure.record_book import RecordBook
+from app.measure.record_table import (
+    NOTE,
+    PICTURE,
+    TIME,
+    RecordFilter,
+    RecordModel,
+    shape_label,
+)
+from app.shell.actions import make_action
+from app.shell.context import AppContext
+from app.shell.icons import icon
+from app.widgets.naming import named
+from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.records.statistics import Statistics, statistics_of
+from gelpolight_core.translation import tr
+
+PICTURE_WIDTH = 130
+
+
+class ResultsView(QWidget):
+    """The records of the workspace.
+
+    Parameters
+    ----------
+    book : RecordBook
+        The records.
+    context : AppContext
+        The program's.
+    """
+
+    def __init__(self, book: RecordBook, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "measure.results", tr("Records"))
+        self._book, self._context = book, context
+        self.model = RecordModel()
+        self.filter = RecordFilter(self.model)
+        self.sensor = named(QComboBox(), "measure.results.sensor", tr("Sensor"))
+        self.shape = named(QComboBox(), "measure.results.shape", tr("What was measured"))
+        self.export = _button("export", tr("&Export as CSV…"), "copy")
+        self.remove = _button("remove", tr("&Delete"), "remove")
+        self.count = named(QLabel(), "measure.results.count", tr("How many are shown"))
+        self.table = self._make_table()
+        self.statistics = named(QLabel(), "measure.results.statistics", tr("Statistics"))
+        self.statistics.setWordWrap(True)
+        self.statistics.setTextFormat(Qt.TextFormat.RichText)
+        self.statistics.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
+        self.drift = DriftPlot()
+        self.drift_title = named(QLabel(), "measure.results.drift_title", tr("Error over time"))
+        self._lay_out()
+        self._connect()
+        self.refresh()
+
+    def _make_table(self) -> QTableView:
+        table = named(QTableView(), "measure.results.table", tr("Measurements"))
+        table.setModel(self.filter)
+        table.setSortingEnabled(True)
+        table.sortByColumn(TIME, Qt.SortOrder.DescendingOrder)
+        table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setAlternatingRowColors(True)
+        table.setShowGrid(False)
+        table.setWordWrap(False)
+        table.verticalHeader().hide()
+        table.verticalHeader().setDefaultSectionSize(26)
+        header = table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(NOTE, QHeaderView.ResizeMode.Stretch)
+        header.setSectionResizeMode(PICTURE, QHeaderView.ResizeMode.Interactive)
+        header.resizeSection(PICTURE, PICTURE_WIDTH)
+        table.setTabKeyNavigation(False)
+        return table
+
+    def _lay_out(self) -> None:
+        self.setLayout(QVBoxLayout())
+        bar = QHBoxLayout()
+        bar.setContentsMargins(8, 6, 8, 6)
+        for text, box in ((tr("Sensor"), self.sensor), (tr("What"), self.shape)):
+            bar.addWidget(QLabel(text))
+            bar.addWidget(box)
+        bar.addWidget(self.count)
+        bar.addStretch(1)
+        for widget in (self.remove, self.export):
+            bar.addWidget(widget)
+        left = QWidget()
+        words = QVBoxLayout(left)
+        words.setContentsMargins(10, 4, 10, 4)
+        words.addWidget(self.statistics, 1)
+        right = QWidget()
+        chart = QVBoxLayout(right)
+        chart.setContentsMargins(0, 0, 8, 4)
+        chart.addWidget(self.drift_title)
+        chart.addWidget(self.drift, 1)
+        below = QSplitter(Qt.Orientation.Horizontal)
+        below.addWidget(left)
+        below.addWidget(right)
+        below.setSizes([470, 700])
+        self.split = QSplitter(Qt.Orientation.Vertical)
+        self.split.addWidget(self.table)
+        self.split.addWidget(below)
+        self.split.setSizes([420, 260])
+        self.split.setChildrenCollapsible(False)
+        empty = named(
+            QLabel(tr("Nothing is kept yet. Measure a press, then keep it in the records.")),
+            "measure.results.empty",
+            tr("No records"),
+        )
+        empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.stack = QStackedWidget()
+        self.stack.addWidget(empty)
+        self.stack.addWidget(self.split)
+        column = self.layout()
+        assert isinstance(column, QVBoxLayout)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addLayout(bar)
+        column.addWidget(self.stack, 1)
+
+    def _connect(self) -> None:
+        self._book.changed.connect(self.refresh)
+        self.model.note_written.connect(self._book.write_note)
+        for box in (self.sensor, self.shape):
+            box.activated.connect(self._on_filter)
+        self.table.selectionModel().selectionChanged.connect(lambda *_: self._describe())
+        self.remove.clicked.connect(self.remove_selected)
+        self.export.clicked.connect(self.choose_export)
+        stack = self._book.undo
+        for name, text, slot, keys in (
+            ("undo", tr("Undo in the records"), stack.undo, ("Ctrl+Z",)),
+            ("redo", tr("Redo in the records"), stack.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
+            ("delete", tr("Delete measurements"), self.remove_selected, ("Delete",)),
+        ):
+            make_action(self, f"records.{name}", text, slot, keys=keys)
+
+    # What is shown
+
+    def refresh(self) -> None:
+        """Show the records as they are now; what was selected stays so."""
+        chosen = {record.id for record in self.selected}
+        self.model.show(self._book.records)
+        self._fill(self.sensor, tr("All sensors"), {r.serial: r.serial for r in self.model.records})
+        self._fill(
+            self.shape,
+            tr("Everything"),
+            {r.shape: shape_label(r.shape) for r in self._book.records},
+        )
+        self._on_filter()
+        for row, record in enumerate(self.filter.shown):
+            if record.id in chosen:
+                self.table.selectRow(row)
+        self.stack.setCurrentIndex(1 if self.model.records else 0)
+        self.export.setEnabled(bool(self.model.records))
+
+    @staticmethod
+    def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:
+        chosen = box.currentData() or ""
+        box.clear()
+        box.addItem(everything, "")
+        for value, text in sorted(found.items()):
+            box.addItem(text, value)
+        box.setCurrentIndex(max(box.findData(chosen), 0))
+
+    def _on_filter(self) -> None:
+        self.filter.choose(self.sensor.currentData() or "", self.shape.currentData() or "")
+        shown, all_of_them = self.filter.rowCount(), len(self.model.records)
+        self.count.setText(tr("{n} of {all}").format(n=shown, all=all_of_them))
+        self._describe()
+
+    @property
+    def selected(self) -> tuple[MeasurementRecord, ...]:
+        """The records whose lines are selected."""
+        rows = sorted(index.row() for index in self.table.selectionModel().selectedRows())
+        shown = self.filter.shown
+        return tuple(shown[row] for row in rows if row < len(shown))
+
+    def group(self) -> tuple[MeasurementRecord, ...]:
+        """Return what the statistics are of.
+
+        Those that are selected, if they are several; else all that are shown of the same sensor,
+        shape and true size as the one that is selected, or as the one at the top.
+        """
+        selected, shown = self.selected, self.filter.shown
+        if len(selected) > 1:
+            return tuple(r for r in selected if _thing(r)[1] == _thing(selected[0])[1])
+        like = (*selected, *shown)[:1]
+        return tuple(r for r in shown if _thing(r) == _thing(like[0])) if like else ()
+
+    def _describe(self) -> None:
+        group = self.group()
+        self.remove.setEnabled(bool(self.selected))
+        self.statistics.setText(_statistics_text(group))
+        serial = group[0].serial if group else ""
+        records = tuple(r for r in self.filter.shown if r.serial == serial)
+        self.drift.show_records(records, self._context.settings.limits)
+        title = tr("Error of {serial} over time, with the limits").format(serial=serial)
+        self.drift_title.setText(title if serial else "")
+
+    # What is done
+
+    def remove_selected(self) -> None:
+        """Remove the selected measurements; Ctrl+Z brings them back."""
+        numbers = tuple(r.id for r in self.selected if r.id is not None)
+        if not numbers:
+            return
+        self._book.remove(numbers)
+        text = tr("{n} measurements were removed.").format(n=len(numbers))
+        if len(numbers) == 1:
+            text = tr("The measurement was removed.")
+        self._context.toasts.show(text, actions=((tr("Undo"), self._book.undo.undo),))
+
+    def choose_export(self) -> None:
+        """Let the person choose where the table goes."""
+        folder = self._context.settings.last_folder
+        chosen, _ = QFileDialog.getSaveFileName(
+            self, tr("Export as CSV"), str(folder / "measurements.csv"), tr("Tables (*.csv)")
+        )
+        if chosen:
+            self.export_to(Path(chosen))
+
+    def export_to(self, path: Path) -> None:
+        """Write the table: all measurements, or those of the sensor that is chosen."""
+
+        def done(count: int) -> None:
+            text = tr("{n} measurements written to {path}").format(n=count, path=path)
+            self._context.toasts.show(text, "pass")
+
+        self._context.settings.last_folder = path.parent
+        self._book.export(path, self.sensor.currentData() or None, done)
+
+
+def _thing(record: MeasurementRecord) -> tuple[str, tuple[object, ...]]:
+    """Return what was measured: measurements of one thing can be compared."""
+    truths = tuple(quantity.truth for quantity in record.quantities)
+    return record.serial, (record.shape, *truths)
+
+
+def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
+    if not group:
+        return ""
+    first = group[0]
+    title = tr("{n} x {what}").format(n=len(group), what=shape_label(first.shape))
+    known = [q.truth for q in first.quantities if q.truth is not None]
+    if known:
+        sizes = ", ".join(f"{value:g}" for value in known)
+        title += tr(", true {sizes} mm").format(sizes=sizes)
+    rows = []
+    for quantity in first.quantities[:2]:
+        found = [record.quantity(quantity.name) for record in group]
+        values = [q.value for q in found if q is not None]
+        errors = [q.error_percent for q in found if q is not None and q.error_percent is not None]
+        rows.append(_row(quantity.name, statistics_of(values), errors))
+    head = "".join(
+        f"<th align='right' style='padding-left: 12px'>{text}</th>"
+        for text in (tr("mean"), tr("sd"), tr("spread"), tr("repeatability"), tr("mean error"))
+    )
+    note = tr("Repeatability: two measurements differ by less, 95 times of 100.")
+    if len(group) == 1:
+        note = tr("One measurement has no spread: press it again and keep that, too.")
+    table = f"<table><tr><th></th>{head}</tr>{''.join(rows)}</table>"
+    return f"<b>{title}</b><br><br>{table}<br>{note}"
+
+
+def _row(name: str, found: Statistics, errors: list[float]) -> str:
+    label, _, unit = name.rpartition("_")
+    error = f"{sum(errors) / len(errors):+.2f} %" if errors else "-"
+    cells = [
+        f"{value:.4f}" if math.isfinite(value) else "-"
+        for value in (found.mean, found.sd, found.spread, found.repeatability)
+    ]
+    label = f"{label.replace('_', ' ')} ({unit})"
+    return (
+        f"<tr><td>{label}</td>"
+        + "".join(
+            f"<td align='right' style='padding-left: 12px'>{cell}</td>" for cell in (*cells, error)
+        )
+        + "</tr>"
+    )
+
+
+def _button(name: str, text: str, icon_name: str) -> QPushButton:
+    button = named(QPushButton(text), f"measure.results.{name}", text.replace("&", ""))
+    button.setIcon(icon(icon_name))
+    button.setAutoDefault(False)
+    return button

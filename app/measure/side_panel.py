@@ -1,0 +1,220 @@
+"""Beside the map: the tools on it, the figures of the chosen one, the truth, and to keep it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFormLayout,
+    QFrame,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QScrollArea,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.measure.figures_text import figure_text
+from app.measure.placing import kind_label
+from app.measure.truth_form import TruthForm
+from app.measure.work import Work
+from app.shell import theme
+from app.shell.icons import icon
+from app.widgets.naming import named
+from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.translation import tr
+
+WIDTH = 340
+LIST_HEIGHT = 96
+LEAST_ROWS = 6
+KEY = Qt.ItemDataRole.UserRole
+
+
+class SidePanel(QScrollArea):
+    """What is known of the tools.
+
+    Signals
+    -------
+    propose_wanted()
+        It shall be said what is pressed.
+    tool_chosen(int)
+        A tool of the list: its key.
+    remove_wanted()
+        The chosen tool shall be taken off.
+    keep_wanted()
+        The chosen tool's result shall go to the records.
+    records_wanted()
+        The records shall be shown.
+    """
+
+    propose_wanted = Signal()
+    tool_chosen = Signal(int)
+    remove_wanted = Signal()
+    keep_wanted = Signal()
+    records_wanted = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "measure.panel", tr("Results"))
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setFixedWidth(WIDTH)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.propose = _button("propose", tr("&What is pressed?"), "propose", tr("(Q)"))
+        self.propose.clicked.connect(self.propose_wanted)
+        self.tools = named(QListWidget(), "measure.tools", tr("Tools on the picture"))
+        self.tools.setFixedHeight(LIST_HEIGHT)
+        self.tools.currentItemChanged.connect(self._on_tool)
+        self.remove = _button("remove", tr("Remove the tool"), "remove", tr("(Delete)"))
+        self.remove.clicked.connect(self.remove_wanted)
+        self.figures = _figures_table()
+        self.reason = named(QLabel(), "measure.reason", tr("Why it is doubtful"))
+        self.reason.setWordWrap(True)
+        self.truth = TruthForm()
+        self.who = named(QLineEdit(), "measure.who", tr("Who measured it"))
+        self.note = named(QLineEdit(), "measure.note", tr("Note"))
+        self.note.setPlaceholderText(tr("Anything worth remembering"))
+        self.keep = _button("keep", tr("&Keep in the records"), "keep", tr("(Ctrl+Return)"))
+        self.keep.setMinimumHeight(36)
+        self.keep.clicked.connect(self.keep_wanted)
+        self.kept = named(QLabel(), "measure.kept", tr("What was kept last"))
+        self.kept.setWordWrap(True)
+        self.kept.linkActivated.connect(lambda _link: self.records_wanted.emit())
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        inside = QWidget()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(10, 8, 10, 8)
+        form = QFormLayout()
+        form.addRow(tr("Who"), self.who)
+        form.addRow(tr("Note"), self.note)
+        for widget in (
+            self.propose,
+            self.tools,
+            self.remove,
+            self.figures,
+            self.reason,
+            self.truth,
+        ):
+            column.addWidget(widget)
+        column.addLayout(form)
+        column.addWidget(self.keep)
+        column.addWidget(self.kept)
+        column.addStretch(1)
+        self.setWidget(inside)
+
+    def show_work(self, work: Work, *, known: bool) -> None:
+        """Show the tools and the figures of the chosen one.
+
+        Parameters
+        ----------
+        work : Work
+            What is measured.
+        known : bool
+            Whether there is a height map to measure on.
+        """
+        self.propose.setEnabled(known)
+        self._show_tools(work)
+        self.remove.setEnabled(bool(work.chosen))
+        found = work.results.get(work.chosen)
+        if not isinstance(found, str) and work.result is None:
+            found = None
+        self._show_figures(found, measuring=bool(work.chosen) and known)
+        tool = work.tool
+        if tool is None:
+            self.truth.show_kind("", "", "mm")
+        elif isinstance(found, ToolResult):
+            first = found.figures[0]
+            label = tr("mean side") if tool.name == "cuboid" else first.label
+            self.truth.show_kind(tool.name, label, first.unit)
+        self.keep.setEnabled(isinstance(found, ToolResult))
+
+    def say_kept(self, text: str) -> None:
+        """Say that something is in the records; empty: nothing of this picture is."""
+        colour = theme.colour("pass").name()
+        link = tr("Show the records")
+        words = f"<span style='color:{colour}'>{text}</span> <a href='records'>{link}</a>"
+        self.kept.setText(words if text else "")
+
+    def _show_tools(self, work: Work) -> None:
+        with QSignalBlocker(self.tools):
+            self.tools.clear()
+            for placed in work.sheet.items:
+                item = QListWidgetItem(_line(placed.tool.name, work.results.get(placed.key)))
+                item.setIcon(icon(f"tool-{placed.tool.name}"))
+                item.setData(KEY, placed.key)
+                self.tools.addItem(item)
+                if placed.key == work.chosen:
+                    self.tools.setCurrentItem(item)
+            if not work.sheet.items:
+                item = QListWidgetItem(tr("No tool yet: choose one at the left."))
+                item.setFlags(Qt.ItemFlag.NoItemFlags)
+                self.tools.addItem(item)
+
+    def _show_figures(self, found: ToolResult | str | None, *, measuring: bool) -> None:
+        figures = found.figures if isinstance(found, ToolResult) else ()
+        self.figures.setRowCount(len(figures))
+        for row, figure in enumerate(figures):
+            label, value = QTableWidgetItem(figure.label), QTableWidgetItem(figure_text(figure))
+            value.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            if row == 0:
+                font = value.font()
+                font.setBold(True)
+                value.setFont(font)
+            self.figures.setItem(row, 0, label)
+            self.figures.setItem(row, 1, value)
+        height = self.figures.verticalHeader().length() + 2 * self.figures.frameWidth()
+        self.figures.setFixedHeight(
+            max(height, 7 * self.figures.verticalHeader().defaultSectionSize())
+        )
+        text, role = "", "muted"
+        if isinstance(found, str):
+            text, role = found, "fail"
+        elif isinstance(found, ToolResult) and found.verdict != "ok":
+            text, role = tr("Doubtful: {reason}").format(reason=found.reason), "warn"
+        elif measuring and found is None:
+            text = tr("Measuring…")
+        self.reason.setText(text)
+        self.reason.setStyleSheet(f"color: {QColor(theme.colour(role)).name()};")
+
+    def _on_tool(self, item: QListWidgetItem | None) -> None:
+        if item is not None and item.data(KEY) is not None:
+            self.tool_chosen.emit(item.data(KEY))
+
+
+def _line(name: str, found: ToolResult | str | None) -> str:
+    label = kind_label(name)
+    if isinstance(found, ToolResult):
+        return f"{label}   {figure_text(found.figures[0])}"
+    return f"{label}   {tr('not measured') if isinstance(found, str) else '…'}"
+
+
+def _button(name: str, text: str, icon_name: str, key: str) -> QPushButton:
+    plain = text.replace("&", "")
+    button = named(QPushButton(text), f"measure.{name}", plain, f"{plain} {key}")
+    button.setIcon(icon(icon_name))
+    button.setAutoDefault(False)
+    return button
+
+
+def _figures_table() -> QTableWidget:
+    table = named(QTableWidget(0, 2), "measure.figures", tr("Figures of the chosen tool"))
+    table.horizontalHeader().hide()
+    table.verticalHeader().hide()
+    table.verticalHeader().setDefaultSectionSize(24)
+    table.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+    table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.ResizeToContents)
+    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+    table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+    table.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    table.setShowGrid(False)
+    table.setAlternatingRowColors(True)
+    return table

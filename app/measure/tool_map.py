@@ -1,0 +1,246 @@
+"""The height map with its tools: they are placed by clicks, dragged, and moved by keys."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from app.inspect.height_panel import HeightPanel, extent_of
+from app.inspect.look import Look
+from app.inspect.place import read_at
+from app.inspect.products import Shown
+from app.measure.figures_text import figure_text
+from app.measure.grips import Point, grips_of, outline_of
+from app.measure.palette import Palette
+from app.measure.placing import first_places, kinds, make_tool
+from app.measure.sheet import Placed
+from app.measure.tool_layer import DrawnTool, ToolLayer
+from app.measure.work import Work
+from app.widgets.naming import named
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.tools import ToolResult
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.translation import tr
+
+NUDGE_MM = 0.02
+LARGE_NUDGE_MM = 0.2
+_ARROWS = {
+    Qt.Key.Key_Left: (-1.0, 0.0),
+    Qt.Key.Key_Right: (1.0, 0.0),
+    Qt.Key.Key_Up: (0.0, -1.0),
+    Qt.Key.Key_Down: (0.0, 1.0),
+}
+
+
+class ToolMap(QWidget):
+    """The map, the palette beside it and a line of words below.
+
+    Parameters
+    ----------
+    work : Work
+        What is measured.
+
+    Signals
+    -------
+    hold_wanted()
+        A tool was chosen: the picture must stand.
+    refused(str)
+        A sentence: why a tool cannot be placed like this.
+    """
+
+    hold_wanted = Signal()
+    refused = Signal(str)
+
+    def __init__(self, work: Work) -> None:
+        super().__init__()
+        named(self, "measure.map", tr("Height map with tools"))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._work = work
+        self._kind = ""
+        self._places: list[Point] = []
+        self._live: HeightMap | None = None
+        self.panel = HeightPanel()
+        self.view = self.panel.map
+        self.layer = ToolLayer()
+        self.view.box.addItem(self.layer, ignoreBounds=True)
+        self.tools = Palette(self)
+        self.hint = named(QLabel(), "measure.hint", tr("What to do next on the map"))
+        self.readout = named(QLabel(), "measure.readout", tr("What is under the pointer"))
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        foot = QHBoxLayout()
+        foot.setContentsMargins(8, 2, 8, 2)
+        foot.addWidget(self.hint, 1)
+        foot.addWidget(self.readout)
+        right = QVBoxLayout()
+        right.setSpacing(0)
+        right.addWidget(self.panel, 1)
+        right.addLayout(foot)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.tools)
+        row.addLayout(right, 1)
+
+    def _connect(self) -> None:
+        self.tools.chosen.connect(self._on_kind)
+        self.layer.clicked.connect(self._on_place)
+        self.layer.chosen.connect(self._work.choose)
+        self.layer.grip_chosen.connect(self._on_grip)
+        self.layer.dragged.connect(lambda name, x, y: self._work.drag(name, (x, y)))
+        self.layer.dropped.connect(lambda name, x, y: self._work.drop(name, (x, y)))
+        self.view.pointed.connect(self._on_pointed)
+        self._work.changed.connect(self._draw)
+        self._work.picture_changed.connect(self._show_picture)
+
+    # The picture
+
+    def show_live(self, shown: Shown, look: Look) -> None:
+        """Show a frame's depth while nothing is held."""
+        if shown.heightmap is not None:
+            self._live = shown.heightmap
+            self.panel.show_frame(shown, look.colours)
+
+    def say(self, text: str) -> None:
+        """Show words in the place of a map."""
+        self._live = None
+        self.view.say(text)
+
+    def _show_picture(self) -> None:
+        answer = self._work.answer
+        if answer is not None:
+            rgb, shown = answer.picture.rgb, answer.picture.range_mm
+            self.view.show_picture(rgb, extent_of(answer.heightmap))
+            self.panel.bar.show_range(Look().colours, *shown, tr("mm"))
+        elif self._work.taken is None:
+            self.let_go()
+
+    @property
+    def heightmap(self) -> HeightMap | None:
+        """What is shown."""
+        return self._live if self._work.taken is None else self._work.heightmap
+
+    # Placing
+
+    def let_go(self) -> None:
+        """Place nothing any more."""
+        self._kind, self._places = "", []
+        self.layer.placing = False
+        self.layer.show_begun(())
+        self.tools.let_go()
+        self._tell()
+
+    def _on_kind(self, name: str) -> None:
+        self._kind, self._places = name, []
+        self.layer.placing = bool(name)
+        self.layer.show_begun(())
+        self._tell()
+        if name:
+            self.setFocus()
+            self.hold_wanted.emit()
+
+    def _on_place(self, x_mm: float, y_mm: float) -> None:
+        self.setFocus()
+        self._places.append((x_mm, y_mm))
+        self.layer.show_begun(tuple(self._places))
+        if len(self._places) == len(self._asks()):
+            self._place(tuple(self._places))
+        self._tell()
+
+    def _place(self, places: tuple[Point, ...]) -> None:
+        kind = self._kind
+        self.let_go()
+        try:
+            tool = make_tool(kind, places)
+        except InputError as error:
+            self.refused.emit(str(error))
+            return
+        self._work.add(tool)
+
+    def _asks(self) -> tuple[str, ...]:
+        return next((kind.asks for kind in kinds() if kind.name == self._kind), ())
+
+    def _tell(self) -> None:
+        asks = self._asks()
+        text = ""
+        if self._kind and len(self._places) < len(asks):
+            text = tr("{ask}; Return places it in the middle, Escape lets it go.").format(
+                ask=asks[len(self._places)]
+            )
+        elif self._work.chosen:
+            text = tr("Drag the squares, or move them by the arrow keys.")
+        elif self._work.taken is not None:
+            text = tr("Choose a tool at the left, or let the program say what is pressed (Q).")
+        self.hint.setText(text)
+
+    # Drawing
+
+    def _draw(self) -> None:
+        work = self._work
+        drawn = tuple(_drawn(item, work.results.get(item.key)) for item in work.sheet.items)
+        grips = () if work.tool is None else grips_of(work.tool)
+        self.layer.show_tools(drawn, work.chosen, grips, work.grip)
+        self._tell()
+
+    def _on_grip(self, name: str) -> None:
+        self.setFocus()
+        self._work.choose(self._work.chosen, name)
+
+    def _on_pointed(self, x_mm: float, y_mm: float) -> None:
+        heightmap = self.heightmap
+        reading = None
+        if heightmap is not None and math.isfinite(x_mm):
+            reading = read_at(heightmap, x_mm, y_mm)
+        words = "" if reading is None else tr("x {x:.2f}  y {y:.2f}  depth {d:.3f} mm").format(
+            x=reading.x_mm, y=reading.y_mm, d=reading.depth_mm
+        )  # fmt: skip
+        self.readout.setText(words)
+
+    # Keys
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move the chosen grip, go on to the next one, place, remove, let go."""
+        key = Qt.Key(event.key())
+        if key in _ARROWS:
+            large = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+            step = LARGE_NUDGE_MM if large else NUDGE_MM
+            if self._work.nudge(*(step * d for d in _ARROWS[key])):
+                return
+        match key:
+            case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp:
+                self._next_grip(1 if key == Qt.Key.Key_PageDown else -1)
+            case Qt.Key.Key_Return | Qt.Key.Key_Enter if self._kind:
+                middle = self.view.box.viewRect().center()
+                self._place(first_places(self._kind, (middle.x(), middle.y())))
+            case Qt.Key.Key_Delete | Qt.Key.Key_Backspace if self._work.chosen:
+                self._work.remove(self._work.chosen)
+            case Qt.Key.Key_Escape if self._kind:
+                self.let_go()
+            case Qt.Key.Key_Escape if self._work.chosen:
+                self._work.choose(0)
+            case _:
+                super().keyPressEvent(event)
+
+    def _next_grip(self, step: int) -> None:
+        work = self._work
+        names = [] if work.tool is None else [grip.name for grip in grips_of(work.tool)]
+        if names:
+            at = names.index(work.grip) if work.grip in names else -step
+            work.choose(work.chosen, names[(at + step) % len(names)])
+
+
+def _drawn(item: Placed, found: ToolResult | str | None) -> DrawnTool:
+    """Return a tool as it is drawn: as measured, or as it was put there."""
+    if isinstance(found, ToolResult) and found.tool == item.tool:
+        lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
+        state = "ok" if found.verdict == "ok" else "doubtful"
+        return DrawnTool(item.key, lines, state, figure_text(found.figures[0]))
+    lines = outline_of(item.tool)
+    if not lines:
+        lines = (tuple(grip.at_mm for grip in grips_of(item.tool)),)
+    return DrawnTool(item.key, lines, "refused" if isinstance(found, str) else "ok", "")

@@ -1,0 +1,177 @@
+"""The lab's known indenters: ``indenters.json`` of the workspace."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.measurement.measure import SHAPES
+from gelpolight_core.translation import tr
+
+FILE = "indenters.json"
+FORMAT = "gelpolight-indenters"
+VERSION = 1
+SIZE_LIMIT = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Indenter:
+    """An object of known size.
+
+    Attributes
+    ----------
+    name : str
+        What the lab calls it.
+    shape : str
+        ``ball``, ``cylinder`` or ``cuboid``.
+    size_mm : float
+        Diameter, or side of a cuboid.
+    second_mm : float or None
+        The other side of a cuboid that is not square.
+    height_mm : float or None
+        How deep it goes in until its base touches; None where that is not fixed.
+
+    Raises
+    ------
+    InputError
+        If it has no name, the shape is not known, or a length is not greater than zero.
+    """
+
+    name: str
+    shape: str
+    size_mm: float
+    second_mm: float | None = None
+    height_mm: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check it."""
+        where = tr("indenter {name}").format(name=self.name or tr("without a name"))
+        if not self.name.strip():
+            raise InputError(
+                tr("an indenter has no name"), where=where, advice=tr("Give it a name")
+            )
+        if self.shape not in SHAPES:
+            raise InputError(
+                tr("unknown shape '{shape}'").format(shape=self.shape),
+                where=where,
+                advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
+            )
+        for length in (self.size_mm, self.second_mm, self.height_mm):
+            if length is not None and not (math.isfinite(length) and length > 0.0):
+                raise InputError(
+                    tr("a length of {value} mm").format(value=length),
+                    where=where,
+                    advice=tr("Give lengths greater than zero"),
+                )
+
+    @property
+    def mean_size_mm(self) -> float:
+        """The diameter, or the mean side."""
+        second = self.size_mm if self.second_mm is None else self.second_mm
+        return (self.size_mm + second) / 2.0
+
+
+def first_indenters() -> tuple[Indenter, ...]:
+    """Return the list that a lab begins with: the indenters of the paper's evaluation."""
+    rows = [
+        Indenter(
+            tr("{shape} {size:g} mm, {height:g} mm high").format(
+                shape=text, size=size, height=height
+            ),
+            shape,
+            size,
+            height_mm=height,
+        )
+        for shape, text in (("cylinder", tr("Cylinder")), ("cuboid", tr("Cuboid")))
+        for size, height in (
+            *((size, 1.0) for size in (3.0, 4.0, 5.0, 6.0, 7.0)),
+            *((5.0, height) for height in (0.5, 0.75, 1.25, 1.5)),
+        )
+    ]
+    return (*rows, Indenter(tr("Ball 8 mm"), "ball", 8.0))
+
+
+def read_indenters(folder: Path) -> tuple[Indenter, ...]:
+    """Read the list of a workspace; the first one where there is none yet.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is damaged, or of a newer version.
+    """
+    path = folder / FILE
+    try:
+        with path.open("rb") as stream:
+            content = json.loads(stream.read(SIZE_LIMIT))
+        return _parse(content, path)
+    except FileNotFoundError:
+        return first_indenters()
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        raise InputError(
+            tr("the list of indenters cannot be read ({error})").format(error=error),
+            where=str(path),
+            advice=tr("Repair the file, or remove it to begin with the first list again"),
+        ) from error
+
+
+def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
+    """Keep the list, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If two indenters have one name, or the file cannot be written.
+    """
+    rows = list(indenters)
+    names = [row.name for row in rows]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                tr("two indenters are called {name}").format(name=name),
+                where=tr("list of indenters"),
+                advice=tr("Give each a name of its own"),
+            )
+    content = {"format": FORMAT, "version": VERSION, "indenters": [asdict(row) for row in rows]}
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+    def write(stream: BinaryIO) -> None:
+        stream.write(text.encode())
+
+    make_folder(folder)
+    write_atomically(folder / FILE, write)
+
+
+def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise ValueError("it is no list of indenters")
+    version = content["version"]
+    if type(version) is int and version > VERSION:
+        raise InputError(
+            tr("the list of indenters has version {v} and this program knows version {k}").format(
+                v=version, k=VERSION
+            ),
+            where=str(path),
+            advice=tr("Use a newer version of GelPoLight Studio"),
+        )
+    return tuple(
+        Indenter(
+            str(row["name"]),
+            str(row["shape"]),
+            _length(row["size_mm"]),
+            None if row.get("second_mm") is None else _length(row["second_mm"]),
+            None if row.get("height_mm") is None else _length(row["height_mm"]),
+        )
+        for row in content["indenters"]
+    )
+
+
+def _length(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{value!r} is no length")
+    return float(value)

@@ -1,0 +1,211 @@
+"""The evaluation protocol on the virtual sensor, from the first press to the evaluation."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from itertools import zip_longest
+from pathlib import Path
+
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.experiments.press_workers import Equipment, PressTask, work_through
+from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.measurement.evaluation import Evaluation, evaluate_presses
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.presses import open_ledger, picture_reconstruction
+from gelpolight_core.measurement.protocol import PressWanted
+from gelpolight_core.measurement.protocol_run import ProtocolRun
+from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_session
+from gelpolight_core.simulation.session import simulate_session
+from gelpolight_core.translation import tr
+
+Progress = Callable[[str, float], None]
+
+SESSION, CALIBRATION = "session", "sensor.gplcal"
+LEDGER = "measurements.jsonl"
+
+
+def calibrate_virtual_sensor(
+    design: SensorDesign, folder: Path, *, model: str = "full", progress: Progress | None = None
+) -> Path:
+    """Calibrate the virtual sensor as a technician would; return the calibration's file.
+
+    What an earlier call has finished is not made again.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The sensor.
+    folder : Path
+        Gets the folder ``session`` and the file ``sensor.gplcal``.
+    model : str, optional
+        Of the calibration.
+    progress : callable, optional
+        Told a name and the share done, 0..1.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+
+    def part(start: float, width: float) -> Progress:
+        def tell(name: str, share: float) -> None:
+            if progress is not None:
+                progress(name, start + width * share)
+
+        return tell
+
+    made, session = folder / CALIBRATION, folder / SESSION
+    if made.is_file():
+        return made
+    make_folder(folder)
+    if not session.is_dir():
+        begun = folder / f"{SESSION}.part"
+        shutil.rmtree(begun, ignore_errors=True)
+        simulate_session(design, begun, progress=part(0.0, 0.5))
+        os.replace(begun, session)
+    run = calibrate_session(read_session(session), model=model, progress=part(0.5, 0.5))
+    write_calibration(run.calibration, made)
+    return made
+
+
+def press_protocol(
+    run: ProtocolRun,
+    equipment: Equipment,
+    ledger: Ledger,
+    *,
+    workers: int = 2,
+    progress: Progress | None = None,
+) -> None:
+    """Make every press that is left, and measure every press that is not measured yet.
+
+    Object after object gets its next press, so that a run that is broken off has seen all.
+
+    Parameters
+    ----------
+    run : ProtocolRun
+        What is pressed, and where it is kept.
+    equipment : Equipment
+        The virtual sensor, where presses are left, and the calibration.
+    ledger : Ledger
+        Keeps what is measured.
+    workers : int, optional
+        Presses that are worked on at a time.
+    progress : callable, optional
+        Told what was done and the share done, 0..1; what it raises stops the work, and nothing
+        that is done is lost.
+
+    Raises
+    ------
+    InputError
+        If the disk refuses something, or the calibration cannot be read.
+    """
+    tasks = [_task(run, press, make=False) for press in run.done]
+    tasks = [task for task in tasks if not _is_measured(task, ledger)]
+    tasks += [_task(run, press, make=True) for press in _interleaved(run.left)]
+    total = len(run.wanted)
+    measured = total - len(tasks)
+    with closing(work_through(tasks, equipment, workers=workers)) as results:
+        for task, outcome in results:
+            if task.press is not None:
+                run.record(task.press)
+            key = ledger.key(task.picture, task.shape)
+            if key is not None:
+                ledger.keep(key, outcome)
+            measured += 1
+            if progress is not None:
+                progress(tr("press {n} of {all}").format(n=measured, all=total), measured / total)
+
+
+def measure_folder(
+    presses: Path,
+    equipment: Equipment,
+    ledger: Ledger,
+    *,
+    workers: int = 2,
+    progress: Progress | None = None,
+) -> None:
+    """Measure the pictures of a folder with ``truth.csv``, several at a time, into a ledger.
+
+    Parameters
+    ----------
+    presses : Path
+        The folder.
+    equipment : Equipment
+        The calibration.
+    ledger : Ledger
+        Keeps what is measured.
+    workers : int, optional
+        Pictures that are worked on at a time.
+    progress : callable, optional
+        Told the file's name and the share done, 0..1.
+
+    Raises
+    ------
+    InputError
+        If ``truth.csv`` or the calibration cannot be read, or the ledger cannot be written.
+    """
+    rows = read_truth(presses).rows
+    tasks = [PressTask(presses / row.file, row.truth.shape) for row in rows]
+    tasks = [task for task in tasks if task.picture.is_file() and not _is_measured(task, ledger)]
+    with closing(work_through(tasks, equipment, workers=workers)) as results:
+        for number, (task, outcome) in enumerate(results, start=1):
+            key = ledger.key(task.picture, task.shape)
+            if key is not None:
+                ledger.keep(key, outcome)
+            if progress is not None:
+                progress(task.picture.name, number / len(tasks))
+
+
+def evaluate_run(run: ProtocolRun, reconstructor: Reconstructor, ledger: Ledger) -> Evaluation:
+    """Evaluate what is pressed so far; what the ledger knows is not measured again.
+
+    Parameters
+    ----------
+    run : ProtocolRun
+        With at least one press.
+    reconstructor : Reconstructor
+        With the calibration.
+    ledger : Ledger
+        Of measurements with it.
+
+    Raises
+    ------
+    InputError
+        If nothing is pressed yet.
+    """
+    return evaluate_presses(
+        run.presses,
+        picture_reconstruction(reconstructor),
+        crossing=run.protocol.crossing,
+        ledger=ledger,
+    )
+
+
+def run_ledger(run: ProtocolRun, reconstructor: Reconstructor) -> Ledger:
+    """Return the ledger in a run's folder."""
+    return open_ledger(run.folder / LEDGER, reconstructor)
+
+
+def _task(run: ProtocolRun, press: PressWanted, *, make: bool) -> PressTask:
+    return PressTask(run.picture(press), press.truth.shape, press if make else None)
+
+
+def _is_measured(task: PressTask, ledger: Ledger) -> bool:
+    key = ledger.key(task.picture, task.shape)
+    return key is not None and ledger.find(key) is not None
+
+
+def _interleaved(presses: Sequence[PressWanted]) -> list[PressWanted]:
+    objects: dict[object, list[PressWanted]] = {}
+    for press in presses:
+        objects.setdefault(press.truth, []).append(press)
+    rounds = zip_longest(*objects.values())
+    return [press for of_each in rounds for press in of_each if press is not None]

@@ -1,0 +1,145 @@
+"""Measurements that were made already, one line each, so that nothing is measured twice.
+
+A line is found by what its result depends on: the picture's bytes, the shape, and the name that
+the ledger was opened for (the calibration, the model, the program's version). So a picture that
+was taken again, or another calibration, never meets an old result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.session.wholeness import unreadable
+from gelpolight_core.translation import tr
+
+PAIRS = ("side_mm", "centre_mm")
+SPREADS = ("sd", "noise_sd", "calibration_sd")
+"""Fields of a measurement that are no plain values, and that hold some."""
+
+
+class Ledger:
+    """A file of measurements; a line is on the disk before the next one is begun.
+
+    Parameters
+    ----------
+    path : Path or None
+        The file, made with the first line; None: nothing is written.
+    name : str
+        What else the results depend on, such as the calibration's identity and the model.
+
+    Raises
+    ------
+    InputError
+        If the file is there and cannot be read.
+    """
+
+    def __init__(self, path: Path | None, name: str) -> None:
+        self._path, self._name = path, name
+        self._known: dict[str, Measurement | str] = {}
+        # A line that a crash cut short is no line; the next one begins on a line of its own.
+        self._torn = False
+        if path is None or not path.is_file():
+            return
+        try:
+            lines = path.read_text(encoding="utf-8").split("\n")
+        except (OSError, UnicodeDecodeError) as error:
+            raise _damaged(path, error) from error
+        self._torn = bool(lines[-1])
+        for line in lines:
+            self._take_in(line)
+
+    def key(self, picture: Path, shape: str) -> str | None:
+        """Return what a picture's result is found by; None where the picture cannot be read."""
+        try:
+            content = picture.read_bytes()
+        except OSError:  # the measurement itself says so in its own words
+            return None
+        digest = hashlib.sha256(content)
+        digest.update(f"\n{shape}\n{self._name}".encode())
+        return digest.hexdigest()
+
+    def find(self, key: str) -> Measurement | str | None:
+        """Return a result: a measurement, a sentence why there is none, or None if not known."""
+        return self._known.get(key)
+
+    def keep(self, key: str, outcome: Measurement | str) -> None:
+        """Write a result to the end of the file.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        self._known[key] = outcome
+        if self._path is None:
+            return
+        said = outcome if isinstance(outcome, str) else _as_json(outcome)
+        line = json.dumps({"key": key, "outcome": said}, separators=(",", ":")) + "\n"
+        try:
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write("\n" + line if self._torn else line)
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise unwritable(error, self._path) from error
+        self._torn = False
+
+    def _take_in(self, line: str) -> None:
+        """Take in one line; one that was torn is measured again."""
+        try:
+            content = json.loads(line)
+            outcome = content["outcome"]
+            self._known[content["key"]] = (
+                outcome if isinstance(outcome, str) else _measurement(outcome)
+            )
+        except (ValueError, TypeError, KeyError):
+            return
+
+
+def unwritable(error: OSError, path: Path) -> InputError:
+    """Return what to raise about a file that cannot be added to."""
+    return InputError(
+        tr("the file cannot be written ({reason})").format(reason=error.strerror or error),
+        where=str(path),
+        advice=tr("Check the disk and its permissions, then go on where it was left"),
+    )
+
+
+def _damaged(path: Path, error: OSError | UnicodeDecodeError) -> InputError:
+    if isinstance(error, OSError):
+        return unreadable(error, path)
+    return InputError(
+        tr("the file is not text in UTF-8"),
+        where=str(path),
+        advice=tr("Move it away: the presses are measured again"),
+    )
+
+
+def _as_json(measurement: Measurement) -> dict[str, Any]:
+    """Return every field; numbers keep their last bit, as JSON writes them shortest and exact."""
+    return {**asdict(measurement), "outline_mm": measurement.outline_mm.tolist()}
+
+
+def _measurement(content: dict[str, Any]) -> Measurement:
+    values: dict[str, Any] = {
+        key: tuple(v) if key in PAIRS and v else v for key, v in content.items()
+    }
+    for part in SPREADS:
+        values[part] = _spread(content[part])
+    values["outline_mm"] = np.array(content["outline_mm"], np.float64)
+    return Measurement(**values)
+
+
+def _spread(content: dict[str, Any] | None) -> dict[str, Any] | None:
+    if content is None:
+        return None
+    return {key: tuple(v) if isinstance(v, list) else v for key, v in content.items()}

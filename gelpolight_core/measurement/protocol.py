@@ -1,0 +1,243 @@
+"""The evaluation protocol of the paper's section VI-B: what is pressed, where and how often.
+
+Objects of sizes 3 to 7 mm at one height, and of heights 0.5 to 1.5 mm at one size, each pressed
+five times in one region and once in each of 25 random regions. Every press has a place of its own
+that depends on nothing but the seed and the press itself, so that a part of the protocol asks for
+the same places as the whole, and a run that is resumed goes on with the places it began with.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.evaluation import Crossing
+from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.truth import PressTruth
+from gelpolight_core.translation import tr
+
+SHAPES = ("cylinder", "cuboid")
+SAME_REGION = "same"
+ROOM_MM = 2.0
+"""Ground that is seen around every object: three decay lengths of 0.7 mm, where the membrane has
+come to rest to a twentieth of the height."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressWanted:
+    """One press of the protocol.
+
+    Attributes
+    ----------
+    truth : Truth
+        The object: shape, size and height.
+    place_mm : (float, float)
+        Where its middle goes, (x, y) in the sensor frame.
+    yaw_deg : float
+        How a cuboid is turned, from x to y; 0 for a cylinder.
+    region : str
+        ``same``, or a random region's name such as ``r07``.
+    repeat : int
+        From 1.
+    """
+
+    truth: Truth
+    place_mm: tuple[float, float]
+    yaw_deg: float
+    region: str
+    repeat: int
+
+    @property
+    def file(self) -> str:
+        """The picture's name, which no other press of a protocol has."""
+        t = self.truth
+        return (
+            f"{t.shape}_s{round(100 * t.size_mm):03d}_h{round(100 * t.height_mm):03d}"
+            f"_{self.region}_{self.repeat}.png"
+        )
+
+    @property
+    def row(self) -> PressTruth:
+        """What ``truth.csv`` says of it."""
+        return PressTruth(self.file, self.truth, self.region, str(self.repeat))
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """What is pressed; the default is the paper's, and any part of it may be left out.
+
+    Attributes
+    ----------
+    shapes : tuple of str
+        Some of ``cylinder`` and ``cuboid``.
+    sizes_mm : tuple of float
+        Diameters or sides that are pressed at `at_height_mm`.
+    heights_mm : tuple of float
+        Heights that are pressed at the size `at_size_mm`.
+    at_size_mm, at_height_mm : float
+        Where the two series cross.
+    repeats : int
+        Presses of each object in one and the same region.
+    regions : int
+        Random regions, in each of which each object is pressed once.
+    reach_mm : float
+        Radius about the sensor frame's origin within which objects and the ground around them lie.
+    seed : int
+        Of the random places.
+    """
+
+    shapes: tuple[str, ...] = SHAPES
+    sizes_mm: tuple[float, ...] = (3.0, 4.0, 5.0, 6.0, 7.0)
+    heights_mm: tuple[float, ...] = (0.5, 0.75, 1.0, 1.25, 1.5)
+    at_size_mm: float = 5.0
+    at_height_mm: float = 1.0
+    repeats: int = 5
+    regions: int = 25
+    reach_mm: float = 10.0
+    seed: int = 0
+
+    @property
+    def objects(self) -> tuple[Truth, ...]:
+        """The distinct objects, shape by shape."""
+        planar = [(size, self.at_height_mm) for size in self.sizes_mm]
+        depth = [(self.at_size_mm, height) for height in self.heights_mm]
+        items = tuple(dict.fromkeys(planar + depth))
+        return tuple(Truth(shape, *item) for shape in self.shapes for item in items)
+
+    @property
+    def crossing(self) -> Crossing:
+        """Where its two series cross."""
+        return Crossing(self.at_size_mm, self.at_height_mm)
+
+    def presses(self) -> tuple[PressWanted, ...]:
+        """Return every press: object by object, first in the same region, then in the random ones.
+
+        So an object is mounted once, and pressed until it is done with.
+        """
+        return tuple(press for truth in self.objects for press in self._presses_of(truth))
+
+    def _presses_of(self, truth: Truth) -> list[PressWanted]:
+        wanted = [
+            PressWanted(truth, (0.0, 0.0), 0.0, SAME_REGION, repeat)
+            for repeat in range(1, self.repeats + 1)
+        ]
+        for number in range(1, self.regions + 1):
+            region = f"r{number:02d}"
+            place, yaw = self._random_place(truth, region)
+            wanted.append(PressWanted(truth, place, yaw, region, 1))
+        return wanted
+
+    def _random_place(self, truth: Truth, region: str) -> tuple[tuple[float, float], float]:
+        """Return a place that is equally likely anywhere with room, and a turn for a cuboid."""
+        name = f"{truth.shape} {truth.size_mm:.3f} {truth.height_mm:.3f} {region}"
+        rng = np.random.default_rng([self.seed, zlib.crc32(name.encode())])
+        away = room_mm(truth, self.reach_mm) * math.sqrt(rng.random())
+        angle = 2.0 * math.pi * rng.random()
+        # To hundredths of a millimetre, as they are shown and written.
+        place = (round(away * math.cos(angle), 2), round(away * math.sin(angle), 2))
+        yaw = round(90.0 * rng.random() - 45.0, 1)
+        return place, yaw if truth.shape == "cuboid" else 0.0
+
+
+def room_mm(truth: Truth, reach_mm: float) -> float:
+    """Return how far from the origin an object's middle may lie; not positive: it has no room.
+
+    Parameters
+    ----------
+    truth : Truth
+        The object.
+    reach_mm : float
+        Radius within which it and the ground around it must lie.
+    """
+    half = truth.size_mm / (math.sqrt(2.0) if truth.shape == "cuboid" else 2.0)
+    return reach_mm - half - ROOM_MM
+
+
+def protocol_reach_mm(calibration: Calibration) -> float:
+    """Return the radius about the origin in which every point of the membrane is seen."""
+    table = calibration.table
+    grid = table.grid
+    away = np.hypot(grid.x_mm[None, :], grid.y_mm[:, None])
+    hidden = away[~table.valid]
+    edge = min(-grid.x_mm[0], grid.x_mm[-1], -grid.y_mm[0], grid.y_mm[-1])
+    return float(min(edge, hidden.min() if hidden.size else edge))
+
+
+def check_protocol(protocol: Protocol, *, where: str = "protocol") -> Protocol:
+    """Refuse a protocol that nobody can press; return it otherwise.
+
+    Parameters
+    ----------
+    protocol : Protocol
+        To be checked.
+    where : str, optional
+        File or origin named in the error.
+
+    Raises
+    ------
+    InputError
+        If nothing is to be pressed, a shape is unknown, a number is out of range or stands twice,
+        or an object has no room.
+    """
+
+    def refusal(found: str, advice: str) -> InputError:
+        return InputError(found, where=where, advice=advice)
+
+    for shape in protocol.shapes:
+        if shape not in SHAPES:
+            raise refusal(
+                tr("the protocol has no shape '{shape}'").format(shape=shape),
+                tr("Choose from {shapes}").format(shapes=", ".join(SHAPES)),
+            )
+    _check_lengths(protocol, refusal)
+    if len(set(protocol.shapes)) < len(protocol.shapes):
+        raise refusal(tr("a shape is named twice"), tr("Name each shape once"))
+    if not protocol.objects:
+        raise refusal(tr("no object is to be pressed"), tr("Choose a shape, and a size or height"))
+    counts = {tr("repeats"): protocol.repeats, tr("regions"): protocol.regions}
+    for name, count in counts.items():
+        if not 0 <= count <= 99:
+            raise refusal(
+                tr("{count} {name} are asked for").format(count=count, name=name),
+                tr("Ask for 0 to 99"),
+            )
+    if protocol.repeats + protocol.regions == 0:
+        raise refusal(tr("nothing is to be pressed"), tr("Ask for repeats or for regions"))
+    for truth in protocol.objects:
+        room = room_mm(truth, protocol.reach_mm)
+        if room <= 0.0:
+            raise refusal(
+                tr("a {shape} of {size:g} mm has no room within {reach:.1f} mm").format(
+                    shape=truth.shape, size=truth.size_mm, reach=protocol.reach_mm
+                ),
+                tr("Leave this size out: {mm:.1f} mm are missing").format(mm=-room),
+            )
+    return protocol
+
+
+def _check_lengths(protocol: Protocol, refusal: Callable[[str, str], InputError]) -> None:
+    lists: dict[str, Sequence[float]] = {
+        "sizes_mm": protocol.sizes_mm,
+        "heights_mm": protocol.heights_mm,
+        "at_size_mm": (protocol.at_size_mm,),
+        "at_height_mm": (protocol.at_height_mm,),
+        "reach_mm": (protocol.reach_mm,),
+    }
+    for name, lengths in lists.items():
+        for length in lengths:
+            if not 0.05 <= length <= 200.0:
+                raise refusal(
+                    tr("{name} holds {length:g}").format(name=name, length=length),
+                    tr("Give lengths from 0.05 to 200 mm"),
+                )
+        # The names of the pictures hold hundredths of a millimetre.
+        if len({round(100 * length) for length in lengths}) < len(lengths):
+            raise refusal(
+                tr("{name} holds a length twice").format(name=name), tr("Name each length once")
+            )

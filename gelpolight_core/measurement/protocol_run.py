@@ -1,0 +1,358 @@
+"""A run of the evaluation protocol: a folder that can be left at any time and gone on with.
+
+    protocol.toml   presses/*.png   presses/truth.csv   refused.csv   discarded/*.png
+
+A press counts once its row stands in ``truth.csv``; its picture is on the disk before. Nothing
+else is kept of where a run stands, so a run that was killed goes on with the press it was at.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.measurement.evaluation import Crossing
+from gelpolight_core.measurement.ledger import unwritable
+from gelpolight_core.measurement.protocol import PressWanted, Protocol, check_protocol
+from gelpolight_core.measurement.protocol_file import (
+    FILE_NAME,
+    ProtocolFile,
+    read_protocol_file,
+    write_protocol_file,
+)
+from gelpolight_core.session.capture import average_frames, write_picture
+from gelpolight_core.translation import tr
+
+PRESSES, DISCARDED, REFUSED = "presses", "discarded", "refused.csv"
+TRUTH = "truth.csv"
+COLUMNS = (
+    "file",
+    "shape",
+    "diameter_mm",
+    "side_mm",
+    "height_mm",
+    "region",
+    "repeat",
+    "x_mm",
+    "y_mm",
+    "yaw_deg",
+    "captured",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RunProgress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    done, total : int
+        Presses.
+    refused : int
+        Presses that were refused and made again.
+    object_done, object_total : int
+        Presses of the object that is pressed next; 0 of 0 at the end.
+    """
+
+    done: int
+    total: int
+    refused: int
+    object_done: int
+    object_total: int
+
+    @property
+    def share(self) -> float:
+        """Share done, 0..1."""
+        return self.done / self.total
+
+
+class ProtocolRun:
+    """A run in its folder; made by :func:`begin_run` or :func:`open_run`.
+
+    Attributes
+    ----------
+    folder : Path
+        Where everything is.
+    content : ProtocolFile
+        What is pressed, on which sensor.
+    """
+
+    def __init__(self, folder: Path, content: ProtocolFile, rows: Mapping[str, list[str]]) -> None:
+        self.folder, self.content = folder, content
+        self.wanted = content.protocol.presses()
+        self._rows = dict(rows)
+        self._refused = _count_lines(folder / REFUSED)
+
+    @property
+    def protocol(self) -> Protocol:
+        """What is pressed."""
+        return self.content.protocol
+
+    @property
+    def presses(self) -> Path:
+        """The folder of the pictures and ``truth.csv``."""
+        return self.folder / PRESSES
+
+    @property
+    def done(self) -> tuple[PressWanted, ...]:
+        """The presses that count, in the protocol's order."""
+        return tuple(press for press in self.wanted if press.file in self._rows)
+
+    @property
+    def left(self) -> tuple[PressWanted, ...]:
+        """The presses still to be made, in the protocol's order."""
+        return tuple(press for press in self.wanted if press.file not in self._rows)
+
+    @property
+    def progress(self) -> RunProgress:
+        """How far it is."""
+        now = self.next()
+        of_object = [p for p in self.wanted if now is not None and p.truth == now.truth]
+        here = sum(press.file in self._rows for press in of_object)
+        return RunProgress(len(self._rows), len(self.wanted), self._refused, here, len(of_object))
+
+    def next(self) -> PressWanted | None:
+        """Return what to press next; None at the end."""
+        return next((press for press in self.wanted if press.file not in self._rows), None)
+
+    def picture(self, press: PressWanted) -> Path:
+        """Return where a press's picture is, or shall be."""
+        return self.presses / press.file
+
+    def accept(self, press: PressWanted, frames: Sequence[NDArray[Any]]) -> Path:
+        """Keep a press: its frames averaged in one picture, and its row in ``truth.csv``.
+
+        Parameters
+        ----------
+        press : PressWanted
+            What was pressed.
+        frames : sequence of (rows, columns, 3) uint8 or uint16
+            RGB, of the steady press.
+
+        Raises
+        ------
+        InputError
+            If the disk refuses it; the press is then asked for again.
+        """
+        write_picture(average_frames(frames), self.picture(press))
+        self.record(press)
+        return self.picture(press)
+
+    def record(self, press: PressWanted) -> None:
+        """Count a press whose picture is in its place already.
+
+        Raises
+        ------
+        InputError
+            If ``truth.csv`` cannot be written.
+        """
+        rows = {**self._rows, press.file: _row(press)}
+        order = {wanted.file: k for k, wanted in enumerate(self.wanted)}
+        _write_rows([rows[file] for file in sorted(rows, key=order.__getitem__)], self.presses)
+        self._rows = rows
+
+    def refuse(self, press: PressWanted, reason: str) -> None:
+        """Note that a press was refused and why; it stays the next one.
+
+        Raises
+        ------
+        InputError
+            If the note cannot be written.
+        """
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerow([_now(), press.file, reason])
+        _append(self.folder / REFUSED, text.getvalue())
+        self._refused += 1
+
+    def take_back(self, press: PressWanted) -> Path | None:
+        """Make a press again: its picture goes to ``discarded``; return its place there.
+
+        Raises
+        ------
+        InputError
+            If the press is not done, or the disk refuses it.
+        """
+        if press.file not in self._rows:
+            raise InputError(
+                tr("this press is not done yet"),
+                where=press.file,
+                advice=tr("Choose one that is done"),
+            )
+        # The row first: without it the picture is only a picture, and nothing is lost.
+        rows = {file: row for file, row in self._rows.items() if file != press.file}
+        _write_rows(list(rows.values()), self.presses)
+        self._rows = rows
+        picture = self.picture(press)
+        if not picture.is_file():
+            return None
+        make_folder(self.folder / DISCARDED)
+        stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")
+        kept = self.folder / DISCARDED / f"{picture.stem}_{stamp}.png"
+        try:
+            os.replace(picture, kept)
+        except OSError as error:
+            raise unwritable(error, kept) from error
+        return kept
+
+
+def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str) -> ProtocolRun:
+    """Make the folder of a new run.
+
+    Parameters
+    ----------
+    folder : Path
+        To be made; it may be there, but hold no run.
+    protocol : Protocol
+        What is pressed.
+    serial : str
+        Of the sensor.
+    calibration : str
+        Identity of the calibration.
+
+    Raises
+    ------
+    InputError
+        If the protocol cannot be pressed, the folder holds a run or presses already, or cannot be
+        written.
+    """
+    check_protocol(protocol)
+    for name in (FILE_NAME, PRESSES):
+        if (folder / name).exists():
+            raise InputError(
+                tr("the folder holds a {name} already").format(name=name),
+                where=str(folder),
+                advice=tr("Go on with that run, or name a new folder"),
+            )
+    make_folder(folder / PRESSES)
+    content = ProtocolFile(protocol, serial, calibration)
+    write_protocol_file(content, folder)
+    return ProtocolRun(folder, content, {})
+
+
+def open_run(folder: Path) -> ProtocolRun:
+    """Go on with a run where it was left.
+
+    Raises
+    ------
+    InputError
+        If there is none, or ``protocol.toml`` or ``truth.csv`` is damaged or of another protocol.
+    """
+    content = read_protocol_file(folder)
+    presses = folder / PRESSES
+    make_folder(presses)
+    wanted = {press.file: press for press in content.protocol.presses()}
+    rows: dict[str, list[str]] = {}
+    for row in _read_rows(presses / TRUTH):
+        press = wanted.get(row[0])
+        if press is None or len(row) != len(COLUMNS) or row[1:-1] != _row(press)[1:-1]:
+            raise InputError(
+                tr("the row of {file} is not of this protocol").format(file=row[0]),
+                where=str(presses / TRUTH),
+                advice=tr("Put protocol.toml and truth.csv back as they were written"),
+            )
+        # A picture that was taken away is asked for again.
+        if (presses / row[0]).is_file():
+            rows[row[0]] = row
+    return ProtocolRun(folder, content, rows)
+
+
+def presses_folder(folder: Path) -> Path:
+    """Return the folder of pictures and ``truth.csv`` that a run's or a session's folder holds."""
+    inner = folder / PRESSES
+    return inner if not (folder / TRUTH).is_file() and (inner / TRUTH).is_file() else folder
+
+
+def crossing_of(presses: Path) -> Crossing | None:
+    """Return where the series of a folder's presses cross; None where it is no protocol's.
+
+    Parameters
+    ----------
+    presses : Path
+        The folder of the pictures, in that of the run.
+
+    Raises
+    ------
+    InputError
+        If ``protocol.toml`` is damaged.
+    """
+    folder = presses.parent
+    if presses.name != PRESSES or not (folder / FILE_NAME).is_file():
+        return None
+    return read_protocol_file(folder).protocol.crossing
+
+
+def _row(press: PressWanted) -> list[str]:
+    truth = press.truth
+    size = repr(truth.size_mm)
+    sizes = ["", size] if truth.shape == "cuboid" else [size, ""]
+    places = [repr(press.place_mm[0]), repr(press.place_mm[1]), repr(press.yaw_deg)]
+    return [
+        press.file,
+        truth.shape,
+        *sizes,
+        repr(truth.height_mm),
+        press.region,
+        str(press.repeat),
+        *places,
+        _now(),
+    ]
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _write_rows(rows: Sequence[Sequence[str]], presses: Path) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(rows)
+    write_atomically(presses / TRUTH, lambda stream: stream.write(text.getvalue().encode()))
+
+
+def _read_rows(path: Path) -> list[list[str]]:
+    if not path.is_file():
+        return []
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            tr("the file cannot be read ({reason})").format(reason=error),
+            where=str(path),
+            advice=tr("Mend it; the pictures beside it are whole"),
+        ) from error
+    lines = [row for row in csv.reader(text.splitlines()) if row]
+    if not lines or tuple(lines[0]) != COLUMNS:
+        raise InputError(
+            tr("the first line is not that of a protocol's run"),
+            where=str(path),
+            advice=tr("Put the file back as it was written"),
+        )
+    return lines[1:]
+
+
+def _append(path: Path, line: str) -> None:
+    try:
+        with path.open("a", encoding="utf-8") as file:
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise unwritable(error, path) from error
+
+
+def _count_lines(path: Path) -> int:
+    if not path.is_file():
+        return 0
+    with path.open("rb") as file:
+        return sum(1 for _ in file)

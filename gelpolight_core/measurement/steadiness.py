@@ -1,0 +1,148 @@
+"""Is something pressed, at the right place, and does it hold still? Judged by the camera's noise.
+
+A press is told from the bare membrane by what it changes in the picture; so that neither needs a
+calibration, and the answer is there at the camera's rate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.session.movement import BLOCK_PX, MOVING_SHARE, changed_blocks, moving_share
+from gelpolight_core.translation import tr
+
+Frame = NDArray[Any]
+
+CONTACT_CHANGE = 0.06
+"""The walls of a press change the light by tens of percent, warming LEDs by one or two."""
+PRESSED_SHARE = 0.004
+"""A cylinder of 3 mm and 0.5 mm height changes a hundredth of a picture 30 mm wide."""
+LIFTED_SHARE = 0.001
+LEAST_FRAMES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """What a picture shows that the bare membrane does not.
+
+    Attributes
+    ----------
+    share : float
+        Share of the picture that is changed.
+    centre_px : (float, float)
+        Its middle, (u, v) in pixels; NaN where nothing is changed.
+    """
+
+    share: float
+    centre_px: tuple[float, float]
+
+    @property
+    def pressed(self) -> bool:
+        """Whether something is pressed."""
+        return self.share >= PRESSED_SHARE
+
+    @property
+    def lifted(self) -> bool:
+        """Whether the membrane is bare again."""
+        return self.share < LIFTED_SHARE
+
+
+@dataclass(frozen=True, slots=True)
+class PressJudgement:
+    """Whether frames show a press that may be kept.
+
+    Attributes
+    ----------
+    accepted : bool
+        Whether they do.
+    reason : str
+        Why not, and what to do; empty when accepted.
+    moving_share : float
+        Largest share of the picture that changed between two of the frames.
+    contact : Contact
+        What is pressed.
+    """
+
+    accepted: bool
+    reason: str
+    moving_share: float
+    contact: Contact
+
+
+def find_contact(bare: Frame, now: Frame) -> Contact:
+    """Return what is pressed in a frame.
+
+    Parameters
+    ----------
+    bare, now : (rows, columns, 3) uint8 or uint16
+        The bare membrane, and the frame, of one size and depth.
+    """
+    changed = changed_blocks(bare, now, flicker=CONTACT_CHANGE)
+    rows, columns = np.nonzero(changed)
+    if rows.size == 0:
+        return Contact(0.0, (math.nan, math.nan))
+    middle = 0.5 * (BLOCK_PX - 1)
+    # The middle of the extent, which the shadow on one side draws less than the centroid.
+    u, v = (
+        float(BLOCK_PX * 0.5 * (np.percentile(c, 2) + np.percentile(c, 98)) + middle)
+        for c in (columns, rows)
+    )
+    return Contact(float(changed.mean()), (u, v))
+
+
+def judge_press(
+    frames: Sequence[Frame],
+    bare: Frame,
+    *,
+    place_px: tuple[float, float] | None = None,
+    tolerance_px: float = math.inf,
+) -> PressJudgement:
+    """Judge whether consecutive frames show a press that is held still.
+
+    Parameters
+    ----------
+    frames : sequence of (rows, columns, 3) uint8 or uint16
+        At least two, in their order.
+    bare : (rows, columns, 3)
+        The bare membrane, of the same size and depth.
+    place_px : (float, float), optional
+        Where to press, (u, v) in pixels.
+    tolerance_px : float, optional
+        How far beside it the middle of the press may be.
+    """
+    nowhere = Contact(0.0, (math.nan, math.nan))
+    if len(frames) < LEAST_FRAMES:
+        return PressJudgement(False, tr("One frame cannot show stillness."), math.nan, nowhere)
+    if any(f.shape != bare.shape or f.dtype != bare.dtype for f in frames):
+        reason = tr("The camera's picture has another size than that of the bare membrane.")
+        return PressJudgement(False, reason, math.nan, nowhere)
+    # The first and the last too: a slow creep is no movement from one frame to the next.
+    pairs = [*pairwise(frames), (frames[0], frames[-1])]
+    moving = max(moving_share(*pair) for pair in pairs)
+    contact = find_contact(bare, frames[-1])
+    reason = _reason(contact, moving, place_px, tolerance_px)
+    return PressJudgement(not reason, reason, moving, contact)
+
+
+def _reason(
+    contact: Contact, moving: float, place_px: tuple[float, float] | None, tolerance_px: float
+) -> str:
+    """Return why a press is refused; empty where it is not."""
+    if not contact.pressed:
+        return tr("Nothing is pressed: press the object in until its base touches.")
+    if moving > MOVING_SHARE:
+        return tr("It moved ({share:.1f} % of the picture changed): hold it still.").format(
+            share=100.0 * moving
+        )
+    if place_px is not None:
+        away = math.dist(contact.centre_px, place_px)
+        if away > tolerance_px:
+            return tr("It is beside the circle by {px:.0f} pixels: move it there.").format(px=away)
+    return ""

@@ -1,0 +1,107 @@
+"""What was measured is not measured again, and nothing old is taken for new."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.result import Measurement
+
+
+def measurement(height: float = 1.0 / 3.0) -> Measurement:
+    spread = {"side_mm": (0.1 / 3, 0.01), "height_mm": 1e-3 / 7, "yaw_deg": None}
+    return Measurement(
+        shape="cuboid",
+        diameter_mm=None,
+        side_mm=(4.0 / 3.0, 5.0 / 7.0),
+        height_mm=height,
+        centre_mm=(0.1, -0.2),
+        yaw_deg=12.3,
+        drape_decay_mm=0.7,
+        sd=spread,
+        edge_radius_mm=0.08,
+        blur_mm=None,
+        baseline_mm=-1e-5,
+        residual_rms_mm=0.003,
+        correlated_pixels=9.5,
+        outline_mm=np.random.default_rng(0).standard_normal((5, 2)),
+        verdict="ok",
+        reason="",
+        noise_sd=None,
+        calibration_sd=spread,
+    )
+
+
+def same(a: Measurement, b: Measurement) -> bool:
+    """Return whether all fields are equal to the last bit."""
+    return all(
+        np.array_equal(x, y) if isinstance(x, np.ndarray) else x == y
+        for x, y in ((getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    )
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    path = tmp_path / "press.png"
+    path.write_bytes(b"picture")
+    return path
+
+
+@given(height=st.floats(allow_nan=False, allow_infinity=False))
+def test_a_measurement_comes_back_to_the_last_bit(
+    tmp_path_factory: pytest.TempPathFactory, height: float
+) -> None:
+    path = tmp_path_factory.mktemp("ledger") / "m.jsonl"
+    ledger = Ledger(path, "calibration full")
+    ledger.keep("a", measurement(height))
+    ledger.keep("b", "no object is pressed")
+    again = Ledger(path, "calibration full")
+    found = again.find("a")
+    assert isinstance(found, Measurement)
+    assert same(found, measurement(height))
+    assert again.find("b") == "no object is pressed"
+    assert again.find("c") is None
+
+
+def test_another_picture_shape_or_calibration_is_measured_anew(
+    tmp_path: Path, picture: Path
+) -> None:
+    ledger = Ledger(None, "one")
+    keys = {ledger.key(picture, "cylinder"), ledger.key(picture, "cuboid")}
+    keys.add(Ledger(None, "other").key(picture, "cylinder"))
+    picture.write_bytes(b"taken again")
+    keys.add(ledger.key(picture, "cylinder"))
+    assert len(keys) == 4
+    assert ledger.key(tmp_path / "missing.png", "cylinder") is None
+
+
+@pytest.mark.parametrize("cut", [1, 40, 400])
+def test_a_line_cut_short_by_a_crash_costs_that_line_only(tmp_path: Path, cut: int) -> None:
+    path = tmp_path / "m.jsonl"
+    ledger = Ledger(path, "n")
+    ledger.keep("a", measurement())
+    ledger.keep("b", measurement())
+    path.write_bytes(path.read_bytes()[:-cut])
+    torn = Ledger(path, "n")
+    assert torn.find("b") is None or cut == 1
+    torn.keep("c", replace(measurement(), height_mm=math.pi))
+    whole = Ledger(path, "n")
+    found = whole.find("c")
+    assert isinstance(whole.find("a"), Measurement)
+    assert isinstance(found, Measurement) and found.height_mm == math.pi
+
+
+def test_a_ledger_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "m.jsonl"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not text"):
+        Ledger(path, "n")
+    Ledger(None, "n").keep("a", "kept in memory only")

@@ -1,0 +1,251 @@
+"""The paper's protocol as a technician presses it: what, where, and left and gone on with."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import scene
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.protocol import (
+    ROOM_MM,
+    Protocol,
+    check_protocol,
+    protocol_reach_mm,
+)
+from gelpolight_core.measurement.protocol_file import read_protocol_file
+from gelpolight_core.measurement.protocol_run import (
+    begin_run,
+    crossing_of,
+    open_run,
+    presses_folder,
+)
+from gelpolight_core.measurement.truth import read_truth
+
+SMALL = Protocol(shapes=("cylinder",), sizes_mm=(3.0,), heights_mm=(), repeats=2, regions=1)
+
+
+def frames(value: int, count: int = 1) -> list[np.ndarray]:
+    return [np.full((12, 16, 3), value, np.uint8) for _ in range(count)]
+
+
+def test_the_whole_protocol_is_the_papers() -> None:
+    presses = Protocol(reach_mm=11.5).presses()
+    assert len(presses) == 2 * 9 * 30
+    assert len({press.file for press in presses}) == len(presses)
+    objects = {(p.truth.shape, p.truth.size_mm, p.truth.height_mm) for p in presses}
+    assert {(s, h) for shape, s, h in objects if shape == "cuboid"} == {
+        *((size, 1.0) for size in (3.0, 4.0, 5.0, 6.0, 7.0)),
+        *((5.0, height) for height in (0.5, 0.75, 1.0, 1.25, 1.5)),
+    }
+    of_one = [p for p in presses if p.truth == presses[0].truth]
+    assert [p.region for p in of_one[:5]] == ["same"] * 5
+    assert len({p.place_mm for p in of_one[5:]}) == 25
+
+
+@given(seed=st.integers(0, 2**31), reach=st.floats(8.0, 30.0))
+def test_every_object_lies_within_reach_with_the_ground_around_it(seed: int, reach: float) -> None:
+    for press in Protocol(seed=seed, reach_mm=reach, regions=3).presses():
+        half = 0.5 * press.truth.size_mm
+        corner = half * math.sqrt(2.0) if press.truth.shape == "cuboid" else half
+        # Places are rounded to hundredths of a millimetre.
+        assert math.hypot(*press.place_mm) + corner + ROOM_MM <= reach + 0.01
+
+
+def test_random_places_fill_the_room_evenly() -> None:
+    away = [
+        math.hypot(*press.place_mm)
+        for seed in range(40)
+        for press in Protocol(
+            ("cylinder",), (4.0,), (), repeats=0, reach_mm=14.0, seed=seed
+        ).presses()
+    ]
+    # Half of a disc's area is within 1/sqrt(2) of its radius; 1000 places know that to 1.6 %.
+    assert np.mean(np.array(away) < 10.0 / math.sqrt(2.0)) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_part_of_the_protocol_asks_for_the_same_places_as_the_whole() -> None:
+    whole = {press.file: press for press in Protocol().presses()}
+    part = Protocol(shapes=("cuboid",), sizes_mm=(4.0,), heights_mm=(1.25,), repeats=1, regions=7)
+    assert len(part.presses()) == 2 * 8
+    assert all(whole[press.file] == press for press in part.presses())
+
+
+@pytest.mark.parametrize(
+    ("protocol", "message"),
+    [
+        (Protocol(shapes=("ball",)), "no shape 'ball'"),
+        (Protocol(shapes=()), "no object is to be pressed"),
+        (Protocol(sizes_mm=(), heights_mm=()), "no object is to be pressed"),
+        (Protocol(sizes_mm=(0.0,)), "sizes_mm holds 0"),
+        (Protocol(sizes_mm=(-3.0,)), "sizes_mm holds -3"),
+        (Protocol(heights_mm=(math.nan,)), "heights_mm holds nan"),
+        (Protocol(sizes_mm=(3.0, 3.001)), "sizes_mm holds a length twice"),
+        (Protocol(shapes=("cuboid", "cuboid")), "a shape is named twice"),
+        (Protocol(repeats=0, regions=0), "nothing is to be pressed"),
+        (Protocol(regions=100), "100 regions are asked for"),
+        (Protocol(repeats=-1), "-1 repeats are asked for"),
+        (Protocol(reach_mm=6.0), "a cuboid of 6 mm has no room within 6.0 mm"),
+    ],
+)
+def test_a_protocol_that_nobody_can_press_is_refused(protocol: Protocol, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        check_protocol(protocol)
+
+
+def test_the_reach_is_where_every_point_is_seen() -> None:
+    calibration = scene.calibration()
+    reach = protocol_reach_mm(calibration)
+    grid, valid = calibration.table.grid, calibration.table.valid
+    away = np.hypot(grid.x_mm[None, :], grid.y_mm[:, None])
+    assert valid[away < reach].all()
+    assert not valid[away < reach + 3 * grid.pitch_mm].all() or reach > 0.5 * grid.x_mm[-1]
+
+
+def test_a_run_is_left_and_gone_on_with_where_it_was(tmp_path: Path) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    first = run.next()
+    assert first is not None
+    run.accept(first, frames(10, 4))
+    run.refuse(first, "It moved, and was held anew.")
+
+    again = open_run(tmp_path / "run")
+    assert again.content == run.content
+    assert again.wanted == run.wanted
+    assert again.done == (first,)
+    assert again.next() == run.next() == run.wanted[1]
+    progress = again.progress
+    assert (progress.done, progress.total, progress.refused) == (1, 3, 1)
+    assert (progress.object_done, progress.object_total) == (1, 3)
+    for press in again.left:
+        again.accept(press, frames(20))
+    assert again.next() is None
+    assert again.progress.share == 1.0
+
+
+def test_the_run_is_the_folder_that_evaluate_reads(tmp_path: Path) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    for press in reversed(run.wanted):
+        run.accept(press, frames(10))
+    folder = presses_folder(tmp_path / "run")
+    assert folder == tmp_path / "run" / "presses"
+    rows = read_truth(folder).rows
+    assert list(rows) == [press.row for press in run.wanted]
+    assert [row.region for row in rows] == ["same", "same", "r01"]
+    assert crossing_of(folder) == SMALL.crossing
+    assert presses_folder(folder) == folder
+    assert crossing_of(tmp_path) is None
+
+
+def test_frames_of_a_press_are_averaged_with_all_their_bits(tmp_path: Path) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    picture = run.accept(run.wanted[0], [*frames(10, 3), *frames(11)])
+    kept = cv2.imread(str(picture), cv2.IMREAD_UNCHANGED)
+    assert kept.dtype == np.uint16
+    assert kept.mean() == pytest.approx(10.25 * 257, abs=0.5)
+
+
+def test_a_press_taken_back_is_asked_for_again_and_its_picture_is_kept(tmp_path: Path) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    press = run.wanted[0]
+    for value in (10, 20):
+        run.accept(press, frames(value))
+        kept = run.take_back(press)
+        assert kept is not None
+        assert cv2.imread(str(kept)).mean() == value
+    assert run.next() == press
+    assert open_run(run.folder).next() == press
+    assert len(list((run.folder / "discarded").iterdir())) == 2
+    with pytest.raises(InputError, match="not done yet"):
+        run.take_back(press)
+
+
+def test_a_picture_that_was_taken_away_is_asked_for_again(tmp_path: Path) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    for press in run.wanted:
+        run.accept(press, frames(10))
+    run.picture(run.wanted[1]).unlink()
+    again = open_run(run.folder)
+    assert again.left == (run.wanted[1],)
+
+
+def test_a_run_that_is_killed_between_any_two_presses_loses_none(tmp_path: Path) -> None:
+    """The process is ended by the system in the middle of its work, with nothing tidied up."""
+    script = (
+        "import sys, os, numpy as np; from pathlib import Path\n"
+        "from gelpolight_core.measurement.protocol import Protocol\n"
+        "from gelpolight_core.measurement.protocol_run import begin_run\n"
+        "run = begin_run(Path(sys.argv[1]), Protocol(('cylinder',), (3.0,), (), repeats=3, "
+        "regions=0), serial='A', calibration='A-1')\n"
+        "for k, press in enumerate(run.wanted):\n"
+        "    if k == 2: os.kill(os.getpid(), 9)\n"
+        "    run.accept(press, [np.full((8, 8, 3), k, np.uint8)])\n"
+    )
+    folder = tmp_path / "run"
+    ended = subprocess.run([sys.executable, "-c", script, str(folder)], check=False)
+    assert ended.returncode == -9
+    run = open_run(folder)
+    assert run.done == run.wanted[:2]
+    assert run.next() == run.wanted[2]
+
+
+@pytest.mark.parametrize("damage", ["", "not = [toml", 'format = "else"\n', None])
+def test_a_damaged_protocol_is_refused_and_nothing_is_touched(
+    tmp_path: Path, damage: str | None
+) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    path = run.folder / "protocol.toml"
+    text = path.read_text()
+    path.write_text(text.replace("version = 1", "version = 9") if damage is None else damage)
+    with pytest.raises(InputError, match="version 9" if damage is None else "protocol|format"):
+        open_run(run.folder)
+
+
+@pytest.mark.parametrize(
+    ("key", "other", "message"),
+    [
+        ("repeats = 2", 'repeats = "two"', r"\[places\] repeats is not a whole number"),
+        ("seed = 0", "seed = -1", "seed is below zero"),
+        ("seed = 0", "seed = 0\nsneed = 1", "sneed is unknown"),
+        ("3.0,", '"wide",', r"\[objects\] sizes_mm is not a list of lengths"),
+        ("at_size_mm = 5.0", "", "at_size_mm is missing"),
+    ],
+)
+def test_a_mistake_in_the_protocol_is_named(
+    tmp_path: Path, key: str, other: str, message: str
+) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    path = run.folder / "protocol.toml"
+    text = path.read_text()
+    assert key in text
+    path.write_text(text.replace(key, other))
+    with pytest.raises(InputError, match=message):
+        read_protocol_file(run.folder)
+
+
+def test_a_truth_of_another_protocol_is_refused(tmp_path: Path) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    run.accept(run.wanted[0], frames(10))
+    truth = run.presses / "truth.csv"
+    truth.write_text(truth.read_text().replace(",3.0,", ",3.5,"))
+    with pytest.raises(InputError, match=r"the row of cylinder_s300.* is not of this protocol"):
+        open_run(run.folder)
+    truth.write_text("file,shape\n")
+    with pytest.raises(InputError, match="first line"):
+        open_run(run.folder)
+
+
+def test_a_new_run_does_not_take_the_place_of_another(tmp_path: Path) -> None:
+    begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    with pytest.raises(InputError, match=r"holds a protocol\.toml already"):
+        begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    with pytest.raises(InputError, match=r"there is no protocol\.toml"):
+        open_run(tmp_path)

@@ -1,0 +1,82 @@
+"""A press is kept when something is pressed where it should be, and holds still."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gelpolight_core.measurement.steadiness import find_contact, judge_press
+
+ROWS, COLUMNS = 240, 320
+PLACE = (150.0, 120.0)
+
+
+def light(shift_px: float | None) -> np.ndarray:
+    """Return light (rows, columns, 3) of a membrane, bare or with walls around a dent."""
+    y, x = np.mgrid[:ROWS, :COLUMNS].astype(np.float64)
+    glow = np.stack([0.15 + 0.5 * x / COLUMNS, 0.4 - 0.2 * y / ROWS, 0.1 + 0.3 * y / ROWS], -1)
+    if shift_px is None:
+        return glow
+    dx, dy = x - PLACE[0] - shift_px, y - PLACE[1]
+    wall = np.exp(-(((np.hypot(dx, dy) - 25.0) / 4.0) ** 2))
+    side = (dx / np.maximum(np.hypot(dx, dy), 1.0))[..., None] * np.array([1.0, -0.5, 0.3])
+    return np.asarray(glow * (1.0 + 0.6 * wall[..., None] * side))
+
+
+def shot(shift_px: float | None, seed: int, *, noise: float = 0.01) -> np.ndarray:
+    seen = light(shift_px)
+    sd = noise * np.sqrt(0.02 + seen)
+    seen = seen + sd * np.random.default_rng(seed).standard_normal(seen.shape)
+    return np.round(255.0 * np.clip(seen, 0.0, 1.0)).astype(np.uint8)
+
+
+@settings(max_examples=10, deadline=None)
+@given(noise=st.sampled_from([0.002, 0.01, 0.03]), seed=st.integers(0, 1000))
+def test_a_still_press_is_accepted_whatever_the_cameras_noise(noise: float, seed: int) -> None:
+    frames = [shot(0.0, seed + k, noise=noise) for k in range(3)]
+    judged = judge_press(frames, shot(None, seed + 9, noise=noise), place_px=PLACE, tolerance_px=9)
+    assert judged.accepted
+    assert judged.reason == ""
+    assert judged.contact.centre_px == pytest.approx(PLACE, abs=8.0)
+
+
+def test_the_bare_membrane_is_no_press_even_when_the_light_has_warmed() -> None:
+    bare = shot(None, 0)
+    warm = np.clip(1.03 * bare.astype(float), 0, 255).astype(np.uint8)
+    for frame in (shot(None, 1), warm):
+        contact = find_contact(bare, frame)
+        assert contact.lifted and not contact.pressed
+    judged = judge_press([shot(None, k) for k in range(1, 4)], bare)
+    assert not judged.accepted
+    assert judged.reason.startswith("Nothing is pressed")
+
+
+def test_a_press_that_slides_is_refused_even_if_no_two_frames_in_a_row_differ() -> None:
+    bare = shot(None, 0)
+    jump = judge_press([shot(0.0, 1), shot(0.0, 2), shot(2.0, 3)], bare)
+    creep = judge_press([shot(0.12 * k, k) for k in range(1, 20)], bare)
+    for judged in (jump, creep):
+        assert not judged.accepted
+        assert "moved" in judged.reason
+        assert judged.moving_share > 0.001
+
+
+def test_a_press_beside_the_circle_is_refused_with_how_far() -> None:
+    frames = [shot(40.0, k) for k in range(3)]
+    bare = shot(None, 9)
+    judged = judge_press(frames, bare, place_px=PLACE, tolerance_px=15.0)
+    assert not judged.accepted
+    assert "beside the circle by" in judged.reason
+    assert judge_press(frames, bare).accepted
+
+
+def test_frames_that_cannot_be_compared_are_refused() -> None:
+    bare = shot(None, 0)
+    assert "One frame" in judge_press([shot(0.0, 1)], bare).reason
+    small = cv2.resize(bare, (64, 48))
+    assert "another size" in judge_press([shot(0.0, 1), shot(0.0, 2)], small).reason
+    deep = bare.astype(np.uint16)
+    assert not judge_press([shot(0.0, 1), shot(0.0, 2)], deep).accepted
