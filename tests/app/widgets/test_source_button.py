@@ -10,8 +10,8 @@ from pytest import MonkeyPatch
 from pytestqt.qtbot import QtBot
 from recorded import write_recording
 
-from app.widgets.source_button import SourceButton
 from app.shell.context import AppContext
+from app.widgets.source_button import SourceButton
 
 
 def test_a_recording_can_play_the_camera(
