@@ -32,7 +32,7 @@ PARTS = (
     "matplotlib",
     "tifffile",
     "trimesh",
-    "pyvista",
+    "vtk",
     "vtk",
 )
 
