@@ -33,7 +33,6 @@ PARTS = (
     "tifffile",
     "trimesh",
     "vtk",
-    "vtk",
 )
 
 
