@@ -54,7 +54,7 @@ def test_a_turned_region_holds_the_nodes_inside_it() -> None:
     flat = made(lambda x, y: np.where(np.abs(x + y) < 1.0, 0.0, 0.3))
     ridge = Rectangle((1.0, -1.0), (3.0, 1.2), yaw_deg=-45.0)
     assert roughness(flat, ridge).sz_um == pytest.approx(0.0, abs=1e-9)
-    assert roughness(flat, ridge).count == pytest.approx(3.6 / PITCH**2, rel=0.02)
+    assert roughness(flat, ridge).count == pytest.approx(3.6 / PITCH**2, rel=0.05)
 
 
 def test_a_region_says_how_much_of_its_roughness_may_be_the_maps_own() -> None:
