@@ -121,9 +121,13 @@ def contact_finder(calibration: Calibration, full: FullModel) -> ContactFinder:
         return np.asarray(cv2.resize(cut, (columns, rows), interpolation=cv2.INTER_AREA))
 
     expected = blocks(picture)
+    # The background was resampled on its way here: what another blur changes is not to be trusted.
+    blurred = cv2.GaussianBlur(picture, (0, 0), 1.0)
+    unsure = np.abs(blocks(np.asarray(blurred, np.float32)) - expected)
     least = LEAST_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
-    limit = np.maximum(least * expected, SIGMAS / block * calibration.noise)
-    limit[blocks(seen(known)) < 0.999] = np.inf
+    limit = np.maximum(least * expected, SIGMAS / block * calibration.noise) + 2.0 * unsure
+    core = cv2.erode(known.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0)
+    limit[blocks(seen(core)) < 0.999] = np.inf
     return ContactFinder(
         block, expected, limit.astype(np.float32), blocks(points).astype(np.float64)
     )
