@@ -7,6 +7,7 @@ grid at its full scale, is said with each constant.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain, repeat
 from threading import Lock
 from typing import Any
 
@@ -51,8 +52,8 @@ ROUNDS = 2
 # A second round moves the surface by about twice its depth squared over the lights' height; below
 # this depth, by less than half a micrometre.
 SHALLOW_MM = 0.05
-# Of the integration: the first rounds only have to say where the surface is.
-FIRST_TOLERANCE = 0.03
+# Of the integration, round by round: the first ones only have to say where the surface is.
+FIRST_TOLERANCES = (0.05, 0.005)
 TOLERANCE = 2e-3
 # Bytes that a node at quarter scale, a solved node and a shown node must read and write once.
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 4 * (12 + 20 + 13), 88, 6
@@ -228,10 +229,11 @@ class LiveSolver:
     ) -> tuple[Map, tuple[tuple[float, ...], str]]:
         """Return the depth after the near-light rounds at quarter scale; as `coarse_depth`."""
         scale, corner = self.maps.quarter, region.corner
+        tolerances = chain(FIRST_TOLERANCES, repeat(FIRST_TOLERANCES[-1]))
 
         def solve(depth: Map) -> Map:
             slopes = self._slopes(scale, picture, corner, depth)
-            return self._integrate(scale, picture, corner, depth, slopes, FIRST_TOLERANCE).depth_mm
+            return self._integrate(scale, picture, corner, depth, slopes, next(tolerances)).depth_mm
 
         longest = longest_step_mm(self._full)
         return near_light_rounds(solve, region.shape, longest, ROUNDS, shallow_mm=SHALLOW_MM)

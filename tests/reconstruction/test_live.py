@@ -44,7 +44,7 @@ def as_camera(rgb: NDArray[np.float32]) -> Frame:
 def shown() -> Callable[[State], Frame]:
     """Return a function that shows a state of the virtual sensor at half its size."""
     sensor = VirtualSensor(SensorDesign().scaled(0.5), 0)
-    return lambda state: as_camera(sensor.frame(state, averaged=1, stream="another"))
+    return lambda state: np.asarray(sensor.frame(state, averaged=1, stream="another"), np.uint8)
 
 
 @pytest.fixture(scope="module")
