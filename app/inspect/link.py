@@ -204,7 +204,7 @@ class LiveLink(QObject):
         self._context.status.update(
             rate_hz=figures.rate_hz,
             dropped=figures.dropped + self._inbox.unprocessed,
-            processing_ms=None if self.last is None else self.last.total_ms,
+            processing_ms=(self.last.total_ms or None) if self.last is not None else None,
         )
         if figures.lost:
             self._say(figures.lost)

@@ -136,6 +136,8 @@ class InspectPage(QWidget):
         self.link.enter(False)
         self.views.keep()
         self.jobs.close()
+        # Its threads end with the last reference to it.
+        self.link.use(None)
         self.views.finish()
         return True
 

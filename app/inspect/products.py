@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from app.inspect import shading
 from app.inspect.cuts import Cut, Section, cut
 from app.inspect.look import LEAST_RANGE_MM, Look, colour_table
-from app.inspect.surface import Surface, surface_of
+from app.inspect.surface import LIVE_NODES, Surface, surface_of
 from app.sources.source import Frame
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-# Coarse while live: a software renderer draws so many nodes in time. The texture has the detail.
-LIVE_NODES = 160
 LIVE_PX = 560
 STILL_PX = 2000
 SURROUND = (21, 23, 26)

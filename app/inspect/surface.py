@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+
+# Coarse while live: a software renderer draws so many nodes in time. The texture has the detail.
+LIVE_NODES = 160
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +37,16 @@ class Surface:
     depth_mm: NDArray[np.float32]
     extent_mm: tuple[float, float, float, float]
     texture: NDArray[np.uint8]
+
+    def thinned(self, largest: int) -> Surface:
+        """Return it with no more nodes than this a side; the texture keeps its detail."""
+        rows, columns = self.depth_mm.shape
+        down = np.linspace(0, rows - 1, min(rows, largest)).round().astype(int)
+        across = np.linspace(0, columns - 1, min(columns, largest)).round().astype(int)
+        nodes = np.ix_(down, across)
+        return replace(
+            self, x_mm=self.x_mm[nodes], y_mm=self.y_mm[down], depth_mm=self.depth_mm[nodes]
+        )
 
     def depth_at(self, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the depth of the node nearest to each place; -inf off the surface."""

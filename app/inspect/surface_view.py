@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QWidget
 from app.inspect.camera3d import PRESETS, Camera
 from app.inspect.scale_bar import draw_bar, length_text, round_length_mm
 from app.inspect.scene3d import Scene
-from app.inspect.surface import Surface
+from app.inspect.surface import LIVE_NODES, Surface
 from app.shell import theme
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -30,6 +30,7 @@ from gelpolight_core.translation import tr
 DEGREES_PER_PX = 0.4
 KEY_DEG = 6.0
 ZOOM_STEP = 1.15
+SETTLE_MS = 250
 CURSOR = QColor(255, 255, 255)
 AXIS_PX = 26.0
 
@@ -79,6 +80,10 @@ class SurfaceView(QWidget):
         self._stale = True
         self._fitted = True
         self._held: QPointF | None = None
+        self._settle = QTimer(self)
+        self._settle.setSingleShot(True)
+        self._settle.setInterval(SETTLE_MS)
+        self._settle.timeout.connect(self._show_all_nodes)
         self._take_theme()
 
     # What the panel asks
@@ -87,6 +92,7 @@ class SurfaceView(QWidget):
         """Show the surface of a frame."""
         first = self._surface is None
         self._surface = surface
+        self._settle.stop()
         self._scene.surface.show(surface)
         if first:
             self.fit()
@@ -128,6 +134,7 @@ class SurfaceView(QWidget):
 
     def finish(self) -> None:
         """Give the graphics memory back."""
+        self._settle.stop()
         self._scene.close()
 
     def place_at(self, across: float, down: float) -> tuple[float, float] | None:
@@ -275,9 +282,19 @@ class SurfaceView(QWidget):
 
     def _move(self, camera: Camera) -> None:
         self._fitted = False
+        if self._surface is not None and max(self._surface.depth_mm.shape) > 2 * LIVE_NODES:
+            # All nodes of a standing picture could not follow the hand.
+            if not self._settle.isActive():
+                self._scene.surface.show(self._surface.thinned(LIVE_NODES))
+            self._settle.start()
         self.camera = camera
         self._draw_anew()
         self.moved.emit()
+
+    def _show_all_nodes(self) -> None:
+        if self._surface is not None:
+            self._scene.surface.show(self._surface)
+            self._draw_anew()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102
         super().resizeEvent(event)

@@ -11,8 +11,8 @@ import pytest
 from app.inspect import shading
 from app.inspect.cuts import Section
 from app.inspect.look import Light, Look, colour_table
-from app.inspect.products import LIVE_NODES, QUALITY_COLOURS, SURROUND, Maker, Wanted
-from app.inspect.surface import surface_of
+from app.inspect.products import QUALITY_COLOURS, SURROUND, Maker, Wanted
+from app.inspect.surface import LIVE_NODES, surface_of
 from app.sources.source import Frame
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
