@@ -76,7 +76,7 @@ def test_a_membrane_that_moved_in_the_picture_is_told(
     drift = background_drift(moved(bare, 3), virtual_calibration)
     assert drift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
     assert drift.quality["drift_shift_px"].verdict is Verdict.FAIL
-    with pytest.raises(InputError, match="moved by 3"):
+    with pytest.raises(InputError, match="the membrane has moved by"):
         zeroed(virtual_calibration, [moved(bare, 3)], operator="me", made="now")
 
 
