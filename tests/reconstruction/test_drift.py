@@ -17,14 +17,14 @@ from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.drift import background_drift, raw_background, zeroed
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_picture
+from gelpolight_core.simulation.exposure import Frame, exposed
 from gelpolight_core.simulation.lamps import lamps_of
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
-Frame = NDArray[np.float32]
 BRIGHTER = (1.03, 1.0, 0.97)
 
 
-def frames(*shares: float, count: int = 4) -> list[NDArray[np.uint8]]:
+def frames(*shares: float, count: int = 4) -> list[Frame]:
     """Return frames of the untouched virtual sensor, its LEDs changed by shares."""
     design = SensorDesign().scaled(0.25)
     sensor = VirtualSensor(design, 0)
@@ -35,23 +35,17 @@ def frames(*shares: float, count: int = 4) -> list[NDArray[np.uint8]]:
     warm = VirtualSensor(design, 0, lamps=changed)
     # The camera's exposure stays; a new sensor would be exposed anew.
     picture = warm.brightness(BareMembrane()) * sensor.exposure / warm.exposure
-    top = 2**design.camera.bits - 1
     random = np.random.default_rng(5)
-    return [
-        np.clip(np.round(top * (picture + random.normal(0, 0.003, picture.shape))), 0, top).astype(
-            np.uint8 if top < 256 else np.uint16
-        )
-        for _ in range(count)
-    ]
+    return [exposed(picture, design.camera, random) for _ in range(count)]
 
 
 @pytest.fixture(scope="module")
-def warm() -> list[NDArray[np.uint8]]:
+def warm() -> list[Frame]:
     """Return frames after the red LED has grown 3 % brighter and the blue one darker."""
     return frames(*BRIGHTER)
 
 
-def moved(frame: NDArray[np.uint8], columns: int) -> NDArray[np.uint8]:
+def moved(frame: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
     """Return a frame that the camera sees further to the right."""
     return np.ascontiguousarray(np.roll(frame, columns, axis=1))
 
@@ -66,7 +60,7 @@ def test_a_sensor_that_has_not_changed_has_not_drifted(small_calibration: Calibr
 
 
 def test_leds_that_changed_are_told_by_channel(
-    small_calibration: Calibration, warm: list[NDArray[np.uint8]]
+    small_calibration: Calibration, warm: list[Frame]
 ) -> None:
     drift = background_drift(warm[0], small_calibration)
     assert drift.brightness_percent == pytest.approx([3.0, 0.0, -3.0], abs=0.5)
@@ -82,7 +76,7 @@ def test_a_membrane_that_moved_in_the_picture_is_told(
     drift = background_drift(moved(bare, 3), virtual_calibration)
     assert drift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
     assert drift.quality["drift_shift_px"].verdict is Verdict.FAIL
-    with pytest.raises(InputError, match="moved by 3"):
+    with pytest.raises(InputError, match="the membrane has moved by"):
         zeroed(virtual_calibration, [moved(bare, 3)], operator="me", made="now")
 
 
@@ -99,7 +93,7 @@ def test_a_press_is_called_a_touch_and_never_taken_for_the_background(
 
 @pytest.mark.parametrize("model", ["paper", "full"])
 def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(
-    small_calibration: Calibration, warm: list[NDArray[np.uint8]], model: str
+    small_calibration: Calibration, warm: list[Frame], model: str
 ) -> None:
     new = zeroed(small_calibration, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
     before, after = (
@@ -112,7 +106,7 @@ def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(
 
 
 def test_zeroing_is_on_record_and_has_a_name_of_its_own(
-    small_calibration: Calibration, warm: list[NDArray[np.uint8]], tmp_path: Path
+    small_calibration: Calibration, warm: list[Frame], tmp_path: Path
 ) -> None:
     new = zeroed(small_calibration, warm, operator="me", made="2026-01-02T03:04:05+00:00")
     assert new.identity != small_calibration.identity
