@@ -167,6 +167,7 @@ class LiveSolver:
             stopped, rim = self._solve(raw, region, effort, record, depth, flags, shown)
         if not normals:
             record.left_out(tr("normals"), tr("nobody asked for them"))
+        record.left_out(tr("standard deviations"), tr("nobody asked for them"))
         return LiveDepth(depth, shown, flags, stopped, rim, Plan(effort, tuple(record.steps)))
 
     def _region(self, raw: NDArray[Any], record: PlanRecord, everywhere: bool) -> Region | None:
@@ -198,7 +199,8 @@ class LiveSolver:
         maps, nodes = self.maps, region.nodes
         with record.done(tr("resampling and comparing"), nodes * SAMPLED_BYTES) as reason:
             half, quarter = self._compare(raw, region)
-            reason.append(tr("averages over 2 x 2 nodes need no denoising"))
+            reason.append(tr("averages over 2 x 2 nodes, crosstalk and response undone on the way"))
+        record.left_out(tr("denoising"), tr("such an average has half the noise already"))
         if maps.membrane.bounce is None:
             record.left_out(tr("light from the surroundings"), tr("this membrane gives none"))
         with record.done(tr("near light, quarter scale"), ROUNDS * nodes * SOLVED_BYTES) as reason:
@@ -219,6 +221,8 @@ class LiveSolver:
             solved = self._integrate(scale, picture, corner, start, slopes, TOLERANCE)
             moved = held_back(start, solved.depth_mm, longest_step_mm(self._full))
             reason.append(tr("{n} rounds of conjugate gradients").format(n=solved.rounds))
+        if picture.let_go is None:
+            record.left_out(tr("free rim"), tr("no contact crosses the rim"))
         with record.done(tr("true positions"), 16 * nodes * SHOWN_BYTES) as reason:
             self._show(scale, region, slopes, moved, depth, flags, normals)
             reason.append(tr("and to the whole grid's scale"))
@@ -445,6 +449,7 @@ def flat_normals(shape: tuple[int, ...]) -> Map:
 def _whole_numbers(frame: NDArray[Any]) -> NDArray[Any]:
     """Return a frame as whole numbers; what is not finite in floats counts as saturated."""
     if frame.dtype.kind != "f":
-        return np.ascontiguousarray(frame)
+        # Compiled code is made anew for an array that must not be written to.
+        return np.require(frame, requirements=["C", "W"])
     known = np.nan_to_num(frame, nan=1.0, posinf=1.0, neginf=1.0)
     return np.asarray(np.clip(known, 0.0, 1.0) * 65535.0 + 0.5, np.uint16)
