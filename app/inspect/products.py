@@ -197,12 +197,15 @@ class _Pictures:
     def _shaded(self) -> NDArray[np.uint8]:
         if self._lit is None:
             look = self._look
-            lit = shading.shaded(
-                self._coloured(), self._depth, self._pitch_mm, look.light, look.exaggeration
+            self._lit = shading.shaded(
+                self._depth,
+                self._pitch_mm,
+                colour_table(look.colours),
+                self.range_mm,
+                look.light,
+                exaggeration=look.exaggeration,
+                contour_mm=look.contour_mm,
             )
-            if look.contour_mm > 0.0:
-                lit = shading.with_contours(lit, self._depth, look.contour_mm)
-            self._lit = lit
         return self._lit
 
     def height(self) -> NDArray[np.uint8]:
@@ -239,5 +242,12 @@ class _Pictures:
 
     def surface(self) -> Surface:
         """Return the mesh's nodes and their texture."""
-        largest = None if self._wanted.still else LIVE_NODES
-        return surface_of(self._map, self._shaded(), largest)
+        if self._wanted.still:
+            return surface_of(self._map, self._shaded())
+        return surface_of(self._map, self._shaded(), largest=LIVE_NODES, depth_mm=self._depth)
+
+
+def warm_up() -> None:
+    """Compile what the first picture would wait for."""
+    flat, look = np.zeros((8, 8), np.float32), Look()
+    shading.shaded(flat, 0.1, colour_table(look.colours), (0.0, 1.0), look.light)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -164,6 +165,19 @@ def test_a_calibration_of_another_size_is_refused_and_says_which(
     page.enter()
     _use(page, small_calibration)
     qtbot.waitUntil(lambda: "120x100" in _advice(page)[0], timeout=WAIT_MS)
+
+
+def test_a_calibration_of_another_sensor_is_refused_and_says_whose(
+    page: InspectPage, context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    context.source.choose_virtual_sensor()
+    page.enter()
+    sensor = replace(small_calibration.sensor, serial="lab-7")
+    _use(page, replace(small_calibration, sensor=sensor))
+    text, button = _advice(page)
+    assert "lab-7" in text and "virtual-1" in text
+    assert "Calibrate the virtual sensor" in button.text()
+    assert page.link.live is None
 
 
 def test_the_layout_is_found_again_as_it_was_left(
