@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from app.sources.source import Frame, Setting
 from gelpolight_core.calibration.calibration import Calibration
 
-RATE_HZ = 120.0
+RATE_HZ = 60.0
 WALL_MM = 0.25
 
 
