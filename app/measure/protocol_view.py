@@ -65,7 +65,9 @@ class ProtocolView(QWidget):
         row.setContentsMargins(12, 6, 12, 6)
         self.heading = named(QLabel(), "protocol.heading", tr("The run"))
         row.addWidget(self.heading, 1)
-        row.addWidget(SourceButton(context=self.context, parent=self))
+        source = SourceButton(context=self.context, parent=self)
+        source.setObjectName("protocol.source")
+        row.addWidget(source)
         return row
 
     # What the page around it asks
