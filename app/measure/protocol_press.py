@@ -107,6 +107,16 @@ class PressingView(QWidget):
         self._watching.capture(1, self._keep_bare)
 
     def _keep_bare(self, frames: list[NDArray[Any]]) -> None:
+        camera, seen = self._work.calibration.camera, frames[-1].shape
+        if seen[:2] != (camera.height, camera.width):
+            self.panel.show_live(
+                tr(
+                    "The camera's picture is {u}x{v}, the calibration is for {w}x{h}: choose the "
+                    "camera of this sensor in the bar above."
+                ).format(u=seen[1], v=seen[0], w=camera.width, h=camera.height)
+            )
+            self.panel.bench.setChecked(False)
+            return
         self._bare = frames[-1]
         self._aim()
 

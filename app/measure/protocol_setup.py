@@ -218,7 +218,7 @@ class ProtocolSetup(QScrollArea):
         elif not count:
             text = tr("Choose a shape, a size or height, and how often it is pressed.")
         else:
-            text = tr("{objects} objects, {n} presses: about {time} by hand.").format(
+            text = tr("Objects: {objects}. Presses: {n}, about {time} by hand.").format(
                 objects=len(protocol.objects), n=count, time=_duration(count * SECONDS_A_PRESS)
             )
         self.summary.setText(text)
@@ -227,7 +227,7 @@ class ProtocolSetup(QScrollArea):
 
 def _duration(seconds: float) -> str:
     if seconds < 90.0 * 60.0:
-        return tr("{n} minutes").format(n=max(round(seconds / 60.0), 1))
+        return tr("{n} min").format(n=max(round(seconds / 60.0), 1))
     return tr("{n:.1f} hours").format(n=seconds / 3600.0)
 
 

@@ -6,6 +6,7 @@ import csv
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,6 +14,7 @@ from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.experiments import virtual_protocol
 from gelpolight_core.experiments.press_workers import Equipment
 from gelpolight_core.experiments.virtual_protocol import (
     calibrate_virtual_sensor,
@@ -25,7 +27,7 @@ from gelpolight_core.measurement.protocol_run import ProtocolRun, begin_run, ope
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 SMALL = SensorDesign().scaled(0.25)
-PART = Protocol(sizes_mm=(5.0,), heights_mm=(), repeats=1, regions=1)
+PART = Protocol(sizes_mm=(5.0,), heights_mm=(), repeats=0, regions=1)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +80,7 @@ def test_a_run_that_is_stopped_goes_on_with_the_same_bytes(
     with pytest.raises(KeyboardInterrupt):
         press_protocol(run, equipment, run_ledger(run, reconstructor), workers=1, progress=stop)
     again = open_run(run.folder)
-    assert len(again.done) == 2
+    assert len(again.done) == 1
     told: list[str] = []
     press_protocol(
         again,
@@ -87,7 +89,7 @@ def test_a_run_that_is_stopped_goes_on_with_the_same_bytes(
         workers=1,
         progress=lambda name, _: told.append(name),
     )
-    assert told == ["press 3 of 4", "press 4 of 4"]
+    assert told == ["press 2 of 2"]
     for press in again.wanted:
         assert again.picture(press).read_bytes() == (done / "presses" / press.file).read_bytes()
 
@@ -151,15 +153,31 @@ def test_a_protocol_that_cannot_be_pressed_is_refused_before_anything_is_made(
 
 
 def test_a_sensor_is_calibrated_once_and_from_a_whole_session_only(
-    small_session: Path, tmp_path: Path
+    small_session: Path,
+    small_calibration: Calibration,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    shutil.copytree(small_session, tmp_path / "session")
-    (tmp_path / "session.part").mkdir()
-    told: list[float] = []
-    made = calibrate_virtual_sensor(
-        SMALL, tmp_path, model="paper", progress=lambda _, share: told.append(share)
+    """What a killed call left of a session is made anew; what it finished is not."""
+    made_in: list[str] = []
+
+    def simulate(design: SensorDesign, out: Path, *, progress: object) -> None:
+        made_in.append(out.name)
+        shutil.copytree(small_session, out)
+
+    monkeypatch.setattr(virtual_protocol, "simulate_session", simulate)
+    monkeypatch.setattr(
+        virtual_protocol,
+        "calibrate_session",
+        lambda session, **_: SimpleNamespace(calibration=small_calibration),
     )
-    assert told[0] >= 0.5
+    (tmp_path / "session.part" / "balls").mkdir(parents=True)
+    made = calibrate_virtual_sensor(SMALL, tmp_path)
+    assert read_calibration(made).identity == small_calibration.identity
+    assert not (tmp_path / "session.part").exists()
+    made.unlink()
+    assert calibrate_virtual_sensor(SMALL, tmp_path) == made
     stamp = made.stat().st_mtime_ns
-    assert calibrate_virtual_sensor(SMALL, tmp_path, model="paper") == made
+    assert calibrate_virtual_sensor(SMALL, tmp_path) == made
     assert made.stat().st_mtime_ns == stamp
+    assert made_in == ["session.part"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
@@ -55,6 +55,7 @@ def picture(tmp_path: Path) -> Path:
     return path
 
 
+@settings(max_examples=25, deadline=None)
 @given(height=st.floats(allow_nan=False, allow_infinity=False))
 def test_a_measurement_comes_back_to_the_last_bit(
     tmp_path_factory: pytest.TempPathFactory, height: float

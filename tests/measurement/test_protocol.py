@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 import scene
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
@@ -51,6 +51,7 @@ def test_the_whole_protocol_is_the_papers() -> None:
     assert len({p.place_mm for p in of_one[5:]}) == 25
 
 
+@settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**31), reach=st.floats(8.0, 30.0))
 def test_every_object_lies_within_reach_with_the_ground_around_it(seed: int, reach: float) -> None:
     for press in Protocol(seed=seed, reach_mm=reach, regions=3).presses():

@@ -43,7 +43,7 @@ class SceneCamera:
         self._lock = threading.Lock()
         self._light = picture(calibration, None)
         self._number = 0
-        self.shaking = False
+        self.shaking = self.cropped = False
 
     def press(self, place_mm: tuple[float, float] | None) -> None:
         """Press at a place from the next frame on; None: lift."""
@@ -61,6 +61,8 @@ class SceneCamera:
             light, self._number = self._light, self._number + 1
             if self.shaking:
                 light = np.roll(light, self._number % 5, axis=1)
+            if self.cropped:
+                light = light[:, ::2]
         rng = np.random.default_rng(self._number)
         value = 255.0 * light + rng.standard_normal(light.shape, dtype=np.float32)
         return Frame(

@@ -143,9 +143,9 @@ def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
 
 
 def test_what_is_chosen_is_counted_before_it_is_begun(view: ProtocolView) -> None:
-    assert "18 objects, 540 presses" in view.setup.summary.text()
+    assert "Objects: 18. Presses: 540" in view.setup.summary.text()
     choose(view, repeats=2, regions=3)
-    assert "1 objects, 5 presses" in view.setup.summary.text()
+    assert "Objects: 1. Presses: 5" in view.setup.summary.text()
     choose(view, repeats=0)
     assert not view.setup.begin.isEnabled()
 
@@ -206,6 +206,21 @@ def test_an_unsteady_press_is_refused_with_its_reason_and_asked_for_again(
     panel.take_back.click()
     assert run.progress.done == 0
     assert len(list((run.folder / "discarded").iterdir())) == 1
+
+
+def test_a_camera_of_another_size_is_refused_before_anything_is_pressed(
+    view: ProtocolView, camera: SceneCamera, qtbot: QtBot
+) -> None:
+    choose(view, repeats=1)
+    camera.cropped = True
+    view.setup.begin.click()
+    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
+    panel = view.pressing.panel
+    qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
+    panel.bare.click()
+    said = "The camera's picture is 160x240, the calibration is for 320x240"
+    qtbot.waitUntil(lambda: said in panel.live.text(), timeout=WAIT_MS)
+    assert not panel.capture.isEnabled()
 
 
 def test_a_run_that_cannot_be_opened_says_why(
