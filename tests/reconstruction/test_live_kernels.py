@@ -110,6 +110,7 @@ def solved_in_blocks(field: ShadedField, depth: Map, membrane: Membrane) -> dict
         live.gloss,
         live.bounce,
         True,
+        True,
         *out.values(),
     )
     return out
