@@ -201,7 +201,7 @@ class LiveSolver:
             record.left_out(tr("near light, half scale"), tr("this effort does without it"))
         size = shape[0] * shape[1] * SOLVED_BYTES
         with record.done(tr("near light, last round"), size) as reason:
-            slopes = self._slopes(scale, picture, corner, start)
+            slopes = self._slopes(scale, picture, corner, start, normals is not None)
             reason.append(tr("from the depth at quarter scale"))
         with record.done(tr("integration"), 5 * start.nbytes) as reason:
             solved = self._integrate(scale, picture, corner, start, slopes, TOLERANCE)
@@ -229,7 +229,12 @@ class LiveSolver:
         return near_light_rounds(solve, region.shape, longest, ROUNDS, shallow_mm=SHALLOW_MM)
 
     def _slopes(
-        self, scale: LiveScale, picture: PressPicture, corner: tuple[int, int], depth: Map
+        self,
+        scale: LiveScale,
+        picture: PressPicture,
+        corner: tuple[int, int],
+        depth: Map,
+        normals: bool = False,
     ) -> _Solved:
         """Return slopes along the rays at the present depth; as `solve_near_light`."""
         membrane, shape = self.maps.membrane, depth.shape
@@ -259,6 +264,7 @@ class LiveSolver:
             membrane.gloss,
             membrane.bounce,
             True,
+            normals,
             solved.slope_x,
             solved.slope_y,
             solved.weight,

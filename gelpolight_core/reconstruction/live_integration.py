@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gelpolight_core.reconstruction.weighted import MAX_ROUNDS
 
 Map = NDArray[np.float32]
+SHARED_NODES = 60_000
 
 
 _whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract", "reassoc"}, cache=True)
@@ -66,10 +67,13 @@ def integrate_live(
         (2.0 - 2.0 * np.cos(np.pi * np.arange(1, n + 1) / n)).astype(np.float32) for n in shape
     )
 
+    # A small transform is done before a second thread has woken.
+    threads = workers if weight.size > SHARED_NODES else 1
+
     def precondition(field: Map) -> Map:
-        spectrum = scipy.fft.dstn(field, type=2, workers=workers)
+        spectrum = scipy.fft.dstn(field, type=2, workers=threads)
         _divide(spectrum, *waves)
-        return np.asarray(scipy.fft.idstn(spectrum, type=2, workers=workers, overwrite_x=True))
+        return np.asarray(scipy.fft.idstn(spectrum, type=2, workers=threads, overwrite_x=True))
 
     left = np.empty(shape, np.float32)
     _flow(slope_x, slope_y, weight, np.float32(pitch_mm), left)

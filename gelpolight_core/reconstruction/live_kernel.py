@@ -24,7 +24,6 @@ from gelpolight_core.reconstruction.near_light_kernel import (
 )
 
 _B = 64
-_IN = 23
 _single = np.float32
 _0, _1, _2, _HALF = _single(0.0), _single(1.0), _single(2.0), _single(0.5)
 _PI = _single(pi)
@@ -227,16 +226,16 @@ def _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shado
             half * w[11 * _B + j] * s2,
         )
     t0, _, k0 = _told(
-        w[j], w[9 * _B + j], w[6 * _B + j], w[19 * _B + j], s0, dark[0], bounce, nz, shadows
+        w[j], w[9 * _B + j], w[6 * _B + j], w[13 * _B + j], s0, dark[0], bounce, nz, shadows
     )
     t1, _, k1 = _told(
-        w[_B + j], w[10 * _B + j], w[7 * _B + j], w[20 * _B + j], s1, dark[1], bounce, nz, shadows
+        w[_B + j], w[10 * _B + j], w[7 * _B + j], w[14 * _B + j], s1, dark[1], bounce, nz, shadows
     )
     t2, _, k2 = _told(
         w[2 * _B + j],
         w[11 * _B + j],
         w[8 * _B + j],
-        w[21 * _B + j],
+        w[15 * _B + j],
         s2,
         dark[2],
         bounce,
@@ -262,11 +261,12 @@ def _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shado
 
 
 @_whole
-def solve_block(w, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Solve the `_B` nodes of a block: planes 0 to 22 of `w` are read, 23 to 28 are written."""
+def solve_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Solve the `_B` nodes of a block: planes 0 to 16 of `w` are read, 17 to 22 are written."""
     for j in range(_B):
-        d, wx, wy = w[12 * _B + j], w[13 * _B + j], w[14 * _B + j]
-        x = x_first + pitch * _single(j) + d * wx
+        d, at = w[12 * _B + j], _single(j)
+        wx, wy = drift[0] + at * drift[1], drift[2] + at * drift[3]
+        x = x_first + pitch * at + d * wx
         short = _1 / sqrt(wx * wx + wy * wy + _1)
         v = (wx * short, wy * short, -short)
         l0, near0 = _light(leds[0], x, y + d * wy, d)
@@ -275,13 +275,13 @@ def solve_block(w, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows
         s0, s1, s2 = w[3 * _B + j] * near0, w[4 * _B + j] * near1, w[5 * _B + j] * near2
         flat = (_0, _0, -_1)
         d0, lit0, k0 = _told(
-            w[j], w[9 * _B + j], w[6 * _B + j], w[19 * _B + j], s0, dark[0], bounce, -_1, shadows
+            w[j], w[9 * _B + j], w[6 * _B + j], w[13 * _B + j], s0, dark[0], bounce, -_1, shadows
         )
         d1, lit1, k1 = _told(
             w[_B + j],
             w[10 * _B + j],
             w[7 * _B + j],
-            w[20 * _B + j],
+            w[14 * _B + j],
             s1,
             dark[1],
             bounce,
@@ -292,7 +292,7 @@ def solve_block(w, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows
             w[2 * _B + j],
             w[11 * _B + j],
             w[8 * _B + j],
-            w[21 * _B + j],
+            w[15 * _B + j],
             s2,
             dark[2],
             bounce,
@@ -306,21 +306,21 @@ def solve_block(w, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows
         e0 = _least(-l0[2] * _most(d0, _0) / _most(f0, tiny), _1)
         e1 = _least(-l1[2] * _most(d1, _0) / _most(f1, tiny), _1)
         e2 = _least(-l2[2] * _most(d2, _0) / _most(f2, tiny), _1)
-        lit0 = w[19 * _B + j]
-        lit1 = w[20 * _B + j]
-        lit2 = w[21 * _B + j]
+        lit0 = w[13 * _B + j]
+        lit1 = w[14 * _B + j]
+        lit2 = w[15 * _B + j]
         n = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, lit0, lit1, lit2)
         n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
         n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
         # What is dark is judged with the light from around that the normal found receives.
         _, lit0, k0 = _told(
-            w[j], w[9 * _B + j], w[6 * _B + j], w[19 * _B + j], s0, dark[0], bounce, n[2], shadows
+            w[j], w[9 * _B + j], w[6 * _B + j], w[13 * _B + j], s0, dark[0], bounce, n[2], shadows
         )
         _, lit1, k1 = _told(
             w[_B + j],
             w[10 * _B + j],
             w[7 * _B + j],
-            w[20 * _B + j],
+            w[14 * _B + j],
             s1,
             dark[1],
             bounce,
@@ -331,7 +331,7 @@ def solve_block(w, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows
             w[2 * _B + j],
             w[11 * _B + j],
             w[8 * _B + j],
-            w[21 * _B + j],
+            w[15 * _B + j],
             s2,
             dark[2],
             bounce,
@@ -346,45 +346,53 @@ def solve_block(w, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows
         trust = _1 if known > _single(2.5) else _ONE_DARK
         trust = _UNSOLVED if hidden or not solved else trust
         along = _1 / _most(along, _LEAST_ALONG)
-        slope_x = -(nx * (_1 + d * w[15 * _B + j]) + ny * d * w[16 * _B + j]) * along
-        slope_y = -(nx * d * w[17 * _B + j] + ny * (_1 + d * w[18 * _B + j])) * along
-        saturated = w[19 * _B + j] + w[20 * _B + j] + w[21 * _B + j] > _0
+        slope_x = (
+            -(nx * (_1 + d * (drift[4] + at * drift[5])) + ny * d * (drift[6] + at * drift[7]))
+            * along
+        )
+        slope_y = (
+            -(nx * d * (drift[8] + at * drift[9]) + ny * (_1 + d * (drift[10] + at * drift[11])))
+            * along
+        )
+        saturated = w[13 * _B + j] + w[14 * _B + j] + w[15 * _B + j] > _0
         unlit = lit0 * lit1 * lit2 < _HALF
         flag = (
             (_F_HIDDEN if hidden else _0)
             + (_F_SATURATED if saturated else _0)
             + (_F_DARK if unlit else _0)
         )
-        kind = w[22 * _B + j]
+        kind = w[16 * _B + j]
         usable = kind > _single(1.5)
-        w[23 * _B + j] = slope_x if usable else _0
-        w[24 * _B + j] = slope_y if usable else _0
-        w[25 * _B + j] = trust if usable else (_UNSOLVED if kind > _HALF else _1)
-        w[26 * _B + j] = flag if usable else _F_OUTSIDE
-        w[27 * _B + j] = nx if usable else _0
-        w[28 * _B + j] = ny if usable else _0
+        w[17 * _B + j] = slope_x if usable else _0
+        w[18 * _B + j] = slope_y if usable else _0
+        w[19 * _B + j] = trust if usable else (_UNSOLVED if kind > _HALF else _1)
+        w[20 * _B + j] = flag if usable else _F_OUTSIDE
+        w[21 * _B + j] = nx if usable else _0
+        w[22 * _B + j] = ny if usable else _0
 
 
 @_part
-def _fetch(w, at, line, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    for j in range(count):
-        w[at + j] = line[begin + j]
+def _ramps(static, row, place, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return drift and its derivatives along a block: value and step of each.
 
-
-@_part
-def _store(w, at, line, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    for j in range(count):
-        line[begin + j] = w[at + j]
-
-
-@_part
-def _fetch_bits(w, saturated, begin, kind, place, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    for j in range(count):
-        bits = saturated[begin + j]
-        w[19 * _B + j] = _single(bits & 1)
-        w[20 * _B + j] = _single((bits >> 1) & 1)
-        w[21 * _B + j] = _single((bits >> 2) & 1)
-        w[22 * _B + j] = _single(kind[place + j])
+    Over a block they are straight lines within 1e-4, and six maps less are read from memory.
+    """
+    last = place + count - 1
+    share = _1 / _single(max(count - 1, 1))
+    return (
+        static[6, row, place],
+        (static[6, row, last] - static[6, row, place]) * share,
+        static[7, row, place],
+        (static[7, row, last] - static[7, row, place]) * share,
+        static[8, row, place],
+        (static[8, row, last] - static[8, row, place]) * share,
+        static[9, row, place],
+        (static[9, row, last] - static[9, row, place]) * share,
+        static[10, row, place],
+        (static[10, row, last] - static[10, row, place]) * share,
+        static[11, row, place],
+        (static[11, row, last] - static[11, row, place]) * share,
+    )
 
 
 @_whole
@@ -406,6 +414,7 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     gloss,
     bounce,
     shadows,
+    normals,
     slope_x,
     slope_y,
     weight,
@@ -415,34 +424,49 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 ):
     """Solve rows `first` to `last` of a region whose corner in the static maps is `corner`.
 
+    Normals are written where they are wanted.
     `static` (12, rows, columns): 3 scales, 3 noises, drift x, y, and its four derivatives.
     """
     columns = depth.shape[1]
-    w = np.zeros(29 * _B, np.float32)
+    w = np.zeros(23 * _B, np.float32)
     for i in range(first, last):
         y = _single(origin_mm[1] + pitch_mm * (i + corner[0]))
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
             place = corner[1] + begin
             row = i + corner[0]
+            # Plain indices: a view of a row is counted, and threads would wait for the counter.
             for k in range(3):
-                _fetch(w, k * _B, ratio[k, i], begin, count)
+                for j in range(count):
+                    w[k * _B + j] = ratio[k, i, begin + j]
                 if bounce is not None:
-                    _fetch(w, (9 + k) * _B, around[k, i], begin, count)
-            _fetch(w, 12 * _B, depth[i], begin, count)
-            for k in range(6):
-                _fetch(w, (3 + k) * _B, static[k, row], place, count)
-                _fetch(w, (13 + k) * _B, static[6 + k, row], place, count)
-            _fetch_bits(w, saturated[i], begin, kind[row], place, count)
-            x_first = _single(origin_mm[0] + pitch_mm * place)
-            solve_block(
-                w, y, x_first, _single(pitch_mm), leds, dark, curves, gloss, bounce, shadows
-            )
-            _store(w, 23 * _B, slope_x[i], begin, count)
-            _store(w, 24 * _B, slope_y[i], begin, count)
-            _store(w, 25 * _B, weight[i], begin, count)
-            _store(w, 27 * _B, normal_x[i], begin, count)
-            _store(w, 28 * _B, normal_y[i], begin, count)
-            line = flags[i]
+                    for j in range(count):
+                        w[(9 + k) * _B + j] = around[k, i, begin + j]
             for j in range(count):
-                line[begin + j] = np.uint8(w[26 * _B + j])
+                w[12 * _B + j] = depth[i, begin + j]
+            for k in range(6):
+                for j in range(count):
+                    w[(3 + k) * _B + j] = static[k, row, place + j]
+            for j in range(count):
+                bits = saturated[i, begin + j]
+                w[13 * _B + j] = _single(bits & 1)
+                w[14 * _B + j] = _single((bits >> 1) & 1)
+                w[15 * _B + j] = _single((bits >> 2) & 1)
+                w[16 * _B + j] = _single(kind[row, place + j])
+            x_first = _single(origin_mm[0] + pitch_mm * place)
+            drift = _ramps(static, row, place, count)
+            pitch = _single(pitch_mm)
+            solve_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows)
+            for j in range(count):
+                slope_x[i, begin + j] = w[17 * _B + j]
+            for j in range(count):
+                slope_y[i, begin + j] = w[18 * _B + j]
+            for j in range(count):
+                weight[i, begin + j] = w[19 * _B + j]
+            if normals:
+                for j in range(count):
+                    normal_x[i, begin + j] = w[21 * _B + j]
+                for j in range(count):
+                    normal_y[i, begin + j] = w[22 * _B + j]
+            for j in range(count):
+                flags[i, begin + j] = np.uint8(w[20 * _B + j])

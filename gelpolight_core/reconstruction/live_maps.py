@@ -186,7 +186,7 @@ def _scale(
     pitch = grid.pitch_mm * factor
     all_usable = _average(usable.astype(np.float32), factor) > 0.99
     mostly_inside = _average(inside.astype(np.float32), factor) > 0.5
-    drift = _planes(_average(calibration.table.drift, factor)).astype(np.float64)
+    drift = _whole(_planes(_average(calibration.table.drift, factor)).astype(np.float64), x, y)
     # Averaging a block leaves the noise of one node over the block's width.
     noise = calibration.noise / np.sqrt(2.0) / factor
     static = static_maps(full, x, y, drift, _planes(noise / _average(base, factor)))
@@ -198,6 +198,19 @@ def _scale(
         static,
         np.where(all_usable, 2, mostly_inside).astype(np.uint8),
     )
+
+
+def _whole(
+    drift: NDArray[np.float64], x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the drift with what no ray tells filled in by a plane through the rest."""
+    known = np.isfinite(drift).all(axis=0)
+    if known.all() or not known.any():
+        return np.nan_to_num(drift)
+    x, y = np.meshgrid(x_mm, y_mm)
+    terms = np.stack([x, y, np.ones_like(x)], axis=-1)
+    plane, *_ = np.linalg.lstsq(terms[known], drift[:, known].T, rcond=None)
+    return np.asarray(np.where(known, drift, np.moveaxis(terms @ plane, -1, 0)))
 
 
 def static_maps(

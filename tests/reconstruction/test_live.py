@@ -107,6 +107,7 @@ def test_one_round_is_enough_for_a_shallow_press(
     surface = pressed(Cylinder(3.0, depth_mm), x_mm=1.0, y_mm=-2.0)
     picture = shown(PressedMembrane(surface))
     once = balanced.depth(picture)
+    assert once.depth_mm.max() > 0.5 * depth_mm
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(live, "SHALLOW_MM", 0.0)
         twice = balanced.depth(picture)

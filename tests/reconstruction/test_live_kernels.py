@@ -32,12 +32,16 @@ LEDS = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.9], [10.1, -6.3, -13.5]])
 _EVEN = np.linspace(0.0, 1.0, CURVE_NODES)
 BENT = tuple(tuple((_EVEN * (1.0 + g * (1.0 - _EVEN))).tolist()) for g in (0.2, 0.35, 0.5))
 
-membranes = st.builds(
-    Membrane,
-    st.floats(0.8, 1.3),
-    st.one_of(st.just(0.0), st.floats(0.05, 0.5)),
-    st.floats(0.3, 0.7),
-    st.one_of(st.just(0.0), st.floats(0.1, 0.9)),
+# Each kind of membrane is compiled by itself: these two stand for all.
+membranes = st.one_of(
+    st.builds(Membrane, st.floats(0.8, 1.3)),
+    st.builds(
+        Membrane,
+        st.floats(0.8, 1.3),
+        st.floats(0.05, 0.5),
+        st.floats(0.3, 0.7),
+        st.floats(0.1, 0.9),
+    ),
 )
 
 
@@ -109,6 +113,7 @@ def solved_in_blocks(field: ShadedField, depth: Map, membrane: Membrane) -> dict
         live.curves,
         live.gloss,
         live.bounce,
+        True,
         True,
         *out.values(),
     )
