@@ -14,12 +14,14 @@ from app.inspect import shading
 from app.inspect.cuts import Cut, Section, cut
 from app.inspect.look import LEAST_RANGE_MM, Look, colour_table
 from app.inspect.surface import LIVE_NODES, Surface, surface_of
+from app.live.zebra import eight_bits
 from app.sources.source import Frame
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 LIVE_PX = 560
+CAMERA_PX = 760
 STILL_PX = 2000
 SURROUND = (21, 23, 26)
 
@@ -82,6 +84,8 @@ class Shown:
         As reconstructed.
     range_mm : (low, high)
         Depths at the ends of the colours.
+    camera : (rows, columns, 3) uint8 or None
+        The camera's picture, made smaller while it moves.
     height, normals, quality : (rows, columns, 3) uint8 or None
         Pictures over the extent of the grid.
     quality_top : float
@@ -97,6 +101,7 @@ class Shown:
     frame: Frame
     heightmap: HeightMap | None = None
     range_mm: tuple[float, float] = (0.0, 1.0)
+    camera: NDArray[np.uint8] | None = None
     height: NDArray[np.uint8] | None = None
     normals: NDArray[np.uint8] | None = None
     quality: NDArray[np.uint8] | None = None
@@ -126,9 +131,10 @@ class Maker:
     def __call__(self, frame: Frame) -> Shown:
         """Make what is wanted of a frame."""
         wanted = self.wanted
-        if self.live is None or not wanted.needs_depth:
-            return Shown(frame)
         began = time.perf_counter()
+        camera = camera_picture(frame, wanted) if wanted.camera else None
+        if self.live is None or not wanted.needs_depth:
+            return Shown(frame, camera=camera)
         heightmap, depth_ms = self._heightmap(frame, wanted)
         shown = _Pictures(heightmap, wanted)
         surface = shown.surface() if wanted.surface else None
@@ -137,6 +143,7 @@ class Maker:
             frame=frame,
             heightmap=heightmap,
             range_mm=shown.range_mm,
+            camera=camera,
             height=shown.height() if wanted.height else None,
             normals=shown.normals() if wanted.normals else None,
             quality=quality,
@@ -163,6 +170,12 @@ class Maker:
         depth_ms = 1e3 * (time.perf_counter() - began)
         self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
+
+
+def camera_picture(frame: Frame, wanted: Wanted) -> NDArray[np.uint8]:
+    """Return the camera's picture for the screen."""
+    shown = frame.rgb if wanted.still else shading.fitted(frame.rgb, CAMERA_PX)
+    return eight_bits(shown)
 
 
 class _Pictures:

@@ -25,7 +25,6 @@ from app.inspect.section_panel import SectionPanel
 from app.inspect.surface_panel import SurfacePanel, preset_names
 from app.live.overlay import Marker, Overlay
 from app.live.picture_view import PictureView
-from app.live.zebra import eight_bits
 from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.jobs import Jobs
@@ -200,8 +199,9 @@ class Views(QMainWindow):
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show a frame in every view that is shown."""
-        if self._visible["camera"]:
-            self.camera.show_rgb(eight_bits(shown.frame.rgb))
+        if shown.camera is not None:
+            rows, columns = shown.frame.rgb.shape[:2]
+            self.camera.show_rgb(shown.camera, size=(columns, rows))
         if shown.heightmap is None:
             return
         if not self._has_depth:
