@@ -24,6 +24,8 @@ LIVE_PX = 560
 CAMERA_PX = 760
 STILL_PX = 2000
 SURROUND = (21, 23, 26)
+STEEPNESS = colour_table("magma"), 0.0, 60.0
+"""Colours of the slope, and its degrees at their ends."""
 
 QUALITY_COLOURS = {
     Flag.INVALID: (225, 225, 225),
@@ -41,8 +43,10 @@ class Wanted:
 
     Attributes
     ----------
-    surface, height, normals, camera : bool
+    surface, height, camera : bool
         The views that are shown.
+    normals : str
+        What the view of normals shows: ``normals``, ``slope``, or empty where it is hidden.
     quality : str
         What the quality view shows: ``flags``, ``uncertainty``, or empty where it is hidden.
     section : Section or None
@@ -57,7 +61,7 @@ class Wanted:
 
     surface: bool = False
     height: bool = False
-    normals: bool = False
+    normals: str = ""
     camera: bool = False
     quality: str = ""
     section: Section | None = None
@@ -68,7 +72,7 @@ class Wanted:
     @property
     def needs_depth(self) -> bool:
         """Whether the frame must be reconstructed."""
-        views = self.surface or self.height or self.normals or bool(self.quality)
+        views = self.surface or self.height or bool(self.normals) or bool(self.quality)
         return views or self.section is not None or self.region is not None
 
 
@@ -162,11 +166,13 @@ class Maker:
         if self._last is not None:
             same, made, heightmap, depth_ms = self._last
             has = (heightmap.normals is not None, heightmap.depth_sd_mm is not None)
-            enough = has[0] >= wanted.normals and (has[1] or made[1] >= uncertainty)
+            enough = has[0] >= bool(wanted.normals) and (has[1] or made[1] >= uncertainty)
             if same is frame and made[0] is reconstructor and enough:
                 return heightmap, depth_ms
         began = time.perf_counter()
-        heightmap = reconstructor.depth(frame.rgb, normals=wanted.normals, uncertainty=uncertainty)
+        heightmap = reconstructor.depth(
+            frame.rgb, normals=bool(wanted.normals), uncertainty=uncertainty
+        )
         depth_ms = 1e3 * (time.perf_counter() - began)
         self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
@@ -232,9 +238,13 @@ class _Pictures:
         return shading.outside_filled(rgb, self._outside, SURROUND)
 
     def normals(self) -> NDArray[np.uint8]:
-        """Return the normals as colours."""
+        """Return the normals, or how steep they are, as colours."""
         assert self._map.normals is not None
-        rgb = shading.normal_colours(shading.fitted(self._map.normals, self._px))
+        normals = shading.fitted(self._map.normals, self._px)
+        if self._wanted.normals == "slope":
+            rgb = shading.coloured(shading.steepness_deg(normals), *STEEPNESS)
+        else:
+            rgb = shading.normal_colours(normals)
         return shading.outside_filled(rgb, self._outside, SURROUND)
 
     def quality(self) -> tuple[NDArray[np.uint8] | None, float]:
