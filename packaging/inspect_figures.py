@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from live_figures import DRAG_MS, dragger
-from probes import Lateness, Spent, resident_mb, told
+from probes import Lateness, Spent, ThreadTimes, resident_mb, told
 from PySide6.QtCore import QEvent, QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
@@ -127,7 +127,7 @@ class Measurement:
         self._drawings = 0 if view is None else view.drawings
         stream = self.page.link.stream
         self._before = None if stream is None else stream.figures()
-        self._spent, self._memory_mb = Spent(), resident_mb()
+        self._spent, self._threads, self._memory_mb = Spent(), ThreadTimes(), resident_mb()
 
     def tell(self) -> None:
         """Print what was measured."""
@@ -148,6 +148,8 @@ class Measurement:
         print(told("age of a frame when it is painted", self.watch.ages_ms, "ms", high=95))
         print(f"memory: {self._memory_mb:.0f} MB, at the end {resident_mb():.0f} MB")
         print(self._spent.told())
+        print("processor time for each shown frame, by thread:")
+        print(self._threads.told(shown))
 
     def stop(self) -> None:
         """End everything."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from app.inspect.products import Maker, Shown, Wanted
+from app.inspect.products import Maker, Shown, Wanted, camera_picture
 from app.shell.context import AppContext
 from app.sources.mailbox import Mailbox
 from app.sources.processor import Failure, Outcome, Processor
@@ -206,7 +206,7 @@ class LiveLink(QObject):
             return
         if isinstance(item, Failure):
             self._say(item.sentence)
-            self._show(Shown(item.frame))
+            self._show(Shown(item.frame, camera=camera_picture(item.frame, self._maker.wanted)))
             return
         self._say("")
         self.last = item.value

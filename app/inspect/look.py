@@ -18,7 +18,7 @@ COLOUR_MAPS = {
     "inferno": tr("Inferno"),
     "magma": tr("Magma"),
     "CET-L1": tr("Grey"),
-    "CET-L17": tr("Earth"),
+    "plasma": tr("Plasma"),
 }
 LEAST_RANGE_MM = 0.02
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.inspect.actions import Deeds
@@ -47,6 +47,7 @@ class InspectPage(QWidget):
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
         named(self, "inspect", tr("Inspect"))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.context = context
         self.jobs = Jobs("inspect", self)
         self.views = Views(self.jobs, context=context)
@@ -81,6 +82,8 @@ class InspectPage(QWidget):
             keys=("Space",), icon_name="pause", tip=tr("Let the picture stand, with all detail"),
         )  # fmt: skip
         self.pause_action.setCheckable(True)
+        # Other pages have a use of their own for the bar.
+        self.pause_action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         self.recorder = RecordControl(self.link, self, context=self.context)
         self.deeds = Deeds(self.link, self.views, self.jobs, self, context=self.context)
         deeds = self.deeds
@@ -127,6 +130,7 @@ class InspectPage(QWidget):
         self.link.enter(True)
         self._words.start()
         self._advise()
+        self.setFocus()
 
     def leave(self) -> None:
         """Let the source go."""

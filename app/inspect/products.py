@@ -14,14 +14,18 @@ from app.inspect import shading
 from app.inspect.cuts import Cut, Section, cut
 from app.inspect.look import LEAST_RANGE_MM, Look, colour_table
 from app.inspect.surface import LIVE_NODES, Surface, surface_of
+from app.live.zebra import eight_bits
 from app.sources.source import Frame
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 LIVE_PX = 560
+CAMERA_PX = 760
 STILL_PX = 2000
 SURROUND = (21, 23, 26)
+STEEPNESS = colour_table("magma"), 0.0, 60.0
+"""Colours of the slope, and its degrees at their ends."""
 
 QUALITY_COLOURS = {
     Flag.INVALID: (225, 225, 225),
@@ -39,8 +43,10 @@ class Wanted:
 
     Attributes
     ----------
-    surface, height, normals, camera : bool
+    surface, height, camera : bool
         The views that are shown.
+    normals : str
+        What the view of normals shows: ``normals``, ``slope``, or empty where it is hidden.
     quality : str
         What the quality view shows: ``flags``, ``uncertainty``, or empty where it is hidden.
     section : Section or None
@@ -55,7 +61,7 @@ class Wanted:
 
     surface: bool = False
     height: bool = False
-    normals: bool = False
+    normals: str = ""
     camera: bool = False
     quality: str = ""
     section: Section | None = None
@@ -66,7 +72,7 @@ class Wanted:
     @property
     def needs_depth(self) -> bool:
         """Whether the frame must be reconstructed."""
-        views = self.surface or self.height or self.normals or bool(self.quality)
+        views = self.surface or self.height or bool(self.normals) or bool(self.quality)
         return views or self.section is not None or self.region is not None
 
 
@@ -82,6 +88,8 @@ class Shown:
         As reconstructed.
     range_mm : (low, high)
         Depths at the ends of the colours.
+    camera : (rows, columns, 3) uint8 or None
+        The camera's picture, made smaller while it moves.
     height, normals, quality : (rows, columns, 3) uint8 or None
         Pictures over the extent of the grid.
     quality_top : float
@@ -97,6 +105,7 @@ class Shown:
     frame: Frame
     heightmap: HeightMap | None = None
     range_mm: tuple[float, float] = (0.0, 1.0)
+    camera: NDArray[np.uint8] | None = None
     height: NDArray[np.uint8] | None = None
     normals: NDArray[np.uint8] | None = None
     quality: NDArray[np.uint8] | None = None
@@ -126,9 +135,10 @@ class Maker:
     def __call__(self, frame: Frame) -> Shown:
         """Make what is wanted of a frame."""
         wanted = self.wanted
-        if self.live is None or not wanted.needs_depth:
-            return Shown(frame)
         began = time.perf_counter()
+        camera = camera_picture(frame, wanted) if wanted.camera else None
+        if self.live is None or not wanted.needs_depth:
+            return Shown(frame, camera=camera)
         heightmap, depth_ms = self._heightmap(frame, wanted)
         shown = _Pictures(heightmap, wanted)
         surface = shown.surface() if wanted.surface else None
@@ -137,6 +147,7 @@ class Maker:
             frame=frame,
             heightmap=heightmap,
             range_mm=shown.range_mm,
+            camera=camera,
             height=shown.height() if wanted.height else None,
             normals=shown.normals() if wanted.normals else None,
             quality=quality,
@@ -155,14 +166,22 @@ class Maker:
         if self._last is not None:
             same, made, heightmap, depth_ms = self._last
             has = (heightmap.normals is not None, heightmap.depth_sd_mm is not None)
-            enough = has[0] >= wanted.normals and (has[1] or made[1] >= uncertainty)
+            enough = has[0] >= bool(wanted.normals) and (has[1] or made[1] >= uncertainty)
             if same is frame and made[0] is reconstructor and enough:
                 return heightmap, depth_ms
         began = time.perf_counter()
-        heightmap = reconstructor.depth(frame.rgb, normals=wanted.normals, uncertainty=uncertainty)
+        heightmap = reconstructor.depth(
+            frame.rgb, normals=bool(wanted.normals), uncertainty=uncertainty
+        )
         depth_ms = 1e3 * (time.perf_counter() - began)
         self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
+
+
+def camera_picture(frame: Frame, wanted: Wanted) -> NDArray[np.uint8]:
+    """Return the camera's picture for the screen."""
+    shown = frame.rgb if wanted.still else shading.fitted(frame.rgb, CAMERA_PX)
+    return eight_bits(shown)
 
 
 class _Pictures:
@@ -219,9 +238,13 @@ class _Pictures:
         return shading.outside_filled(rgb, self._outside, SURROUND)
 
     def normals(self) -> NDArray[np.uint8]:
-        """Return the normals as colours."""
+        """Return the normals, or how steep they are, as colours."""
         assert self._map.normals is not None
-        rgb = shading.normal_colours(shading.fitted(self._map.normals, self._px))
+        normals = shading.fitted(self._map.normals, self._px)
+        if self._wanted.normals == "slope":
+            rgb = shading.coloured(shading.steepness_deg(normals), *STEEPNESS)
+        else:
+            rgb = shading.normal_colours(normals)
         return shading.outside_filled(rgb, self._outside, SURROUND)
 
     def quality(self) -> tuple[NDArray[np.uint8] | None, float]:

@@ -128,6 +128,14 @@ def normal_colours(normals: NDArray[np.float32]) -> Rgb:
     return np.asarray(np.clip(scaled, 0.0, 255.0).astype(np.uint8))
 
 
+def steepness_deg(normals: NDArray[np.float32]) -> Map:
+    """Return how steep the surface is, degrees, from its normals."""
+    across = cv2.magnitude(normals[..., 0], normals[..., 1])
+    return np.asarray(
+        cv2.phase(np.ascontiguousarray(-normals[..., 2]), across, angleInDegrees=True)
+    )
+
+
 def flag_colours(
     rgb: Rgb, flags: NDArray[np.uint8], palette: dict[Flag, tuple[int, int, int]]
 ) -> Rgb:

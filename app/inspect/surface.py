@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 
 # Coarse while live: a software renderer draws so many nodes in time. The texture has the detail.
-LIVE_NODES = 160
+LIVE_NODES = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,10 +14,10 @@ from PySide6.QtWidgets import (
 )
 
 from app.inspect.cuts import Section
-from app.inspect.height_panel import HeightPanel, extent_of
+from app.inspect.height_panel import HeightPanel
 from app.inspect.look import Look
 from app.inspect.look_panel import LookPanel
-from app.inspect.map_view import MapView
+from app.inspect.normals_panel import NormalsPanel
 from app.inspect.products import Shown, Wanted
 from app.inspect.quality_panel import QualityPanel
 from app.inspect.section_line import RegionBox, SectionLine
@@ -25,7 +25,6 @@ from app.inspect.section_panel import SectionPanel
 from app.inspect.surface_panel import SurfacePanel, preset_names
 from app.live.overlay import Marker, Overlay
 from app.live.picture_view import PictureView
-from app.live.zebra import eight_bits
 from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.jobs import Jobs
@@ -63,8 +62,7 @@ class Views(QMainWindow):
         self._context = context
         self.surface = SurfacePanel(jobs)
         self.height = HeightPanel()
-        self.normals = MapView("inspect.normals", tr("Normals"))
-        self.normals.say(tr("No depth yet."))
+        self.normals = NormalsPanel()
         self.quality = QualityPanel()
         self.camera = PictureView()
         self.section = SectionPanel()
@@ -155,12 +153,13 @@ class Views(QMainWindow):
         self.follow_source()
 
     def _connect(self) -> None:
-        for view in (self.height.map, self.normals, self.quality.map, self.surface):
+        for view in (self.height.map, self.normals.map, self.quality.map, self.surface):
             view.pointed.connect(self.pointed)
         self.camera.pointed.connect(self.picture_pointed)
         self.camera.clicked.connect(self._on_picture_clicked)
         self.look.changed.connect(self._on_look)
         self.quality.chosen.connect(self.wanted_changed)
+        self.normals.chosen.connect(self.wanted_changed)
         for part in (self.line, self.region):
             part.moved.connect(self.wanted_changed)
         self.section.changed.connect(self._on_section)
@@ -182,7 +181,7 @@ class Views(QMainWindow):
         return Wanted(
             surface=shown["surface"],
             height=shown["height"],
-            normals=shown["normals"],
+            normals=self.normals.what if shown["normals"] else "",
             camera=shown["camera"],
             quality=self.quality.what if shown["quality"] else "",
             section=self._section() if shown["section"] else None,
@@ -200,8 +199,9 @@ class Views(QMainWindow):
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show a frame in every view that is shown."""
-        if self._visible["camera"]:
-            self.camera.show_rgb(eight_bits(shown.frame.rgb))
+        if shown.camera is not None:
+            rows, columns = shown.frame.rgb.shape[:2]
+            self.camera.show_rgb(shown.camera, size=(columns, rows))
         if shown.heightmap is None:
             return
         if not self._has_depth:
@@ -211,8 +211,7 @@ class Views(QMainWindow):
             self.surface.show_surface(shown.surface)
         self.height.show_frame(shown, self.look.look.colours)
         self.look.show_range(*shown.range_mm)
-        if shown.normals is not None:
-            self.normals.show_picture(shown.normals, extent_of(shown.heightmap))
+        self.normals.show_frame(shown)
         if self._visible["quality"]:
             self.quality.show_frame(shown, still=still)
         if shown.cut is not None:
@@ -229,12 +228,12 @@ class Views(QMainWindow):
         self._has_depth = False
         self._on_section()
         self.surface.show_surface(None)
-        for view in (self.height.map, self.normals, self.quality.map):
+        for view in (self.height.map, self.normals.map, self.quality.map):
             view.say(words)
 
     def show_cursor(self, x_mm: float, y_mm: float) -> None:
         """Mark a place in every view of the depth."""
-        for view in (self.height.map, self.normals, self.quality.map, self.surface):
+        for view in (self.height.map, self.normals.map, self.quality.map, self.surface):
             view.show_cursor(x_mm, y_mm)
 
     def show_pixel(self, pixel: tuple[float, float] | None) -> None:

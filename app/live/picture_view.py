@@ -79,7 +79,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         named(self, "live.picture", tr("Live picture"))
         # Keys belong to the whole live view, which has the tools' and the handles'.
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._size = (0, 0)
+        self._size = self._drawn = (0, 0)
         self._fitted = True
         self._box = _Box()
         self._box.dragged.connect(self.dragged)
@@ -111,16 +111,26 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         width, _ = self._box.viewPixelSize()
         return float(self.devicePixelRatioF() / width) if width > 0.0 else 1.0
 
-    def show_rgb(self, rgb: NDArray[np.uint8] | None) -> None:
-        """Show a picture (rows, columns, 3); None for none."""
+    def show_rgb(
+        self, rgb: NDArray[np.uint8] | None, *, size: tuple[int, int] | None = None
+    ) -> None:
+        """Show a picture (rows, columns, 3); None for none.
+
+        A picture that was made smaller has the `size` (width, height) of the one that it stands
+        for; places are that one's pixels.
+        """
         self._placeholder.setVisible(rgb is None)
         if rgb is None:
             self._image.clear()
-            self._size = (0, 0)
+            self._size = self._drawn = (0, 0)
             self.zoomed.emit(math.nan)
             return
         self._image.setImage(rgb, autoLevels=False)
-        size = (rgb.shape[1], rgb.shape[0])
+        size = size or (rgb.shape[1], rgb.shape[0])
+        drawn = (rgb.shape[1], rgb.shape[0])
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._image.setRect(QRectF(-0.5, -0.5, *size))
         if size != self._size:
             self._size = size
             # Half a pixel: the first pixel's centre, not its corner, is (0, 0).

@@ -44,7 +44,8 @@ def _made(dome: HeightMap, frame: Frame, **wanted: Any) -> tuple[Any, Reconstruc
 
 @pytest.mark.parametrize("view", ["height", "normals", "quality", "surface"])
 def test_only_the_view_that_is_shown_is_computed(dome: HeightMap, frame: Frame, view: str) -> None:
-    shown, _ = _made(dome, frame, **{view: "flags" if view == "quality" else True})
+    wanted = {"quality": "flags", "normals": "normals"}.get(view, True)
+    shown, _ = _made(dome, frame, **{view: wanted})
     made = {f.name for f in fields(shown) if f.name in ("height", "normals", "quality", "surface")}
     assert {name for name in made if getattr(shown, name) is not None} == {view}
     assert shown.cut is None
@@ -154,3 +155,10 @@ def test_flags_have_their_colour_and_the_outside_is_no_flag(dome: HeightMap, fra
     shown, _ = _made(dome, frame, quality="flags", still=True)
     assert tuple(shown.quality[85, 45]) == QUALITY_COLOURS[Flag.DARK]
     assert tuple(shown.quality[0, 0]) == SURROUND
+
+
+def test_the_slope_view_is_the_angle_of_the_normals() -> None:
+    tilt = np.radians([0.0, 30.0, 60.0])
+    normals = np.stack([np.sin(tilt), 0.0 * tilt, -np.cos(tilt)], axis=-1)[None]
+    found = shading.steepness_deg(normals.astype(np.float32))
+    np.testing.assert_allclose(found, [[0.0, 30.0, 60.0]], atol=0.1)
