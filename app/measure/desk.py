@@ -45,6 +45,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING as RECORDING
 from gelpolight_core.translation import tr
 
+BENCH_WIDTH = 270
 PICTURES = (".png", ".tif", ".tiff")
 
 
@@ -94,6 +95,7 @@ class Desk(QMainWindow):
         self.auto.setChecked(True)
         self._steady = SteadyPress()
         self._has_calibration = False
+        self._shown: Shown | None = None
         self._trouble = ""
         self._build()
         self._connect()
@@ -195,7 +197,7 @@ class Desk(QMainWindow):
         self.link.want(Wanted(height=True))
         self.link.enter(True)
         self._follow_bench()
-        self._advise()
+        self._refresh()
 
     def leave(self) -> None:
         """Let the source go; a picture that is held stays."""
@@ -256,8 +258,8 @@ class Desk(QMainWindow):
 
     def hold(self, by_hand: bool = True) -> None:
         """Hold the picture that is shown, to measure on it."""
-        shown = self.link.last
-        if self.work.taken is None and shown is not None and shown.heightmap is not None:
+        shown = self._shown
+        if self.work.taken is None and shown is not None:
             now = datetime.now().astimezone()
             name = tr("{camera}, {time:%H:%M:%S}").format(camera=self._camera(), time=now)
             self._take(Taken(name, frame=shown.frame), propose=not by_hand)
@@ -292,6 +294,9 @@ class Desk(QMainWindow):
             return
         self.map.show_live(shown, Look())
         heightmap = shown.heightmap
+        could, self._shown = self._can_hold, None if heightmap is None else shown
+        if could != self._can_hold:
+            self._refresh()
         if heightmap is None:
             return
         frame = shown.frame
@@ -356,7 +361,7 @@ class Desk(QMainWindow):
 
     @property
     def _can_hold(self) -> bool:
-        return self.link.last is not None and self.link.last.heightmap is not None
+        return self._shown is not None
 
     def _on_proposed(self, proposal: Proposal | None) -> None:
         if proposal is None:
@@ -374,11 +379,12 @@ class Desk(QMainWindow):
 
     # The calibration and the source
 
-    def _use(self, reconstructor: Reconstructor | None) -> None:
-        self._has_calibration = reconstructor is not None
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        self._has_calibration = live is not None
         self._trouble = ""
-        self.link.use(reconstructor)
-        self.work.use(reconstructor)
+        self._shown = None
+        self.link.use(live, best)
+        self.work.use(best)
         if self.work.taken is None:
             self.map.say(tr("No depth yet."))
         self._show_validated()
@@ -395,6 +401,7 @@ class Desk(QMainWindow):
         self.validated.setStyleSheet(f"color: {theme.colour(role).name()};")
 
     def _on_source(self) -> None:
+        self._shown = None
         self.link.open()
         self._follow_bench()
         if self.work.taken is None:
@@ -408,9 +415,12 @@ class Desk(QMainWindow):
         if virtual and source.bench is not None and self._bench.widget() is None:
             from app.bench.bench_panel import BenchPanel  # only the demo needs it
 
+            panel = BenchPanel(bench=source.bench)
             scroll = QScrollArea()
             scroll.setWidgetResizable(True)
-            scroll.setWidget(BenchPanel(bench=source.bench))
+            scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+            scroll.setWidget(panel)
+            scroll.setMinimumWidth(BENCH_WIDTH)
             self._bench.setWidget(scroll)
         self._bench.setVisible(virtual)
 
