@@ -204,9 +204,11 @@ class Desk(QMainWindow):
         self.link.enter(False)
 
     def close_work(self) -> None:
-        """End every thread."""
+        """End every thread, those of the reconstructors, too: they go with them."""
         self.link.enter(False)
         self.work.close()
+        self.link.use(None)
+        self._shown = None
 
     def open_file(self, path: Path) -> None:
         """Measure on a picture, or play a recording as the camera.
