@@ -136,7 +136,11 @@ class BenchPanel(QWidget):
         self._yaw.setRange(-180.0, 180.0)
         self._yaw.setWrapping(True)
         self._form.addRow(tr("Turned by"), self._yaw)
-        self._hint = named(QLabel(tr("Drag on the picture to move it.")), "bench.hint", tr("Hint"))
+        self._hint = named(
+            QLabel(tr("Drag it on the picture to move it; the middle button moves the picture.")),
+            "bench.hint",
+            tr("Hint"),
+        )
         self._hint.setWordWrap(True)
 
     def _make_pose_row(self) -> QWidget:

@@ -28,6 +28,7 @@ class BenchDock(QDockWidget):
         named(self, "calibrate.bench", tr("Virtual bench"))
         self._source = source
         self._tried = 0
+        self._held: tuple[float, float] | None = None
         self.hide()
 
     @property
@@ -66,3 +67,25 @@ class BenchDock(QDockWidget):
         """Move what lies there to where the person clicked in the live picture."""
         if self._source.bench is not None and self.isVisible():
             self._source.bench.drag_to(u, v)
+
+    def drag(self, phase: str, u: float, v: float) -> None:
+        """Move what lies there as the person drags it, held where it was taken hold of.
+
+        Parameters
+        ----------
+        phase : str
+            "begin", "move" or "end".
+        u, v : float
+            Where the pointer is, in the picture.
+        """
+        bench = self._source.bench
+        place = None if bench is None else bench.place_mm(u, v)
+        if bench is None or place is None:
+            return
+        if phase == "begin":
+            scene = bench.scene
+            self._held = scene.x_mm - place[0], scene.y_mm - place[1]
+        elif self._held is not None:
+            bench.arrange(x_mm=place[0] + self._held[0], y_mm=place[1] + self._held[1])
+            if phase == "end":
+                self._held = None

@@ -109,9 +109,9 @@ class CalibrationController(QObject):
         self.desk.submit(Job(tr("Importing pictures"), work, taken, must=True))
 
     def _taken(self, stage: Stage, names: tuple[str, ...]) -> None:
+        self.changed.emit()
         for name in names:
             self.captured.emit(stage.value, name)
-        self.changed.emit()
         if stage is Stage.LENS:
             self.look_for_boards()
         self.compute(stage)
@@ -194,6 +194,19 @@ class CalibrationController(QObject):
             self.compute(stage)
 
         self.undo.push(Correction(text, act, take_back, done=done, refused=self.refused.emit))
+
+    def reload(self) -> None:
+        """Read what is stated and decided anew; the history begins anew with it.
+
+        Raises
+        ------
+        InputError
+            If it cannot be used; then all stays as it was.
+        """
+        self.project.reload()
+        self.undo.clear()
+        self.changed.emit()
+        self.compute()
 
     # Lens views
 

@@ -39,7 +39,9 @@ SAME_PICTURE = 0.02
 LEAST_RATIO_LIGHT = 8.0 / 255.0
 
 
-def detect_whiteboard(rgb: Rgb, *, table: ResamplingTable | None = None) -> Detection:
+def detect_whiteboard(
+    rgb: Rgb, *, table: ResamplingTable | None = None, background: Rgb | None = None
+) -> Detection:
     """Judge the light on the whiteboard.
 
     Parameters
@@ -48,11 +50,15 @@ def detect_whiteboard(rgb: Rgb, *, table: ResamplingTable | None = None) -> Dete
         The frame.
     table : ResamplingTable, optional
         Says where the working area is; without it the whole picture counts.
+    background : (rows, columns, 3), optional
+        The background stage's picture, where there is one already: the membrane is told by it.
     """
     rim = Overlay(lines=() if table is None else (working_rim(table),))
 
     def look() -> Detection:
         area, small = _prepare(rgb, table)
+        if background is not None and background.shape == rgb.shape:
+            _refuse_membrane(small, _small(background), area)
         unlit = area & (small.min(axis=2) < LEAST_LIGHT)
         lit = area & ~unlit
         inner = _without_rim(lit)
@@ -100,7 +106,10 @@ def detect_background(
         area, small = _prepare(rgb, table)
         full = saturated(rgb) > 0
         pressed = np.zeros(area.shape, np.bool_)
-        good = tr("The membrane is lit well.")
+        good = tr(
+            "The membrane is lit well. Whether anything touches it is told once the whiteboard is"
+            " captured."
+        )
         if whiteboard is not None and whiteboard.shape == rgb.shape:
             white = _small(whiteboard)
             _refuse_whiteboard(small, white, area)
@@ -203,16 +212,33 @@ def _local_change(values: Float, area: Mask2, sigma_px: float) -> Float:
 
 def _refuse_whiteboard(small: Float, whiteboard: Float, area: Mask2) -> None:
     """Refuse the whiteboard itself: no membrane is as bright in all channels and all places."""
-    lit = area & (np.minimum(small, whiteboard).min(axis=2) > LEAST_RATIO_LIGHT)
-    if not lit.any():
-        return
-    off = np.abs(small[lit] / whiteboard[lit] - 1.0)
-    if float(np.median(off, axis=0).max()) < SAME_PICTURE:
+    if _is_same(small, whiteboard, area):
         raise InputError(
             tr("the picture looks just like the whiteboard's"),
             where=tr("frame"),
-            advice=tr("Take the whiteboard off and mount the membrane"),
+            advice=tr(
+                "Mount the membrane; if it is mounted, it was so for the whiteboard's picture:"
+                " capture that again"
+            ),
         )
+
+
+def _refuse_membrane(small: Float, background: Float, area: Mask2) -> None:
+    """Refuse the bare membrane in the place of the whiteboard, where its picture is known."""
+    if _is_same(small, background, area):
+        raise InputError(
+            tr("the picture looks just like the background's"),
+            where=tr("frame"),
+            advice=tr("Take the membrane off and press the white board onto the elastomer"),
+        )
+
+
+def _is_same(small: Float, other: Float, area: Mask2) -> bool:
+    lit = area & (np.minimum(small, other).min(axis=2) > LEAST_RATIO_LIGHT)
+    if not lit.any():
+        return False
+    off = np.abs(small[lit] / other[lit] - 1.0)
+    return float(np.median(off, axis=0).max()) < SAME_PICTURE
 
 
 def _find_pressed(small: Float, whiteboard: Float, area: Mask2) -> Mask2:

@@ -82,19 +82,21 @@ def look_for(
                 return partial(_placed_spots, session=session)
             return partial(detect_mirror, expected_px=_expected(results), editable=still)
         case Stage.RADIANCE:
-            return partial(detect_whiteboard, table=results.table)
+            return partial(
+                _whiteboard, table=results.table, known=_Known(session, Stage.BACKGROUND)
+            )
         case Stage.BACKGROUND:
-            return partial(_background, table=results.table, boards=_Boards(session))
+            return partial(_background, table=results.table, known=_Known(session, Stage.RADIANCE))
         case Stage.BALLS:
             return _ball_looker(project, radius_mm, name)
     return partial(_too_early, stage=step.stage)
 
 
-class _Boards:
-    """The whiteboard's picture, read when it is first needed: in the thread that looks."""
+class _Known:
+    """Another stage's picture, read when it is first needed: in the thread that looks."""
 
-    def __init__(self, session: Session) -> None:
-        self._files = session.found(FOLDERS[Stage.RADIANCE])
+    def __init__(self, session: Session, stage: Stage) -> None:
+        self._files = session.found(FOLDERS[stage])
         self._rgb: Rgb | None = None
 
     @property
@@ -104,8 +106,12 @@ class _Boards:
         return self._rgb
 
 
-def _background(rgb: Rgb, table: ResamplingTable | None, boards: _Boards) -> Detection:
-    return or_refusal(lambda: detect_background(rgb, table=table, whiteboard=boards.rgb))
+def _whiteboard(rgb: Rgb, table: ResamplingTable | None, known: _Known) -> Detection:
+    return or_refusal(lambda: detect_whiteboard(rgb, table=table, background=known.rgb))
+
+
+def _background(rgb: Rgb, table: ResamplingTable | None, known: _Known) -> Detection:
+    return or_refusal(lambda: detect_background(rgb, table=table, whiteboard=known.rgb))
 
 
 def _too_early(_rgb: Rgb, stage: Stage | None) -> Detection:

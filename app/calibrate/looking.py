@@ -78,6 +78,8 @@ class Looking(QObject):
     def take_step(self, step: Step) -> None:
         """Show another step's live picture."""
         self.step = step
+        # Whoever turns the lens after its step has to begin anew.
+        self._pictures.view.judge_focus(step.stage is Stage.LENS)
         self._controller.watching.forget_movement()
         self.live()
 
@@ -142,6 +144,7 @@ class Looking(QObject):
         view.set_stream(None)
         view.show_picture(raw)
         view.set_overlay(None)
+        self._panel.show_live("", ready=True)
         self._pictures.strip.choose(name)
         self._pictures.show_looked_at(name)
         self._show_radius()

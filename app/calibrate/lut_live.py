@@ -121,7 +121,9 @@ class LivePanel(QWidget):
         self._timer.stop()
 
     def _make_lines(self) -> dict[str, pg.PlotDataItem]:
-        self._legend = self._profile.addLegend(offset=(-8, 8), labelTextSize="8pt")
+        self._legend = self._profile.addLegend(labelTextSize="8pt")
+        # Under the dome, where no line goes.
+        self._legend.anchor((0.5, 1.0), (0.5, 1.0), offset=(0, -12))
         lines = {
             "ball": self._profile.plot(name=tr("ball")),
             "before": self._profile.plot(name=tr("before")),

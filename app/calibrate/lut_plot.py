@@ -158,6 +158,7 @@ class CurvePlot(pg.PlotWidget):
         self.box = LassoViewBox()
         super().__init__(viewBox=self.box)
         without_menus(self)
+        self.hideButtons()  # the tool that shows the whole curve has a name
         self._scatter = scatter
         self._density_of: tuple[object, ...] = ()
         self._image = pg.ImageItem()

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from app.sources.stopping import join
+
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
 
@@ -62,8 +64,7 @@ class NewestWins(Generic[Question, Answer]):
         with self._change:
             self._stopped = True
             self._change.notify()
-        self._thread.join(timeout_s)
-        return not self._thread.is_alive()
+        return join(self._thread, timeout_s)
 
     def _work(self) -> None:
         while True:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -128,17 +129,18 @@ def _close_up(rgb: Rgb, points: NDArray[Any], *, ellipse: bool) -> Rgb:
         box = cv2.fitEllipseDirect(at.reshape(-1, 1, 2))
         cv2.ellipse(near, box, (255, 255, 255), 1, cv2.LINE_AA)
     else:
-        middle = at.mean(axis=0)
-        radius = round(float(np.linalg.norm(at - middle, axis=1).mean()))
-        cv2.circle(
-            near,
-            (round(float(middle[0])), round(float(middle[1]))),
-            radius,
-            (255, 255, 255),
-            1,
-            cv2.LINE_AA,
-        )
+        u, v, radius = _fit_circle(at)
+        cv2.circle(near, (round(u), round(v)), round(radius), (255, 255, 255), 1, cv2.LINE_AA)
     return np.asarray(near, np.uint8)
+
+
+def _fit_circle(points: NDArray[Any]) -> tuple[float, float, float]:
+    """Return centre and radius of the circle through points; a part of it may be missing."""
+    middle = points.mean(axis=0)
+    away = (points - middle).astype(np.float64)
+    sides = np.column_stack([2.0 * away, np.ones(len(away))])
+    (u, v, rest), *_ = np.linalg.lstsq(sides, (away**2).sum(axis=1), rcond=None)
+    return float(middle[0] + u), float(middle[1] + v), math.sqrt(rest + u * u + v * v)
 
 
 class MapsView(QWidget):

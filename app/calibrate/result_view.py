@@ -89,8 +89,10 @@ class ResultView(QWidget):
         self.saved.setText(sentence)
         self.saved.setStyleSheet(f"color: {theme.colour(role).name()};")
 
-    def show_statuses(self, statuses: Mapping[Stage, StageStatus], running: Stage | None) -> None:
-        """Show how every stage stands."""
+    def show_statuses(
+        self, statuses: Mapping[Stage, StageStatus], running: Stage | None, *, busy: bool
+    ) -> None:
+        """Show how every stage stands; `busy`: one is computed, or is to be next."""
         for stage, row in self._rows.items():
             row.show_status(statuses[stage], running=stage is running)
         done = all(is_done(statuses[stage].state.value) for stage in self._rows)
@@ -106,16 +108,13 @@ class ResultView(QWidget):
                 text = tr(
                     "Every stage is complete, {n} with a warning. Look at the advice, then save."
                 ).format(n=warned)
-        elif running is not None:
+        elif busy:
             text = tr("Computing: one moment.")
         else:
-            text = tr("{n} stages are still open: complete them from the top.").format(
-                n=len(open_steps)
-            )
+            text = tr("Stages that are still open: {n}. Complete them from the top.")
             if any(s.state is StageState.STALE for s in open_steps):
-                text = tr("{n} stages are not of the present captures: press Recompute.").format(
-                    n=len(open_steps)
-                )
+                text = tr("Stages that are not of the present captures: {n}. Press Recompute.")
+            text = text.format(n=len(open_steps))
         self.headline.setText(text)
         self.save.setEnabled(done or (made and running is None))
         self.save.setStyleSheet("font-weight: bold;" if done else "")

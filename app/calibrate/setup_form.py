@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QStandardPaths, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QDoubleSpinBox,
+    QFileDialog,
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
@@ -16,12 +18,14 @@ from PySide6.QtWidgets import (
     QPushButton,
     QScrollArea,
     QSpinBox,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
 from app.shell import theme
 from app.widgets.naming import named
+from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.session.session import DENSEST_INDEX, SensorData, Session
 from gelpolight_core.translation import tr
@@ -140,6 +144,8 @@ class SetupForm(QScrollArea):
         form = QFormLayout(box)
         self.lens_board = _BoardRow("setup.lens_board", tr("Lens views"))
         self.top_board = _BoardRow("setup.top_board", tr("Top surface"))
+        for row in (self.lens_board, self.top_board):
+            row.print.clicked.connect(lambda _=False, row=row: self._save_board(row.board()))
         form.addRow(tr("Lens views"), self.lens_board)
         form.addRow(tr("On the top surface"), self.top_board)
         return box
@@ -200,6 +206,30 @@ class SetupForm(QScrollArea):
         self.problem.setText(tr("Give the sensor a serial number to begin.") if missing else "")
         self.accept.setEnabled(not missing)
 
+    def _save_board(self, board: BoardSpec) -> None:
+        """Write the page with the stated board where the person says, and show it."""
+        from gelpolight_core.export.board_page import write_board  # heavy: it draws
+
+        across, down = board.inner_corners
+        usual = Path(f"checkerboard-{across}x{down}-{board.square_mm:g}mm.pdf")
+        place = QStandardPaths.StandardLocation.DocumentsLocation
+        chosen, _ = QFileDialog.getSaveFileName(
+            self,
+            tr("Save a checkerboard to print"),
+            str(Path(QStandardPaths.writableLocation(place)) / usual),
+            tr("PDF (*.pdf)"),
+        )
+        if not chosen:
+            return
+        try:
+            write_board(board, Path(chosen))
+        except InputError as error:
+            self.show_problem(str(error))
+            return
+        shown = QDesktopServices.openUrl(QUrl.fromLocalFile(chosen))
+        self.problem.setText("" if shown else tr("Written to {path}").format(path=chosen))
+        self.problem.setStyleSheet("")
+
     def _on_accept(self) -> None:
         self.accepted.emit(self.stated())
 
@@ -221,8 +251,16 @@ class _BoardRow(QWidget):
         row.addWidget(self.columns)
         row.addWidget(QLabel("x"))
         row.addWidget(self.rows)
-        row.addWidget(QLabel(tr("corners, squares of")))
+        row.addWidget(QLabel(tr("squares of")))
         row.addWidget(self.square, 1)
+        self.print = named(
+            QToolButton(),
+            f"{name}.print",
+            tr("{b}: save this board as a page to print").format(b=accessible),
+            tr("Save this board as a page to print, A4 at true size; measure it afterwards"),
+        )
+        self.print.setText(tr("Print…"))
+        row.addWidget(self.print)
 
     def show_board(self, board: BoardSpec) -> None:
         self.columns.setValue(board.inner_corners[0])

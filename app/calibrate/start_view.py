@@ -55,7 +55,7 @@ class StartView(QWidget):
         for name, text, signal in (
             ("new", tr("&New calibration"), self.new_wanted),
             ("open", tr("&Open a session folder…"), self.open_wanted),
-            ("demo", tr("Try it on the &virtual sensor"), self.demo_wanted),
+            ("demo", tr("&Try it on the virtual sensor"), self.demo_wanted),
         ):
             button = named(QPushButton(text), f"start.{name}", text.replace("&", ""))
             button.setMinimumHeight(40)

@@ -14,6 +14,7 @@ from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.translation import tr
 
 RUNNING = "running"
+BEGUN = "begun"
 SIZE = 18
 _ORDER = ("pass", "warn", "stale", "waiting", "empty", "fail")
 
@@ -23,6 +24,7 @@ def state_word(state: str) -> str:
     return {
         "empty": tr("empty"),
         "waiting": tr("not computed"),
+        BEGUN: tr("begun"),
         "stale": tr("stale"),
         "running": tr("running"),
         "pass": tr("pass"),
@@ -33,7 +35,8 @@ def state_word(state: str) -> str:
 
 def state_colour(state: str) -> QColor:
     """Return the colour for a state, in the theme of now."""
-    name = {"empty": "muted", "waiting": "stale", "running": "accent"}.get(state, state)
+    names = {"empty": "muted", BEGUN: "muted", "waiting": "stale", "running": "accent"}
+    name = names.get(state, state)
     return theme.colour(name)
 
 
@@ -65,6 +68,11 @@ def _paint(painter: QPainter, state: str, colour: QColor, back: QColor) -> None:
     pen = QPen(colour, 1.8)
     pen.setCapStyle(Qt.PenCapStyle.RoundCap)
     painter.setPen(pen)
+    if state == BEGUN:
+        painter.drawArc(box, 0, 360 * 16)
+        painter.setBrush(colour)
+        painter.drawPie(box, 90 * 16, -180 * 16)
+        return
     if state in ("empty", "waiting"):
         if state == "waiting":
             pen.setStyle(Qt.PenStyle.DotLine)
@@ -93,15 +101,21 @@ def _paint(painter: QPainter, state: str, colour: QColor, back: QColor) -> None:
 
 
 def step_state(
-    step: Step, statuses: Mapping[Stage, StageStatus], running: Stage | None
+    step: Step, statuses: Mapping[Stage, StageStatus], running: Stage | None, *, taken: int
 ) -> tuple[str, str]:
-    """Return the state of a step and what to say of it: those of its worst stage."""
+    """Return the state of a step and what to say of it: those of its worst stage.
+
+    One with too few pictures, `taken`, has not failed: the person is still at it.
+    """
     if not step.stages:
         return "empty", ""
     if running in step.stages:
         return RUNNING, tr("Computing")
     found = [statuses[stage] for stage in step.stages]
     worst = max(found, key=lambda status: _ORDER.index(status.state.value))
+    if worst.state is StageState.FAIL and 0 < taken < step.least:
+        said = tr("{n} taken; at least {m} are needed, {w} are better")
+        return BEGUN, said.format(n=taken, m=step.least, w=step.wanted)
     return worst.state.value, worst.sentence
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
-from app.calibrate.states import RUNNING, state_icon, state_word
+from app.calibrate.states import state_icon, state_word
 from app.calibrate.steps import Step
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -45,10 +45,6 @@ class StepList(QListWidget):
         for row, step in enumerate(self._steps):
             state, sentence = states.get(step.key, ("empty", ""))
             self._show_state(row, step, state, sentence)
-
-    def show_running(self, step: Step) -> None:
-        """Show that a step is being computed."""
-        self._show_state(self._steps.index(step), step, RUNNING, "")
 
     def _show_state(self, row: int, step: Step, state: str, sentence: str) -> None:
         item = self.item(row)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
@@ -14,6 +15,7 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QPushButton,
     QScrollArea,
+    QScrollBar,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
@@ -183,6 +185,7 @@ class StepPanel(QWidget):
     def _build_foot(self) -> QVBoxLayout:
         foot = QVBoxLayout()
         foot.setContentsMargins(12, 4, 12, 10)
+        foot.setSpacing(6)
         row = QHBoxLayout()
         self.progress = named(QProgressBar(), "calibrate.progress", tr("Progress"))
         self.progress.setRange(0, 100)
@@ -292,11 +295,25 @@ class StepPanel(QWidget):
         self.progress.setValue(round(100 * share))
 
 
+class _QuietBar(QScrollBar):
+    """A scroll bar that is not seen where there is nothing to scroll, but keeps its room.
+
+    Nothing beside it jumps when there is.
+    """
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the bar, or nothing."""
+        if self.maximum() > self.minimum():
+            super().paintEvent(event)
+
+
 def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
     """Return an area for a side panel that scrolls up and down only, and the widget in it."""
     scroll = named(QScrollArea(), name, accessible)
     scroll.setWidgetResizable(True)
     scroll.setFrameShape(QFrame.Shape.NoFrame)
+    scroll.setVerticalScrollBar(_QuietBar())
+    scroll.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
     scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     inside = QWidget()
@@ -307,7 +324,7 @@ def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
 def lay_button(name: str) -> QPushButton:
     """Return the button of the virtual bench; hidden where the camera is a real one."""
     button = named(
-        QPushButton(tr("Put it on the &virtual bench")),
+        QPushButton(tr("Put it on the virtual &bench")),
         name,
         tr("Put on the virtual bench what this step asks for"),
         tr("Each time the next view or press, as a technician would arrange it"),

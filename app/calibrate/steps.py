@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.optics.lens_views import MIN_VIEWS
 from gelpolight_core.translation import tr
 
 
@@ -28,6 +29,8 @@ class Step:
         Frames averaged into one capture.
     wanted : int
         Captures that make a good stage.
+    least : int
+        Captures without which there is no stage.
     """
 
     key: str
@@ -37,6 +40,7 @@ class Step:
     assembly: str
     frames: int = 1
     wanted: int = 1
+    least: int = 1
 
     @property
     def stage(self) -> Stage | None:
@@ -72,6 +76,7 @@ def all_steps() -> tuple[Step, ...]:
             ),
             "camera",
             wanted=12,
+            least=MIN_VIEWS,
         ),
         Step(
             "top_pose",

@@ -7,28 +7,33 @@ import math
 from app.live.picture_checks import Rgb
 from gelpolight_core.session.movement import MOVING_SHARE, moving_share
 
-# Half a second at 30 frames/s: a hand that lets go shakes for a few tenths.
-STILL_FRAMES = 15
+# A hand that lets go shakes for a few tenths of a second.
+STILL_S = 0.5
+# Counted in time, as detection sees two frames a second or thirty; but never by a single pair.
+STILL_FRAMES = 3
 
 
 class Still:
     """Watches consecutive frames and says when nothing has moved for a while."""
 
-    def __init__(self, frames: int = STILL_FRAMES) -> None:
-        self._needed = frames
+    def __init__(self, still_s: float = STILL_S) -> None:
+        self._still_s = still_s
         self._before: Rgb | None = None
-        self._quiet = 0
+        self._quiet, self._since_s = 0, 0.0
         self.moving = math.nan
 
-    def update(self, rgb: Rgb) -> bool:
-        """Take in the next frame; return whether the last ones were all alike."""
+    def update(self, rgb: Rgb, time_s: float) -> bool:
+        """Take in the next frame and when it was made; return whether the last were all alike."""
         before, self._before = self._before, rgb
-        if before is None or before.shape != rgb.shape or before.dtype != rgb.dtype:
-            self._quiet = 0
+        alike = before is not None and before.shape == rgb.shape and before.dtype == rgb.dtype
+        if before is not None and alike:
+            self.moving = moving_share(before, rgb)
+            alike = self.moving <= MOVING_SHARE
+        if not alike:
+            self._quiet, self._since_s = 0, time_s
             return False
-        self.moving = moving_share(before, rgb)
-        self._quiet = self._quiet + 1 if self.moving <= MOVING_SHARE else 0
-        return self._quiet >= self._needed
+        self._quiet += 1
+        return self._quiet >= STILL_FRAMES and time_s - self._since_s >= self._still_s
 
     @property
     def moves(self) -> bool:

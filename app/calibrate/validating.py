@@ -7,12 +7,16 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer
+from PySide6.QtWidgets import QFileDialog
 
 from app.calibrate.controller import CalibrationController
+from app.calibrate.look import read_raw
 from app.calibrate.maps import Panel
-from app.calibrate.trial import Trial, run_trial
+from app.calibrate.trial import KnownObject, Trial, run_trial
 from app.calibrate.validation_panel import ValidationPanel
 from app.shell.context import AppContext
 from app.shell.jobs import Job
@@ -20,11 +24,13 @@ from app.sources.source import Frame
 from app.workspace.validation import Validation, read_validation, write_validation
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
 FRAMES = 4
 POLL_MS = 50
+TRUTH = "truth.csv"
 
 
 class Validating(QObject):
@@ -47,6 +53,7 @@ class Validating(QObject):
         panel.size_limit.setValue(limits.size_percent)
         panel.height_limit.setValue(limits.height_percent)
         panel.trial_wanted.connect(self.measure)
+        panel.import_wanted.connect(self.choose_press)
         panel.keep_wanted.connect(self.keep)
         panel.show_calibration("")
         self._find_earlier()
@@ -104,6 +111,32 @@ class Validating(QObject):
             self._panel.show_work(0.0)
             self._poll.start()
 
+    def choose_press(self) -> None:
+        """Let the person choose a press's picture, and measure it."""
+        presses = self._controller.project.session.folder / "presses"
+        folder = presses if presses.is_dir() else self._context.settings.last_folder
+        chosen, _ = QFileDialog.getOpenFileName(
+            self._panel,
+            tr("Import a picture of a press"),
+            str(folder),
+            tr("Pictures (*.png *.tif *.tiff)"),
+        )
+        if chosen:
+            self.import_press(Path(chosen))
+
+    def import_press(self, path: Path) -> None:
+        """Measure a press from a picture file; its truth is what stands beside it, if anything."""
+        self._panel.show_work(0.0)
+        try:
+            frame = read_raw(path)
+            known = _known_beside(path)
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        if known is not None:
+            self._panel.show_known(known)
+        self._measure([frame])
+
     def _on_poll(self) -> None:
         if self._capture is None or not self._capture.done():
             return
@@ -113,7 +146,9 @@ class Validating(QObject):
         if error is not None:
             self._refuse(str(error))
             return
-        frames = [frame.rgb for frame in future.result()]
+        self._measure([frame.rgb for frame in future.result()])
+
+    def _measure(self, frames: list[NDArray[Any]]) -> None:
         panel = self._panel
         known, path = panel.known(), self._path
         size_limit, height_limit = panel.size_limit.value(), panel.height_limit.value()
@@ -193,6 +228,22 @@ class Validating(QObject):
             self._panel.show_verdict(
                 tr("Not validated: the recorded trial is beyond its limits."), passed=False
             )
+
+
+def _known_beside(path: Path) -> KnownObject | None:
+    """Return the object that a truth.csv beside a press's picture states; None where none does.
+
+    Raises
+    ------
+    InputError
+        If there is one that cannot be used.
+    """
+    if not (path.parent / TRUTH).is_file():
+        return None
+    for row in read_truth(path.parent).rows:
+        if row.file == path.name:
+            return KnownObject(row.truth.shape, row.truth.size_mm, row.truth.height_mm)
+    return None
 
 
 def _who() -> str:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
+    QHBoxLayout,
     QLabel,
     QProgressBar,
     QPushButton,
@@ -33,12 +34,15 @@ class ValidationPanel(QWidget):
         Put on the virtual bench what this step asks for.
     trial_wanted()
         Capture and measure now.
+    import_wanted()
+        Measure the picture of a press from a file.
     keep_wanted()
         Record the trial as this calibration's validation.
     """
 
     lay_wanted = Signal()
     trial_wanted = Signal()
+    import_wanted = Signal()
     keep_wanted = Signal()
 
     def __init__(self, step: Step, parent: QWidget | None = None) -> None:
@@ -76,7 +80,17 @@ class ValidationPanel(QWidget):
         )
         self.measure.setMinimumHeight(38)
         self.measure.clicked.connect(self.trial_wanted)
-        column.addWidget(self.measure)
+        self.import_press = named(
+            QPushButton(tr("&Import…")),
+            "validation.import",
+            tr("Measure a press from a picture file"),
+            tr("Its true size is taken from a truth.csv beside it, where there is one"),
+        )
+        self.import_press.clicked.connect(self.import_wanted)
+        row = QHBoxLayout()
+        row.addWidget(self.measure, 2)
+        row.addWidget(self.import_press, 1)
+        column.addLayout(row)
         self.blocked = named(QLabel(), "validation.blocked", tr("Why nothing can be measured"))
         self.blocked.setWordWrap(True)
         column.addWidget(self.blocked)
@@ -162,9 +176,10 @@ class ValidationPanel(QWidget):
 
     def _allow(self) -> None:
         self.measure.setEnabled(self._has_calibration and self._has_camera)
+        self.import_press.setEnabled(self._has_calibration)
         why = ""
         if self._has_calibration and not self._has_camera:
-            why = tr("No camera: choose one in the bar above.")
+            why = tr("No camera: choose one in the bar above, or import a picture.")
         self.blocked.setText(why)
         self.blocked.setVisible(bool(why))
 

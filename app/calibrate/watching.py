@@ -81,7 +81,7 @@ class Watching(QObject):
 
         def look(frame: Frame) -> Seen | None:
             # Watched whatever is looked for: a movement must not be missed for a new detection.
-            quiet = self._still.update(frame.rgb)
+            quiet = self._still.update(frame.rgb, frame.time_s)
             self._moved = self._moved or self._still.moves
             if detect is None:
                 return None

@@ -15,7 +15,8 @@ from app.calibrate.looking import Looking
 from app.calibrate.maps import Panel, panels_of, refraction_panels
 from app.calibrate.pictures import PICTURE, RESULT
 from app.calibrate.saving import Saving
-from app.calibrate.states import RUNNING, is_done, step_state
+from app.calibrate.states import BEGUN, RUNNING, is_done, step_state
+from app.calibrate.steps import Step
 from app.calibrate.takes import takes_of
 from app.calibrate.trial import KnownObject
 from app.calibrate.validating import Validating
@@ -44,6 +45,7 @@ class Wizard(WizardFrame):
     def __init__(self, project: CalibrationProject, *, context: AppContext) -> None:
         super().__init__(project, context=context)
         self._statuses: dict[Stage, StageStatus] = project.statuses()
+        self._running: Stage | None = None
         self._build_keys()
         self.looking = Looking(self.controller, self.pictures, self.panel, self.step)
         self.saving = Saving(self.controller, self.result, context=context)
@@ -85,6 +87,8 @@ class Wizard(WizardFrame):
         pictures.live_wanted.connect(self.looking.live)
         pictures.reconnect_wanted.connect(self.camera.open)
         pictures.view.clicked.connect(self._on_clicked)
+        pictures.view.dragged.connect(self.bench_dock.drag)
+        self.bench_dock.visibilityChanged.connect(self._follow_bench)
         pictures.view.refused.connect(self._refuse)
         pictures.view.saved.connect(
             lambda path: self.panel.show_notice(tr("Saved {p}").format(p=path), "pass")
@@ -97,6 +101,7 @@ class Wizard(WizardFrame):
         controller.captured.connect(self._on_captured)
         controller.progressed.connect(self._on_progress)
         controller.refused.connect(self._refuse)
+        controller.changed.connect(self.outside.look)
         self.saving.saved.connect(self.validating.take)
         self.validating.show_pictures_in(self._show_trial)
         self.camera.switched.connect(self._on_camera)
@@ -108,11 +113,13 @@ class Wizard(WizardFrame):
     def enter(self) -> None:
         """Look at the camera, as the wizard is shown."""
         self.camera.enter(True)
+        self.outside.watch(True)
         self._focus_on_what_comes_next()
 
     def leave(self) -> None:
         """Let the camera go, as the wizard is hidden."""
         self.camera.enter(False)
+        self.outside.watch(False)
 
     def close_session(self) -> None:
         """End all work; everything captured and decided is on disk."""
@@ -140,12 +147,18 @@ class Wizard(WizardFrame):
             self.validation.show_known(KnownObject(scene.item, scene.size_mm, scene.depth_mm))
         self.looking.live()
 
+    def _follow_bench(self) -> None:
+        """Let drags move what lies on the bench, where it is shown beside the live picture."""
+        live = not self.looking.name and self.bench_dock.in_use
+        self.pictures.view.hand_drags_on(live and not self.bench_dock.isHidden())
+
     def _on_clicked(self, u: float, v: float) -> None:
         if not self.looking.name:
             self.bench_dock.drag_to(u, v)
 
     def _refuse(self, sentence: str) -> None:
         """Say on the page why something came to nothing."""
+        self.outside.look()
         if self.isVisible() and self.side.currentWidget() is self.panel:
             self.panel.show_notice(sentence, "fail")
         else:
@@ -157,8 +170,8 @@ class Wizard(WizardFrame):
         """Return the first step that is not complete."""
         for step in self.steps:
             if step.stage is not None:
-                state, _ = step_state(step, self._statuses, None)
-                if state in (StageState.EMPTY.value, StageState.FAIL.value):
+                state, _ = self._state_of(step, None)
+                if state in (StageState.EMPTY.value, BEGUN, StageState.FAIL.value):
                     return step.key
         return "result"
 
@@ -230,21 +243,27 @@ class Wizard(WizardFrame):
         """Show how everything stands now."""
         self._statuses = self.controller.statuses()
         running = self.controller.running
-        states = {s.key: step_state(s, self._statuses, running) for s in self.steps}
+        states = {s.key: self._state_of(s, running) for s in self.steps}
         states["validation"] = self.validating.state
         self.step_list.show_states(states)
         self._show_state(*states[self.step.key])
         self.pictures.strip.show_takes(
             takes_of(self.step, self.project, self._statuses, self.controller.lens_views())
         )
-        self.result.show_statuses(self._statuses, running)
+        self.result.show_statuses(self._statuses, running, busy=self.controller.jobs.busy)
         self._show_maps()
         if self.step.key == "reflectance" and self.curves is not None:
             self.curves.take_results()
         self.looking.refresh()
 
+    def _count(self, step: Step) -> int:
+        return len(self.project.session.found(step.folder)) if step.stage else 0
+
+    def _state_of(self, step: Step, running: Stage | None) -> tuple[str, str]:
+        return step_state(step, self._statuses, running, taken=self._count(step))
+
     def _show_state(self, state: str, sentence: str) -> None:
-        count = len(self.project.session.found(self.step.folder)) if self.step.stage else 0
+        count = self._count(self.step)
         self.panel.show_count(count)
         if state == RUNNING:
             self.panel.show_running()
@@ -294,13 +313,10 @@ class Wizard(WizardFrame):
 
     def _on_progress(self, title: str, share: float) -> None:
         self.panel.show_work(title, share)
-        if not title:
+        running = self.controller.running
+        if not title or running is not self._running:
+            self._running = running
             self._refresh()
-        elif self.controller.running is not None:
-            running = self.controller.running
-            for step in self.steps:
-                if running in step.stages:
-                    self.step_list.show_running(step)
 
     # Pictures
 
@@ -313,6 +329,7 @@ class Wizard(WizardFrame):
 
     def _on_looked(self) -> None:
         self._live_key.setEnabled(bool(self.looking.name))
+        self._follow_bench()
         if self.step.key == "refraction":
             self._show_refraction()
 

@@ -11,12 +11,14 @@ from PySide6.QtWidgets import (
     QStackedWidget,
     QToolBar,
     QUndoView,
+    QVBoxLayout,
     QWidget,
 )
 
 from app.calibrate.bench_dock import BenchDock
 from app.calibrate.camera_link import CameraLink
 from app.calibrate.controller import CalibrationController
+from app.calibrate.outside import OutsideBar
 from app.calibrate.pictures import Pictures
 from app.calibrate.result_view import ResultView
 from app.calibrate.setup_form import SetupForm
@@ -70,9 +72,14 @@ class WizardFrame(QMainWindow):
 
     def _build(self) -> None:
         middle = QWidget()
-        row = QHBoxLayout(middle)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(0)
+        column = QVBoxLayout(middle)
+        row = QHBoxLayout()
+        for layout in (column, row):
+            layout.setContentsMargins(0, 0, 0, 0)
+            layout.setSpacing(0)
+        self.outside = OutsideBar(self.controller)
+        column.addWidget(self.outside)
+        column.addLayout(row, 1)
         self.step_list = StepList(self.steps)
         self.pictures = Pictures()
         self.setup = SetupForm()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QSignalBlocker, Signal
 from PySide6.QtWidgets import QComboBox, QWidget
 
+from app.inspect.advice import Known
 from app.sensors.calibration_actions import show_in_use
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
@@ -16,6 +18,8 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 WIDTH_CHARACTERS = 22
+# From here on parts may be compiled, which takes a minute the first time.
+WARM_FROM = 0.2
 
 
 class CalibrationBox(QComboBox):
@@ -90,13 +94,15 @@ class Library(QObject):
             return
         self._read(used.path)
 
-    def use_what_fits(self, size: tuple[int, int]) -> bool:
-        """Put a calibration for pictures of this size into use; whether there is one."""
+    def use_what_fits(self, serial: str, size: tuple[int, int] | None) -> None:
+        """Put the newest calibration for such pictures into use; empty and None fit all."""
         for entry in self.entries:
-            if entry.summary is not None and entry.summary.picture_size == size:
+            summary = entry.summary
+            if summary is not None and Known(summary.serial, summary.picture_size).fits(
+                serial, size
+            ):
                 self._use(entry.path)
-                return True
-        return False
+                return
 
     def _on_chosen(self, index: int) -> None:
         path = self._box.itemData(index)
@@ -110,17 +116,21 @@ class Library(QObject):
         self._context.requests.calibrations_changed.emit()
 
     def _read(self, path: Path) -> None:
-        def work(_tell: object) -> object:
+        def work(tell: Callable[[float], None]) -> object:
+            from app.inspect.products import warm_up
             from gelpolight_core.calibration.file import read_calibration
             from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
             calibration = read_calibration(path)
             live = Reconstructor(calibration, effort="balanced")
+            tell(WARM_FROM)
+            live.warm_up()
+            warm_up()
             return path, live, Reconstructor(calibration)
 
         def done(found: tuple[Path, object, object]) -> None:
             if self._state[:1] == found[:1]:
                 self.loaded.emit(*found[1:])
 
-        title = tr("Reading the calibration")
+        title = tr("Getting the calibration ready")
         self._jobs.submit(Job(title, work, done, lambda s: self._context.toasts.show(s, "fail")))

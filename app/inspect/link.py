@@ -14,6 +14,7 @@ from app.inspect.products import Maker, Shown, Wanted
 from app.shell.context import AppContext
 from app.sources.mailbox import Mailbox
 from app.sources.processor import Failure, Outcome, Processor
+from app.sources.recording import RecordingSource
 from app.sources.source import Frame
 from app.sources.stream import Stream
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -106,6 +107,24 @@ class LiveLink(QObject):
     def reconstructor(self) -> Reconstructor | None:
         """What makes depth of a standing picture, as good as it can."""
         return self._maker.best
+
+    @property
+    def live(self) -> Reconstructor | None:
+        """What makes depth of moving pictures."""
+        return self._maker.live
+
+    @property
+    def serial(self) -> str:
+        """Serial of the sensor that the source is known to be; empty where it is not known."""
+        choice = self._context.source
+        if choice.info is None or self.stream is None:
+            return ""
+        if choice.info.kind == "virtual" and choice.bench is not None:
+            return choice.bench.design.serial
+        source = self.stream.source
+        if isinstance(source, RecordingSource) and source.header is not None:
+            return source.header.serial
+        return ""
 
     def use(self, live: Reconstructor | None, best: Reconstructor | None = None) -> None:
         """Reconstruct with these from now on; what is under way is dropped."""
@@ -204,7 +223,7 @@ class LiveLink(QObject):
         self._context.status.update(
             rate_hz=figures.rate_hz,
             dropped=figures.dropped + self._inbox.unprocessed,
-            processing_ms=None if self.last is None else self.last.total_ms,
+            processing_ms=(self.last.total_ms or None) if self.last is not None else None,
         )
         if figures.lost:
             self._say(figures.lost)

@@ -71,6 +71,7 @@ class LookPanel(QWidget):
         form.addRow("", self._relief)
         form.addRow(tr("Stretch"), self._stretch)
         form.addRow(tr("Light"), lamp)
+        self._high.setValue(1.0)
         self.show_look(Look())
         self._connect()
 

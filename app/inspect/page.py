@@ -6,10 +6,13 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.inspect.actions import Deeds
+from app.inspect.advice import Known, Situation, advise
 from app.inspect.banner import Banner
 from app.inspect.first_calibration import calibrate_virtual_sensor
 from app.inspect.library import CalibrationBox, Library
@@ -58,6 +61,8 @@ class InspectPage(QWidget):
         self._shown: Shown | None = None
         self._trouble = self._recorded = self._drift = ""
         self._drift_due = False
+        self._size: tuple[int, int] | None = None
+        self._loaded: tuple[Reconstructor | None, Reconstructor | None] = None, None
         self._lay_out()
         self._connect()
         self.views.restore()
@@ -132,10 +137,13 @@ class InspectPage(QWidget):
 
     def may_close(self) -> bool:
         """Nothing is lost by closing."""
-        self.recorder.stop()
+        self.recorder.close()
         self.link.enter(False)
         self.views.keep()
         self.jobs.close()
+        # The reconstructors' threads end with the last reference to them.
+        self._loaded = None, None
+        self.link.use(None)
         self.views.finish()
         return True
 
@@ -164,6 +172,10 @@ class InspectPage(QWidget):
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
+        size = shown.frame.rgb.shape[1], shown.frame.rgb.shape[0]
+        if size != self._size:
+            self._size = size
+            self._advise()
         if self._drift_due and shown.frame.settled and shown.heightmap is not None:
             self._drift_due = False
             self._look_for_drift(shown)
@@ -185,12 +197,10 @@ class InspectPage(QWidget):
         )
 
     def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
-        self._places, self._drift, self._drift_due = None, "", True
-        if live is not None:
-            self._places = PixelPlaces(live.calibration.table)
-            self.views.prepare()
-        self.link.use(live, best)
-        self.views.forget()
+        """Look through another calibration, where it belongs to the pictures."""
+        self._loaded = live, best
+        self._drift, self._drift_due = "", True
+        self.link.use(None)
         self._advise()
 
     # The cursor
@@ -210,7 +220,7 @@ class InspectPage(QWidget):
         self.views.show_cursor(*self._cursor)
         self._tell()
 
-    def _depth(self):
+    def _depth(self) -> NDArray[np.float32] | None:
         heightmap = None if self._shown is None else self._shown.heightmap
         return None if heightmap is None else heightmap.depth_mm
 
@@ -230,6 +240,7 @@ class InspectPage(QWidget):
 
     def _on_source(self) -> None:
         self.recorder.stop()
+        self._size, self._drift, self._drift_due = None, "", True
         self.link.open()
         self._advise()
 
@@ -245,40 +256,35 @@ class InspectPage(QWidget):
         self._trouble = sentence
         self._advise()
 
-    def _advise(self) -> None:
-        """Say what to do next, where something is missing."""
-        info = self.context.source.info
-        if info is None:
-            self.banner.advise(
-                tr("No camera: choose where the pictures come from, or try the virtual sensor."),
-                ("virtual", tr("Use the virtual sensor")),
-            )
-        elif self.link.reconstructor is None:
-            text = tr("No calibration is in use: only the camera's picture can be shown.")
-            if info.kind == "virtual":
-                act = ("calibrate", tr("Calibrate the virtual sensor now"))
-            else:
-                act = ("sensors", tr("Choose or calibrate a sensor"))
-            self.banner.advise(text, act)
-        elif self._trouble:
-            self.banner.advise(self._trouble, self._mend(), role="fail")
-        else:
-            act = ("zero", tr("Set to zero")) if self._drift else ("", "")
-            self.banner.advise(self._drift, act, role="warn")
+    def _situation(self) -> Situation:
+        info, (live, _) = self.context.source.info, self._loaded
+        used = None
+        if live is not None:
+            camera = live.calibration.camera
+            used = Known(live.calibration.sensor.serial, (camera.width, camera.height))
+        summaries = (entry.summary for entry in self.library.entries)
+        return Situation(
+            kind="" if info is None else info.kind,
+            serial=self.link.serial,
+            size=self._size,
+            used=used,
+            library=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
+            trouble=self._trouble,
+            drift=self._drift,
+        )
 
-    def _mend(self) -> tuple[str, str]:
-        """Return what could help with a picture of another size."""
-        link, info = self.link, self.context.source.info
-        if link.stream is not None and link.reconstructor is not None and self._shown is not None:
-            rows, columns = self._shown.frame.rgb.shape[:2]
-            camera = link.reconstructor.calibration.camera
-            if (columns, rows) != (camera.width, camera.height):
-                sizes = {e.summary.picture_size for e in self.library.entries if e.summary}
-                if (columns, rows) in sizes:
-                    return "fitting", tr("Use a calibration that fits")
-                if info is not None and info.kind == "virtual":
-                    return "calibrate", tr("Calibrate the virtual sensor now")
-        return ("reopen", tr("Open it again")) if link.stream is not None else ("", "")
+    def _advise(self) -> None:
+        """Say what to do next, and look through the calibration only where it fits."""
+        advice = advise(self._situation())
+        self.banner.advise(advice.text, (advice.act, advice.button), role=advice.role)
+        live, best = self._loaded if advice.usable else (None, None)
+        if live is self.link.live:
+            return
+        self._places = None if live is None else PixelPlaces(live.calibration.table)
+        if live is not None:
+            self.views.prepare()
+        self.link.use(live, best)
+        self.views.forget()
 
     def _on_act(self, name: str) -> None:
         match name:
@@ -288,9 +294,8 @@ class InspectPage(QWidget):
                 self.calibrate_now()
             case "sensors":
                 self.context.requests.page.emit("sensors")
-            case "fitting" if self._shown is not None:
-                rows, columns = self._shown.frame.rgb.shape[:2]
-                self.library.use_what_fits((columns, rows))
+            case "fitting":
+                self.library.use_what_fits(self.link.serial, self._size)
             case "reopen":
                 self.link.open()
             case "zero":

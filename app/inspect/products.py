@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from app.inspect import shading
 from app.inspect.cuts import Cut, Section, cut
 from app.inspect.look import LEAST_RANGE_MM, Look, colour_table
-from app.inspect.surface import Surface, surface_of
+from app.inspect.surface import LIVE_NODES, Surface, surface_of
 from app.sources.source import Frame
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-# Coarse while live: a software renderer draws so many nodes in time. The texture has the detail.
-LIVE_NODES = 160
 LIVE_PX = 560
 STILL_PX = 2000
 SURROUND = (21, 23, 26)
@@ -199,12 +197,15 @@ class _Pictures:
     def _shaded(self) -> NDArray[np.uint8]:
         if self._lit is None:
             look = self._look
-            lit = shading.shaded(
-                self._coloured(), self._depth, self._pitch_mm, look.light, look.exaggeration
+            self._lit = shading.shaded(
+                self._depth,
+                self._pitch_mm,
+                colour_table(look.colours),
+                self.range_mm,
+                look.light,
+                exaggeration=look.exaggeration,
+                contour_mm=look.contour_mm,
             )
-            if look.contour_mm > 0.0:
-                lit = shading.with_contours(lit, self._depth, look.contour_mm)
-            self._lit = lit
         return self._lit
 
     def height(self) -> NDArray[np.uint8]:
@@ -241,5 +242,12 @@ class _Pictures:
 
     def surface(self) -> Surface:
         """Return the mesh's nodes and their texture."""
-        largest = None if self._wanted.still else LIVE_NODES
-        return surface_of(self._map, self._shaded(), largest)
+        if self._wanted.still:
+            return surface_of(self._map, self._shaded())
+        return surface_of(self._map, self._shaded(), largest=LIVE_NODES, depth_mm=self._depth)
+
+
+def warm_up() -> None:
+    """Compile what the first picture would wait for."""
+    flat, look = np.zeros((8, 8), np.float32), Look()
+    shading.shaded(flat, 0.1, colour_table(look.colours), (0.0, 1.0), look.light)

@@ -47,13 +47,16 @@ class RecordControl(QObject):
         self._timer.timeout.connect(self._poll)
 
     @property
-    def recording(self) -> bool:
-        """Whether a recording is under way."""
+    def busy(self) -> bool:
+        """Whether a recording is under way, or still being written."""
         return self._recorder is not None
 
     def toggle(self) -> None:
         """Begin to record, or end it."""
-        self.stop() if self._recorder is not None else self.start()
+        if self._recorder is None:
+            self.start()
+        else:
+            self.stop()
 
     def start(self) -> None:
         """Record into a new file of the sensor's folder."""
@@ -84,14 +87,33 @@ class RecordControl(QObject):
         self._timer.start()
 
     def stop(self) -> None:
-        """End the recording; harmless when there is none."""
+        """Take no more frames; what waits for the disk is still written, meanwhile."""
+        if self._recorder is not None:
+            self._recorder.finish()
+        self.action.setChecked(False)
+
+    def close(self) -> None:
+        """End the recording, and wait for what is still to be written."""
+        self._timer.stop()
         recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            recorder.stop()
+
+    def _poll(self) -> None:
+        if self._recorder is None:
+            return
+        figures = self._recorder.figures()
+        if figures.finished:
+            self._tell_finished(self._recorder, figures)
+            return
+        words = tr("Recording: {words}") if self.action.isChecked() else tr("Writing: {words}")
+        self.told.emit(words.format(words=recorder_text(figures)))
+
+    def _tell_finished(self, recorder: Recorder, figures: RecorderFigures) -> None:
+        self._recorder = None
         self._timer.stop()
         self.action.setChecked(False)
         self.told.emit("")
-        if recorder is None:
-            return
-        figures = recorder.stop()
         if figures.failure:
             self._context.toasts.show(figures.failure, "fail")
             return
@@ -101,15 +123,6 @@ class RecordControl(QObject):
         replay = (tr("Replay"), lambda: self._context.source.choose_recording(recorder.path))
         kind = "warn" if figures.lost else "pass"
         self._context.toasts.show(text, kind, actions=(replay,))
-
-    def _poll(self) -> None:
-        if self._recorder is None:
-            return
-        figures = self._recorder.figures()
-        if figures.failure or figures.finished:
-            self.stop()
-            return
-        self.told.emit(tr("Recording: {words}").format(words=recorder_text(figures)))
 
 
 def recording_path(workspace: Workspace, serial: str) -> Path:

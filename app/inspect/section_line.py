@@ -11,6 +11,7 @@ from PySide6.QtGui import QColor, QPolygonF
 from PySide6.QtWidgets import QGraphicsPolygonItem
 
 from app.inspect.map_view import MapView
+from app.widgets.plots import own_handle_menus
 from gelpolight_core.measurement.area import Rectangle
 
 INK = "#ff5ac8"
@@ -39,6 +40,7 @@ class SectionLine(QObject):
             hoverPen=pg.mkPen("#ffffff", width=2),
             handlePen=pg.mkPen(INK, width=2),
         )
+        own_handle_menus(self._roi, view)
         self._roi.setZValue(30)
         self._band = QGraphicsPolygonItem()
         self._band.setBrush(BAND)
@@ -107,6 +109,7 @@ class RegionBox(QObject):
             hoverPen=pg.mkPen("#ffffff", width=2),
             handlePen=pg.mkPen(REGION_INK, width=2),
         )
+        own_handle_menus(self._roi, view)
         self._roi.setZValue(28)
         self._roi.setVisible(False)
         view.box.addItem(self._roi, ignoreBounds=True)

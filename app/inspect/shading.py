@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.inspect.look import Light
+from app.inspect.shade_kernel import shade
 from gelpolight_core.reconstruction.heightmap import Flag
 
 Map = NDArray[np.float32]
@@ -16,7 +18,6 @@ Rgb = NDArray[np.uint8]
 
 AMBIENT = 0.38
 SHINE = 46.0
-SHININESS = 24
 HOLLOW = 1.1
 HOLLOW_MM = 0.5
 
@@ -24,10 +25,11 @@ HOLLOW_MM = 0.5
 def fitted(values: NDArray[Any], largest_px: int) -> NDArray[Any]:
     """Return a map or picture no larger than so many pixels a side, averaged."""
     rows, columns = values.shape[:2]
-    scale = largest_px / max(rows, columns)
-    if scale >= 1.0:
+    # A whole factor: averages over equal blocks are by far the fastest.
+    factor = -(-max(rows, columns) // largest_px)
+    if factor <= 1:
         return values
-    size = max(round(scale * columns), 2), max(round(scale * rows), 2)
+    size = max(round(columns / factor), 2), max(round(rows / factor), 2)
     return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA))
 
 
@@ -36,7 +38,7 @@ def automatic_range(depth_mm: Map, least_mm: float) -> tuple[float, float]:
 
     Negative depths, as beside a press where the gel is pushed out, come in where they count.
     """
-    some = depth_mm[::4, ::4]
+    some = depth_mm[::8, ::8]
     low, high = (float(v) for v in np.percentile(some[np.isfinite(some)], (0.5, 99.9)))
     high = max(high, least_mm)
     return (low if low < -0.1 * high else 0.0), high
@@ -59,45 +61,54 @@ def slopes(depth_mm: Map, pitch_mm: float) -> tuple[Map, Map]:
     return np.asarray(along_x), np.asarray(along_y)
 
 
-def shaded(rgb: Rgb, depth_mm: Map, pitch_mm: float, light: Light, exaggeration: float) -> Rgb:
-    """Return a coloured depth map under a lamp, with a gloss, and darker in its hollows.
+def shaded(
+    depth_mm: Map,
+    pitch_mm: float,
+    table: Rgb,
+    range_mm: tuple[float, float],
+    light: Light,
+    *,
+    exaggeration: float = 1.0,
+    contour_mm: float = 0.0,
+) -> Rgb:
+    """Return a depth map in colours under a lamp, with a gloss, and darker in its hollows.
 
     Parameters
     ----------
-    rgb : (rows, columns, 3)
-        The colours.
-    depth_mm : (rows, columns)
+    depth_mm : (rows, columns) float32
         Up is towards the viewer.
     pitch_mm : float
         Between its pixels.
+    table : (256, 3) uint8
+        The colours.
+    range_mm : (low, high)
+        Depths of the first and the last colour.
     light : Light
         The lamp.
-    exaggeration : float
+    exaggeration : float, optional
         Of depth against width.
+    contour_mm : float, optional
+        Between contour lines; 0: none.
     """
-    slope_x, slope_y = slopes(depth_mm, pitch_mm / exaggeration)
     to_light = light.direction()
     half_way = to_light + np.array([0.0, 0.0, 1.0])
     half_way /= np.linalg.norm(half_way)
-    length = cv2.sqrt(slope_x * slope_x + slope_y * slope_y + np.float32(1.0))
-    bright = _dot(slope_x, slope_y, to_light) / length
     side = 2 * max(int(0.5 * HOLLOW_MM / pitch_mm), 1) + 1
-    hollow = cv2.subtract(cv2.blur(depth_mm, (side, side)), depth_mm) * np.float32(
-        HOLLOW * exaggeration
+    out = np.empty((*depth_mm.shape, 3), np.uint8)
+    low, high = range_mm
+    shade(
+        np.ascontiguousarray(depth_mm, np.float32),
+        np.asarray(cv2.blur(depth_mm, (side, side)), np.float32),
+        table,
+        (low, 255.0 / max(high - low, 1e-9)),
+        tuple(map(float, to_light)),
+        tuple(map(float, half_way)),
+        (AMBIENT, SHINE, HOLLOW * exaggeration),
+        0.5 * exaggeration / pitch_mm,
+        float(contour_mm),
+        out,
     )
-    lit = AMBIENT + (1.0 - AMBIENT) * np.maximum(bright / to_light[2], 0.0) - np.clip(hollow, 0, 1)
-    gain = cv2.convertScaleAbs(np.clip(lit, 0.12, 1.6).astype(np.float32), alpha=128.0)
-    result = cv2.multiply(rgb, cv2.merge([gain] * 3), scale=1.0 / 128.0)
-    glint = np.maximum(_dot(slope_x, slope_y, half_way) / length, np.float32(0.0))
-    # Of flat places no gloss, or all of the picture would be veiled by it.
-    base = float(half_way[2]) ** SHININESS
-    shine = cv2.convertScaleAbs(np.maximum(cv2.pow(glint, SHININESS) - base, 0.0), alpha=SHINE)
-    return np.asarray(cv2.add(result, cv2.merge([shine] * 3)), np.uint8)
-
-
-def _dot(slope_x: Map, slope_y: Map, direction: NDArray[np.float64]) -> Map:
-    x, y, z = (np.float32(v) for v in direction)
-    return np.asarray(z - x * slope_x - y * slope_y, np.float32)
+    return out
 
 
 def with_contours(rgb: Rgb, depth_mm: Map, step_mm: float) -> Rgb:
@@ -132,5 +143,9 @@ def flag_colours(
 
 def outside_filled(rgb: Rgb, outside: NDArray[np.uint8], colour: tuple[int, int, int]) -> Rgb:
     """Return a picture with one colour where nothing is measured; `rgb` may be written on."""
-    rgb[outside != 0] = colour
-    return rgb
+    return np.asarray(cv2.copyTo(_filled(rgb.shape[:2], colour), outside, rgb), np.uint8)
+
+
+@lru_cache(maxsize=4)
+def _filled(shape: tuple[int, int], colour: tuple[int, int, int]) -> Rgb:
+    return np.full((*shape, 3), colour, np.uint8)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+
+# Coarse while live: a software renderer draws so many nodes in time. The texture has the detail.
+LIVE_NODES = 160
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +38,16 @@ class Surface:
     extent_mm: tuple[float, float, float, float]
     texture: NDArray[np.uint8]
 
+    def thinned(self, largest: int) -> Surface:
+        """Return it with no more nodes than this a side; the texture keeps its detail."""
+        rows, columns = self.depth_mm.shape
+        down = np.linspace(0, rows - 1, min(rows, largest)).round().astype(int)
+        across = np.linspace(0, columns - 1, min(columns, largest)).round().astype(int)
+        nodes = np.ix_(down, across)
+        return replace(
+            self, x_mm=self.x_mm[nodes], y_mm=self.y_mm[down], depth_mm=self.depth_mm[nodes]
+        )
+
     def depth_at(self, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the depth of the node nearest to each place; -inf off the surface."""
         rows, columns = self.depth_mm.shape
@@ -49,7 +62,11 @@ class Surface:
 
 
 def surface_of(
-    heightmap: HeightMap, texture: NDArray[np.uint8], largest: int | None
+    heightmap: HeightMap,
+    texture: NDArray[np.uint8],
+    *,
+    largest: int | None = None,
+    depth_mm: NDArray[np.float32] | None = None,
 ) -> Surface | None:
     """Return the surface of a height map.
 
@@ -59,20 +76,22 @@ def surface_of(
         Its working area decides where the surface ends.
     texture : (rows, columns, 3) uint8
         Colours over all of the grid.
-    largest : int or None
-        No more nodes than this a side; None: all.
+    largest : int, optional
+        No more nodes than this a side; without it, all.
+    depth_mm : (rows, columns), optional
+        The height map's depth averaged to fewer pixels, which is quicker to be sampled.
 
     Returns
     -------
     surface : Surface or None
         None where nothing lies in the working area.
     """
-    depth = heightmap.depth_mm
+    depth = heightmap.depth_mm if depth_mm is None else depth_mm
     inside = heightmap.flags & Flag.OUTSIDE.value == 0
     used = np.flatnonzero(inside.any(axis=1))
     if used.size < 2:
         return None
-    share = 1.0 if largest is None else min(largest / max(depth.shape), 1.0)
+    share = 1.0 if largest is None else min(largest / max(inside.shape), 1.0)
     rows = np.linspace(used[0], used[-1], max(round(share * used.size), 2))
     nearest = inside[np.rint(rows).astype(int)]
     first = nearest.argmax(axis=1)
@@ -83,11 +102,16 @@ def surface_of(
     along = np.linspace(0.0, 1.0, columns)
     column = (first[:, None] + (last - first)[:, None] * along).astype(np.float32)
     row = np.repeat(rows[:, None], columns, axis=1).astype(np.float32)
-    smooth = depth
-    if share < 0.5:
-        side = 2 * int(0.25 / share) + 1
-        smooth = cv2.blur(depth, (side, side))
-    sampled = cv2.remap(smooth, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    scale = depth.shape[1] / inside.shape[1]
+    side = 2 * int(0.5 * scale / share) + 1
+    smooth = cv2.blur(depth, (side, side)) if side > 1 else depth
+    sampled = cv2.remap(
+        smooth,
+        (column + 0.5) * np.float32(scale) - np.float32(0.5),
+        (row + 0.5) * np.float32(scale) - np.float32(0.5),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
     pitch, left, top = heightmap.pitch_mm, float(heightmap.x_mm[0]), float(heightmap.y_mm[0])
     half = 0.5 * pitch
     extent = (left - half, top - half, float(heightmap.x_mm[-1]) + half,

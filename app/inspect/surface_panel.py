@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import logging
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QToolButton, QVBoxLayout, QWidget
 
 from app.inspect.map_view import MapView
@@ -64,6 +64,7 @@ class SurfacePanel(QWidget):
         self._stack = QStackedWidget()
         self._words = QLabel(tr("No depth yet."))
         self._words.setWordWrap(True)
+        self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._words.setMargin(20)
         self._stack.addWidget(self._words)
         self._flat: MapView | None = None

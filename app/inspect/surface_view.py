@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QWidget
 from app.inspect.camera3d import PRESETS, Camera
 from app.inspect.scale_bar import draw_bar, length_text, round_length_mm
 from app.inspect.scene3d import Scene
-from app.inspect.surface import Surface
+from app.inspect.surface import LIVE_NODES, Surface
 from app.shell import theme
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -30,7 +30,9 @@ from gelpolight_core.translation import tr
 DEGREES_PER_PX = 0.4
 KEY_DEG = 6.0
 ZOOM_STEP = 1.15
+SETTLE_MS = 250
 CURSOR = QColor(255, 255, 255)
+AXIS_PX = 26.0
 
 
 class SurfaceView(QWidget):
@@ -78,6 +80,10 @@ class SurfaceView(QWidget):
         self._stale = True
         self._fitted = True
         self._held: QPointF | None = None
+        self._settle = QTimer(self)
+        self._settle.setSingleShot(True)
+        self._settle.setInterval(SETTLE_MS)
+        self._settle.timeout.connect(self._show_all_nodes)
         self._take_theme()
 
     # What the panel asks
@@ -86,6 +92,7 @@ class SurfaceView(QWidget):
         """Show the surface of a frame."""
         first = self._surface is None
         self._surface = surface
+        self._settle.stop()
         self._scene.surface.show(surface)
         if first:
             self.fit()
@@ -127,6 +134,7 @@ class SurfaceView(QWidget):
 
     def finish(self) -> None:
         """Give the graphics memory back."""
+        self._settle.stop()
         self._scene.close()
 
     def place_at(self, across: float, down: float) -> tuple[float, float] | None:
@@ -192,25 +200,21 @@ class SurfaceView(QWidget):
             painter.drawLine(at + QPointF(0.0, -5.0), at + QPointF(0.0, -22.0))
 
     def _draw_scale(self, painter: QPainter) -> None:
-        """Draw lengths along x, y and z, as they are seen at the lower left of the surface."""
-        assert self._surface is not None
-        left, _, right, bottom = self._surface.extent_mm
-        length = round_length_mm(0.25 * (right - left))
-        # A corner of the square about the disc: no part of the surface lies there.
-        corner = (left, -bottom, 0.0)
-        ends = {
-            "x": (left + length, -bottom, 0.0),
-            "y": (left, -bottom + length, 0.0),
-        }
-        start = self._project(corner)
-        for axis, end in ends.items():
+        """Draw where x and y lie, and a length in the middle of the view."""
+        height = max(self.height(), 1)
+        start = QPointF(12.0 + AXIS_PX, height - 40.0 - AXIS_PX)
+        for axis, x, y in (("x", 1.0, 0.0), ("y", 0.0, -1.0)):
+            # As the sensor's frame: its y points down in the picture from above.
+            along = np.array([x, y, 0.0])
+            way = AXIS_PX * QPointF(
+                float(along @ self.camera.right()), -float(along @ self.camera.up())
+            )
             painter.setPen(QPen(theme.colour("muted"), 1.6))
-            at = self._project(end)
-            painter.drawLine(start, at)
-            painter.drawText(at + QPointF(4.0, -3.0), axis)
-        bar = round_length_mm(0.2 * self.width() * self.camera.mm_per_px(max(self.height(), 1)))
-        px = bar / self.camera.mm_per_px(max(self.height(), 1))
-        base = self.height() - 12.0
+            painter.drawLine(start, start + way)
+            painter.drawText(start + 1.25 * way + QPointF(-4.0, 4.0), axis)
+        scale = self.camera.mm_per_px(height)
+        bar = round_length_mm(0.2 * self.width() * scale)
+        px, base = bar / scale, height - 12.0
         text = length_text(bar)
         if self.exaggeration != 1.0:
             text += tr(",  depth x {k:g}").format(k=self.exaggeration)
@@ -278,9 +282,19 @@ class SurfaceView(QWidget):
 
     def _move(self, camera: Camera) -> None:
         self._fitted = False
+        if self._surface is not None and max(self._surface.depth_mm.shape) > 2 * LIVE_NODES:
+            # All nodes of a standing picture could not follow the hand.
+            if not self._settle.isActive():
+                self._scene.surface.show(self._surface.thinned(LIVE_NODES))
+            self._settle.start()
         self.camera = camera
         self._draw_anew()
         self.moved.emit()
+
+    def _show_all_nodes(self) -> None:
+        if self._surface is not None:
+            self._scene.surface.show(self._surface)
+            self._draw_anew()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102
         super().resizeEvent(event)

@@ -74,6 +74,7 @@ class Views(QMainWindow):
         self._bench.setWidgetResizable(True)
         self.docks: dict[str, QDockWidget] = {}
         self._visible: dict[str, bool] = {}
+        self._has_depth = False
         self.bar = self._make_bar()
         self._make_docks()
         self._connect()
@@ -203,6 +204,9 @@ class Views(QMainWindow):
             self.camera.show_rgb(eight_bits(shown.frame.rgb))
         if shown.heightmap is None:
             return
+        if not self._has_depth:
+            self._has_depth = True
+            self._on_section()
         if shown.surface is not None:
             self.surface.show_surface(shown.surface)
         self.height.show_frame(shown, self.look.look.colours)
@@ -222,6 +226,8 @@ class Views(QMainWindow):
     def forget(self) -> None:
         """Show no depth: there is another calibration, or none."""
         words = tr("No depth yet.")
+        self._has_depth = False
+        self._on_section()
         self.surface.show_surface(None)
         for view in (self.height.map, self.normals, self.quality.map):
             view.say(words)
@@ -279,9 +285,9 @@ class Views(QMainWindow):
             self.wanted_changed.emit()
 
     def _on_section(self) -> None:
-        self.line.show(self._visible["section"])
+        self.line.show(self._visible["section"] and self._has_depth)
         self.line.set_width(self.section.width_mm)
-        self.region.show(self._measures_region())
+        self.region.show(self._measures_region() and self._has_depth)
         self.wanted_changed.emit()
 
     def _on_look(self) -> None:

@@ -83,6 +83,8 @@ class LiveView(QWidget):
         Handle, u, v and radius (0 for a marker), after a drag or a nudge.
     clicked(float, float)
         A left click at (u, v).
+    dragged(str, float, float)
+        "begin", "move" or "end" of a drag, and where: see :meth:`hand_drags_on`.
     saved(str)
         A snapshot was written to this file.
     refused(str)
@@ -91,6 +93,7 @@ class LiveView(QWidget):
 
     moved = Signal(str, float, float, float)
     clicked = Signal(float, float)
+    dragged = Signal(str, float, float)
     saved = Signal(str)
     refused = Signal(str)
 
@@ -103,6 +106,7 @@ class LiveView(QWidget):
         self._rgb: Rgb | None = None
         self._overlay = Overlay()
         self._best_focus = BestFocus()
+        self._judges_focus = True
         self._checked_s = -math.inf
         self._rate_told_s = -math.inf
         self._pointer = (math.nan, math.nan)
@@ -128,6 +132,7 @@ class LiveView(QWidget):
         self._tools.switched.connect(self._on_switch)
         self._picture.pointed.connect(self._on_pointed)
         self._picture.clicked.connect(self.clicked)
+        self._picture.dragged.connect(self.dragged)
         self._picture.zoomed.connect(self._tools.show_zoom)
         self._picture.resized.connect(self._place_histogram)
         self._picture.overlay.handle_moved.connect(self._on_handle_moved)
@@ -151,7 +156,7 @@ class LiveView(QWidget):
         """Show the newest frames of `stream` from now on; None: none, the picture goes."""
         self._stream = stream
         self._best_focus = BestFocus()
-        self._checks.focus.show()
+        self._show_focus(stream is not None)
         self._tick.stop()
         if stream is None:
             self._rgb = None
@@ -171,13 +176,25 @@ class LiveView(QWidget):
     def show_picture(self, rgb: Rgb) -> None:
         """Show a still, (rows, columns, 3) uint8 or uint16, and check it at once."""
         self._checked_s = -math.inf
-        self._checks.focus.hide()
+        self._show_focus(False)
         self._show(rgb)
 
     def set_overlay(self, overlay: Overlay | None) -> None:
         """Draw over the picture; None: nothing."""
         self._overlay = overlay or Overlay()
         self._draw_overlay()
+
+    def hand_drags_on(self, on: bool) -> None:
+        """Tell of drags beside the handles in :attr:`dragged`, in place of panning with them."""
+        self._picture.hand_drags_on(on)
+
+    def judge_focus(self, on: bool) -> None:
+        """Show the focus of live pictures, or not: most things have no edges to focus on."""
+        self._judges_focus = on
+        self._show_focus(self._stream is not None)
+
+    def _show_focus(self, on: bool) -> None:
+        self._checks.focus.setVisible(on and self._judges_focus)
 
     def freeze(self, on: bool) -> None:
         """Keep the picture that is shown, while the stream goes on."""

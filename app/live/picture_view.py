@@ -27,6 +27,29 @@ LEAST_SHOWN_PX = 6.0
 FARTHEST_PX = 8000.0
 
 
+class _Box(pg.ViewBox):  # type: ignore[misc]
+    """A view box that hands drags with the left button on, where somebody wants them."""
+
+    dragged = Signal(str, float, float)
+
+    def __init__(self) -> None:
+        super().__init__(lockAspect=1.0, invertY=True, enableMenu=False)
+        self.hands_drags_on = False
+
+    def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
+        if not self.hands_drags_on or event.button() != Qt.MouseButton.LeftButton:
+            super().mouseDragEvent(event, axis)
+            return
+        event.accept()
+        if event.isStart():
+            self._tell("begin", event.buttonDownPos())
+        self._tell("end" if event.isFinish() else "move", event.pos())
+
+    def _tell(self, phase: str, at: Any) -> None:
+        place = self.mapToView(at)
+        self.dragged.emit(phase, place.x(), place.y())
+
+
 class PictureView(pg.GraphicsView):  # type: ignore[misc]
     """Shows a picture and an overlay.
 
@@ -36,14 +59,18 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         Picture pixel (u, v) under the pointer; NaN where there is none.
     clicked(float, float)
         A left click on the picture.
+    dragged(str, float, float)
+        "begin", "move" or "end" of a drag with the left button, and where it is; without
+        :meth:`hand_drags_on` such a drag pans.
     zoomed(float)
-        Screen pixels per picture pixel.
+        Screen pixels per picture pixel; NaN without a picture.
     resized()
         The view has another size.
     """
 
     pointed = Signal(float, float)
     clicked = Signal(float, float)
+    dragged = Signal(str, float, float)
     zoomed = Signal(float)
     resized = Signal()
 
@@ -54,7 +81,8 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._size = (0, 0)
         self._fitted = True
-        self._box = pg.ViewBox(lockAspect=1.0, invertY=True, enableMenu=False)
+        self._box = _Box()
+        self._box.dragged.connect(self.dragged)
         self._box.disableAutoRange()
         self.setCentralItem(self._box)
         self._image = pg.ImageItem(axisOrder="row-major")
@@ -89,6 +117,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         if rgb is None:
             self._image.clear()
             self._size = (0, 0)
+            self.zoomed.emit(math.nan)
             return
         self._image.setImage(rgb, autoLevels=False)
         size = (rgb.shape[1], rgb.shape[0])
@@ -106,6 +135,10 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
                 yMax=size[1] + reach,
             )
             self.fit()
+
+    def hand_drags_on(self, on: bool) -> None:
+        """Tell of drags with the left button in place of panning; the middle one still pans."""
+        self._box.hands_drags_on = on
 
     def say(self, text: str) -> None:
         """Change what stands where there is no picture."""
@@ -163,7 +196,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
 
     def _on_range(self, *_: Any) -> None:
         self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, self.scale_px < SQUARES_FROM)
-        self.zoomed.emit(self.scale_px)
+        self.zoomed.emit(self.scale_px if self._size != (0, 0) else math.nan)
 
     def _on_pointer(self, at: Any) -> None:
         place = self._box.mapSceneToView(at)

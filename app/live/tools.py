@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QIcon, QKeySequence, QPalette, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
@@ -89,8 +91,8 @@ class PictureTools(QWidget):
         self._buttons[name].setChecked(on)
 
     def show_zoom(self, scale: float) -> None:
-        """Show the magnification, 1 for full size."""
-        self._zoom.setText(f"{100.0 * scale:.0f} %")
+        """Show the magnification, 1 for full size; NaN: there is nothing to magnify."""
+        self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)

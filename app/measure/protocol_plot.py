@@ -92,6 +92,7 @@ class Fig13(QWidget):
         for name in ("left", "bottom"):
             plot.getAxis(name).setPen(theme.colour("line"))
             plot.getAxis(name).setTextPen(text)
+            plot.getAxis(name).enableAutoSIPrefix(False)
         dimensions = sorted({dimension_mm(r, direction) for r in results})
         plot.getAxis("bottom").setTicks([[(k, f"{d:g}") for k, d in enumerate(dimensions)]])
         across = tr("diameter or side (mm)") if direction == "planar" else tr("height (mm)")

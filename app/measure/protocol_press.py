@@ -135,6 +135,8 @@ class PressingView(QWidget):
             return
         if self._work.accept(target.press, frames):
             self._aim()
+            if self._work.run.next() is None:
+                self.result_wanted.emit()
 
     def _take_back(self) -> None:
         self._work.take_back()
@@ -143,8 +145,10 @@ class PressingView(QWidget):
     def _aim(self) -> None:
         """Ask for the next press."""
         self._must_move = False
-        self._show_next()
         press = self._work.run.next()
+        # Nobody looks at the pictures any more: what is left to measure is measured the sooner.
+        self.camera.use(press is not None)
+        self._show_next()
         if press is None or self._bare is None:
             self._target = self._looker = None
             self._watching.look_with(None)
@@ -218,7 +222,9 @@ class PressingView(QWidget):
     def _on_switched(self) -> None:
         self.live.set_stream(self._watching.stream)
         if self._watching.stream is None:
-            self.live.say(tr("No camera: choose one in the bar above."))
+            done = self._work.run.next() is None
+            none = tr("No camera: choose one in the bar above.")
+            self.live.say(tr("All presses are made.") if done else none)
         self._aim()
         if self.panel.bench.isChecked() and self._watching.stream is not None:
             self._tick.start()

@@ -34,6 +34,8 @@ from gelpolight_core.report.document import Listing, Report
 from gelpolight_core.report.evaluation_document import evaluation_document
 from gelpolight_core.translation import tr
 
+ROW_HEIGHT = 24
+
 
 class ResultView(QWidget):
     """Shows an evaluation and writes its report.
@@ -211,9 +213,15 @@ def listing_table(name: str, listing: Listing) -> QTableWidget:
         for j, cell in enumerate(row):
             item = QTableWidgetItem(cell)
             item.setToolTip(cell)
-            if cell[:1].isdigit() or cell[:1] in "+-\N{EM DASH}":
+            if _is_number(cell):
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             table.setItem(i, j, item)
     table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    table.horizontalHeader().setStretchLastSection(True)
+    table.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
+    numbers = listing.rows and _is_number(listing.rows[0][-1])
+    table.horizontalHeader().setStretchLastSection(not numbers)
     return table
+
+
+def _is_number(cell: str) -> bool:
+    return cell[:1].isdigit() or cell[:1] in ("+", "-", "\N{EM DASH}")

@@ -189,6 +189,7 @@ class ProtocolSetup(QScrollArea):
         while self._runs.count():
             old = self._runs.takeAt(0).widget()
             if old is not None:
+                old.setObjectName("")
                 old.deleteLater()
         self._no_runs.setVisible(not runs)
         for number, run in enumerate(runs[:MOST_RUNS]):

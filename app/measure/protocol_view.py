@@ -45,6 +45,7 @@ class ProtocolView(QWidget):
         self.pressing: PressingView | None = None
         self.result: ResultView | None = None
         self._shown = False
+        self._retiring: list[ProtocolWork] = []
         self._jobs = Jobs("protocol set-up", self)
         self._jobs.refused.connect(self._on_refused)
         column = QVBoxLayout(self)
@@ -84,7 +85,9 @@ class ProtocolView(QWidget):
 
     def may_close(self) -> bool:
         """Everything is on disk; work that runs is stopped."""
-        self._close_run(wait=True)
+        self._close_run()
+        for work in self._retiring:
+            work.close()
         self._jobs.close()
         return True
 
@@ -186,20 +189,24 @@ class ProtocolView(QWidget):
         self._refresh()
         self._stack.setCurrentWidget(self.setup)
 
-    def _close_run(self, *, wait: bool = False) -> None:
+    def _close_run(self) -> None:
         if self.work is None or self.pressing is None or self.result is None:
             return
         self.pressing.close_run()
         self.work.busy.disconnect(self.result.show_work)
-        if wait:
-            self.work.close()
-        else:
-            self.work.retire()
+        work = self.work
+        self._retiring.append(work)
+        work.gone.connect(lambda: self._forget(work))
+        work.retire()
         for view in (self.pressing, self.result):
             self._stack.removeWidget(view)
             view.deleteLater()
         self.work = self.pressing = self.result = None
         self.heading.setText("")
+
+    def _forget(self, work: ProtocolWork) -> None:
+        self._retiring.remove(work)
+        work.deleteLater()
 
     # The set-up
 

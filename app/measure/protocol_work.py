@@ -86,6 +86,8 @@ class ProtocolWork(QObject):
         A sentence: what could not be done.
     busy(str, float)
         What runs and its share done; an empty text: nothing.
+    gone()
+        It was retired, and nothing runs any more.
     """
 
     measured = Signal(object, object)
@@ -93,6 +95,7 @@ class ProtocolWork(QObject):
     evaluated = Signal(object)
     refused = Signal(str)
     busy = Signal(str, float)
+    gone = Signal()
 
     def __init__(self, equipped: Equipped, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -182,7 +185,7 @@ class ProtocolWork(QObject):
     def _go_when_done(self, title: str, _share: float) -> None:
         if not title:
             self._jobs.close()
-            self.deleteLater()
+            self.gone.emit()
 
     def _measure(self, press: PressWanted) -> None:
         picture, shape, ledger = self.run.picture(press), press.truth.shape, self._equipped.ledger

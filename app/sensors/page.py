@@ -101,7 +101,7 @@ class SensorsPage(QWidget):
         self.demo = make_action(
             self,
             "sensors.demo",
-            tr("Try the &virtual sensor"),
+            tr("&Try the virtual sensor"),
             requests.begin_demo.emit,
             icon_name="demo",
             tip=tr("Everything works as with a camera, without one"),
@@ -126,7 +126,7 @@ class SensorsPage(QWidget):
         self.reveal = make_action(
             self,
             "sensors.reveal",
-            tr("Show in &folder"),
+            tr("Show in fol&der"),
             lambda: self._with_chosen(lambda entry: _open_folder(entry.path.parent)),
             icon_name="folder",
         )

@@ -32,7 +32,6 @@ PARTS = (
     "matplotlib",
     "tifffile",
     "trimesh",
-    "pyvista",
     "vtk",
 )
 

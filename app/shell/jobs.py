@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import logging
+import queue
 import threading
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from app.sources.stopping import join
 from gelpolight_core.calibration.project import Cancelled
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 POLL_MS = 50
+# What cannot be cancelled at once may take this long: a step of a computation, or a picture that
+# is written to a slow disk.
+CLOSE_S = 10.0
 
 
 @dataclass
@@ -71,7 +77,9 @@ class Jobs(QObject):
 
     def __init__(self, name: str, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
+        self._name = name
+        self._thread: threading.Thread | None = None
+        self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._waiting: deque[Job] = deque()
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
@@ -85,8 +93,12 @@ class Jobs(QObject):
 
     def submit(self, job: Job) -> None:
         """Add a job to the end."""
-        job.future = self._pool.submit(job.work, lambda share: self._tell(job, share))
+        job.future = Future()
         self._waiting.append(job)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+            self._thread.start()
+        self._queue.put(job)
         self._timer.start()
         self._say()
 
@@ -99,12 +111,30 @@ class Jobs(QObject):
             if job.future is not None:
                 job.future.cancel()
 
-    def close(self) -> None:
-        """Cancel what may be, end the thread after the rest; nobody is told of it any more."""
+    def close(self, timeout_s: float = CLOSE_S) -> bool:
+        """Cancel what may be, end the thread after the rest; nobody is told of it any more.
+
+        Return whether it has ended; one that hangs is left behind.
+        """
         self.cancel()
         self._timer.stop()
-        self._pool.shutdown(wait=True)
         self._waiting.clear()
+        thread, self._thread = self._thread, None
+        if thread is None:
+            return True
+        self._queue.put(None)
+        return join(thread, timeout_s)
+
+    def _work(self) -> None:
+        """Do the jobs in their order; in the thread."""
+        while (job := self._queue.get()) is not None:
+            future = job.future
+            if future is None or not future.set_running_or_notify_cancel():
+                continue
+            try:
+                future.set_result(job.work(partial(self._tell, job)))
+            except BaseException as error:  # handed to the thread that asked, which tells it
+                future.set_exception(error)
 
     def _tell(self, job: Job, share: float) -> None:
         """Keep the share done; called in the working thread."""

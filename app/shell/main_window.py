@@ -119,7 +119,11 @@ class MainWindow(QMainWindow):
     def _restore_layout(self) -> None:
         geometry, state = self.context.settings.window_state()
         if not self.restoreGeometry(geometry):
-            self.resize(FIRST_SIZE)
+            room = self.screen().availableSize()
+            self.resize(FIRST_SIZE.boundedTo(room * 0.9))
+            if self.size() != FIRST_SIZE:
+                # Its frame would reach over the screen's edge, and the status bar with it.
+                self.setWindowState(Qt.WindowState.WindowMaximized)
         self.restoreState(state, LAYOUT_VERSION)
 
     # Pages

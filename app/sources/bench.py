@@ -237,20 +237,26 @@ class Bench:
 
     def drag_to(self, u: float, v: float) -> Scene:
         """Bring the middle of what lies there under a point of the picture (pixels)."""
+        place = self.place_mm(u, v)
+        return self.scene if place is None else self.arrange(x_mm=place[0], y_mm=place[1])
+
+    def place_mm(self, u: float, v: float) -> tuple[float, float] | None:
+        """Return the place (x, y) of a scene whose middle is under a point of the picture.
+
+        None where nothing can be moved there.
+        """
         scene = self.scene
         camera, layers = self.design.camera, self.design.layers
         place = np.array(float(u)), np.array(float(v))
         if scene.item == "checkerboard":
             centre = self.poses[scene.pose].centre_mm
             there = pixel_directions(camera, *place) * centre[2] - centre
-            return self.arrange(x_mm=float(there[0]), y_mm=float(there[1]))
+            return float(there[0]), float(there[1])
         if scene.item in FLAT:
-            return scene
+            return None
         ray = trace_points(camera, layers, *place)
         x, y = float(ray.x_mm), float(ray.y_mm)
-        if not (math.isfinite(x) and math.isfinite(y)):
-            return scene
-        return self.arrange(x_mm=x, y_mm=y)
+        return (x, y) if math.isfinite(x) and math.isfinite(y) else None
 
     def depth_range_mm(self, scene: Scene) -> tuple[float, float]:
         """Return how deep the object of a scene can go: a ball no deeper than its middle."""

@@ -8,7 +8,7 @@ from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.sources.source import Frame
+from app.sources.source import Frame, Source
 from app.sources.stopping import join
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
@@ -61,6 +61,30 @@ class RecorderFigures:
     def lost(self) -> int:
         """Frames that are not in the recording, for either reason."""
         return self.missed + self.overrun
+
+
+def header_for(
+    source: Source, *, serial: str = "", calibration_id: str = "", note: str = ""
+) -> RecordingHeader:
+    """Return what a recording of a source says of itself.
+
+    Parameters
+    ----------
+    source : Source
+        Open, so that its settings are those of now.
+    serial, calibration_id : str, optional
+        Sensor and calibration in use.
+    note : str, optional
+        What the person wrote.
+    """
+    return RecordingHeader(
+        serial=serial,
+        calibration_id=calibration_id,
+        source=source.name,
+        kind=source.kind,
+        settings={setting.key: setting.value for setting in source.settings()},
+        note=note,
+    )
 
 
 class Recorder:

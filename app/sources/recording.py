@@ -48,6 +48,10 @@ class Playback:
         1 is the recording's own time.
     damaged : int
         Frames met so far that cannot be read, and are passed over.
+    lost : int
+        Frames that the source made while it was recorded, and that are not in the recording.
+    truncated : bool
+        Whether the recording was cut short or is damaged.
     """
 
     position: int = 0
@@ -59,6 +63,8 @@ class Playback:
     loop: bool = True
     speed: float = 1.0
     damaged: int = 0
+    lost: int = 0
+    truncated: bool = False
 
 
 class RecordingSource:
@@ -188,6 +194,8 @@ class RecordingSource:
                 loop=self._loop,
                 speed=self._speed,
                 damaged=len(self._damaged),
+                lost=recording.lost,
+                truncated=recording.truncated,
             )
 
     def play(self) -> None:

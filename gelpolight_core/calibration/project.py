@@ -35,13 +35,16 @@ from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.capture import average_frames, write_picture
 from gelpolight_core.session.copies import file_hash, refuse_copies
+from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
 from gelpolight_core.session.decisions import (
     Decisions,
     PlacedCircle,
     Point,
     write_decisions,
 )
+from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
 from gelpolight_core.session.description import write_description
+from gelpolight_core.session.outside import KnownFiles
 from gelpolight_core.session.session import (
     ONE_IMAGE_STAGES,
     Session,
@@ -79,6 +82,7 @@ class CalibrationProject:
     def __init__(self, folder: Path) -> None:
         self._lock = threading.RLock()
         self._hashes = _RememberedHashes()
+        self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
         self._session = read_session(folder)
         self._results = StageResults()
         self._outcomes: dict[Stage, _Outcome] = {}
@@ -172,7 +176,10 @@ class CalibrationProject:
     def decide(self, decisions: Decisions) -> None:
         """Take new decisions in the place of the present ones, on disk first."""
         with self._lock:
+            path = self._session.folder / DECISIONS
+            self._files.refuse_changed(path)
             write_decisions(decisions, self._session.folder)
+            self._files.take(path)
             self._session = replace(self._session, decisions=decisions)
 
     def exclude(self, stage: Stage, name: str, excluded: bool = True) -> None:
@@ -216,8 +223,51 @@ class CalibrationProject:
 
     def _describe(self, session: Session) -> None:
         kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
+        path = kept.folder / DESCRIPTION
+        self._files.refuse_changed(path)
         write_description(kept)
+        self._files.take(path)
         self._session = kept
+
+    # What somebody else changes ----------------------------------------------------------------
+
+    def changed_outside(self) -> tuple[Path, ...]:
+        """Return the session's files that somebody else has changed since they were read.
+
+        Until :meth:`reload` or :meth:`overwrite`, what would write over them is refused.
+        """
+        with self._lock:
+            return self._files.changed()
+
+    def reload(self) -> None:
+        """Read description and decisions anew.
+
+        Raises
+        ------
+        InputError
+            If they cannot be used; then all stays as it was.
+        """
+        with self._lock:
+            folder = self._session.folder
+            files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
+            self._session = read_session(folder)
+            self._files = files
+
+    def overwrite(self) -> None:
+        """Write description and decisions as they are known here over what was changed.
+
+        Raises
+        ------
+        InputError
+            If they cannot be written.
+        """
+        with self._lock:
+            for path in self._files.changed():
+                if path.name == DECISIONS:
+                    write_decisions(self._session.decisions, self._session.folder)
+                else:
+                    write_description(self._session)
+                self._files.take(path)
 
     def _next_name(self, folder: str, suffix: str = ".png") -> str:
         taken = [p.stem for p in self._session.captured(folder)]

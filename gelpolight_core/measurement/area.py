@@ -107,7 +107,9 @@ def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
         If fewer than nine of them lie in the working area.
     """
     corners = rectangle.outline_mm
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    # Nodes that lie on the edge belong to it, whatever rounding says.
+    slack = 1e-6 * heightmap.pitch_mm
+    low, high = corners.min(axis=0) - slack, corners.max(axis=0) + slack
     columns = np.flatnonzero((heightmap.x_mm >= low[0]) & (heightmap.x_mm <= high[0]))
     rows = np.flatnonzero((heightmap.y_mm >= low[1]) & (heightmap.y_mm <= high[1]))
     x, y = np.meshgrid(heightmap.x_mm[columns], heightmap.y_mm[rows])
@@ -119,8 +121,6 @@ def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
     )
     depth = heightmap.depth_mm[np.ix_(rows, columns)].astype(np.float64)
     flags = heightmap.flags[np.ix_(rows, columns)]
-    # Nodes that lie on the edge belong to it, whatever rounding says.
-    slack = 1e-9 * heightmap.pitch_mm
     inside = (np.abs(along) <= 0.5 * rectangle.sides_mm[0] + slack) & (
         np.abs(across) <= 0.5 * rectangle.sides_mm[1] + slack
     )

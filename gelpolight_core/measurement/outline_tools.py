@@ -36,8 +36,9 @@ class Circle:
     points_mm : tuple of (float, float)
         Of the rim.
     edge : {"steepest", "plain"}
-        ``steepest``: the points only say where to look, the circle goes through the steepest places
-        of the surface near it, all around; ``plain``: through the points themselves.
+        ``steepest``: the points only say where to look, the circle goes through the edge of what
+        is steepest near it, all around: where half of that slope is reached on the deeper side;
+        ``plain``: through the points themselves.
     """
 
     name: ClassVar[str] = "circle"
@@ -80,8 +81,8 @@ class RectangleTool:
     rectangle : Rectangle
         As drawn.
     edge : {"steepest", "plain"}
-        ``steepest``: the sides move to the steepest places of the surface near them; ``plain``:
-        they stay as drawn.
+        ``steepest``: the sides move to the edges near them, found as for :class:`Circle`;
+        ``plain``: they stay as drawn.
     """
 
     name: ClassVar[str] = "rectangle"

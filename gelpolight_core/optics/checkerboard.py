@@ -287,7 +287,7 @@ def _larger(board: BoardSpec, name: str) -> InputError:
 
 
 def _size_advice() -> str:
-    return tr("Correct inner_corners in session.toml, or show the whole of the stated board")
+    return tr("Correct the stated inner corners of the board, or show the whole of it")
 
 
 def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputError:

@@ -62,8 +62,8 @@ def build_stack(
             tr(
                 "elastomer and window are {t:.1f} mm thick, the top surface is {d:.1f} mm away"
             ).format(t=elastomer_thickness_mm + window_thickness_mm, d=distance_mm),
-            where="session.toml [sensor]",
-            advice=tr("Correct the thicknesses, or the squares' size in [top_pose]"),
+            where=tr("what is stated of the sensor"),
+            advice=tr("Correct the thicknesses, or the squares of the board on top"),
         )
     layers = [
         (air_mm, 1.0),

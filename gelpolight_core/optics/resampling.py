@@ -171,8 +171,8 @@ def _visible_grid(
             tr("the working circle's seen part is {x:.2f} x {y:.2f} mm, below {n} pixels").format(
                 x=high[0] - low[0], y=high[1] - low[1], n=LEAST_NODES
             ),
-            where="session.toml [sensor]",
-            advice=tr("State working_diameter_mm in mm, as the width of the membrane in use"),
+            where=tr("what is stated of the sensor"),
+            advice=tr("State the working diameter in mm, as the width of the membrane in use"),
         )
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_PICTURE * camera.width * camera.height:

@@ -21,7 +21,7 @@ BLOCK_MM = 0.2
 LEAST_CHANGE = 5e-3
 # A press changes the light from the surroundings too, far from itself and without any slope.
 CHANGE_BY_BOUNCE = 6e-3
-SIGMAS = 6.0
+SIGMAS = 5.0
 # Of the nine blocks about one, so that a hot pixel is no contact.
 NEIGHBOURS = 3
 # Raw pixels between the places at which the optics is followed.
@@ -94,7 +94,9 @@ def contact_finder(calibration: Calibration, full: FullModel) -> ContactFinder:
         np.arange(n, dtype=np.float32) / np.float32(STRIDE) for n in (camera.width, camera.height)
     )
     map_u, map_v = np.meshgrid(u, v)
-    points = cv2.remap(places.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR)
+    points: Map = np.asarray(
+        cv2.remap(places.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR), np.float32
+    )
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     index = ((points - origin) / grid.pitch_mm).astype(np.float32)
     known = table.valid & (full.background > LEAST_BASE).all(axis=2)
@@ -119,9 +121,17 @@ def contact_finder(calibration: Calibration, full: FullModel) -> ContactFinder:
         return np.asarray(cv2.resize(cut, (columns, rows), interpolation=cv2.INTER_AREA))
 
     expected = blocks(picture)
+    # The background was resampled on its way here: what another blur changes is not to be trusted.
+    blurred = cv2.GaussianBlur(picture, (0, 0), 1.0)
+    unsure = np.abs(blocks(np.asarray(blurred, np.float32)) - expected)
     least = LEAST_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
-    limit = np.maximum(least * expected, SIGMAS / block * calibration.noise)
-    limit[blocks(seen(known)) < 0.999] = np.inf
+    core = cv2.erode(known.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0)
+    inside = blocks(seen(core)) > 0.999
+    # Stated at the median brightness; it grows with the light, and the background has its own.
+    median = np.median(expected[inside], axis=0) if inside.any() else np.ones(3)
+    noise = calibration.noise * np.sqrt(2.0 * np.maximum(expected / median, 1.0))
+    limit = np.maximum(least * expected, SIGMAS / block * noise) + 2.0 * unsure
+    limit[~inside] = np.inf
     return ContactFinder(
         block, expected, limit.astype(np.float32), blocks(points).astype(np.float64)
     )

@@ -7,6 +7,7 @@ grid at its full scale, is said with each constant.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain, repeat
 from threading import Lock
 from typing import Any
 
@@ -15,12 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.contact import contact_finder
 from gelpolight_core.reconstruction.full import (
     LET_GO,
-    RIM_CHANGE,
-    SATURATED,
-    crossed_rim,
     held_back,
     longest_step_mm,
     near_light_rounds,
@@ -28,11 +27,10 @@ from gelpolight_core.reconstruction.full import (
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.live_integration import LiveIntegration, integrate_live
 from gelpolight_core.reconstruction.live_kernel import solve_rows
-from gelpolight_core.reconstruction.live_maps import LiveMaps, LiveScale, light_levels, live_maps
+from gelpolight_core.reconstruction.live_maps import LiveMaps, LiveScale, live_maps
+from gelpolight_core.reconstruction.live_picture import PressPicture, PressSampler
 from gelpolight_core.reconstruction.live_pixels import (
-    halve,
     place_rows,
-    sample_rows,
     show_depth,
     show_normals,
 )
@@ -51,8 +49,8 @@ ROUNDS = 2
 # A second round moves the surface by about twice its depth squared over the lights' height; below
 # this depth, by less than half a micrometre.
 SHALLOW_MM = 0.05
-# Of the integration: the first rounds only have to say where the surface is.
-FIRST_TOLERANCE = 0.03
+# Of the integration, round by round: the first ones only have to say where the surface is.
+FIRST_TOLERANCES = (0.05, 0.005)
 TOLERANCE = 2e-3
 # Bytes that a node at quarter scale, a solved node and a shown node must read and write once.
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 4 * (12 + 20 + 13), 88, 6
@@ -92,16 +90,6 @@ class _Solved:
     normal_y: Map
 
 
-@dataclass(frozen=True, slots=True)
-class _Picture:
-    """Press over background in a region of one scale."""
-
-    ratio: Map
-    saturated: NDArray[np.uint8]
-    around: Map
-    let_go: NDArray[np.bool_] | None
-
-
 class LiveSolver:
     """Reconstructs frames by the full model, doing for each what it needs.
 
@@ -123,11 +111,10 @@ class LiveSolver:
         self._full = full
         self._workers = RowWorkers(workers)
         self._margin_mm = max(MARGIN_DECAYS * full.decay_mm, LEAST_MARGIN_MM)
-        inverse = np.linalg.inv(calibration.crosstalk).astype(np.float32)
-        self._unmix = tuple(tuple(row) for row in inverse)
-        self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
         self._linear = False
-        self._buffers: dict[str, NDArray[Any]] = {}
+        buffers = Buffers()
+        self._take = buffers.take
+        self._sampler = PressSampler(calibration, full, self.maps, self._workers, buffers)
         self._lock = Lock()
 
     def depth(
@@ -166,6 +153,7 @@ class LiveSolver:
             stopped, rim = self._solve(raw, region, effort, record, depth, flags, shown)
         if not normals:
             record.left_out(tr("normals"), tr("nobody asked for them"))
+        record.left_out(tr("standard deviations"), tr("nobody asked for them"))
         return LiveDepth(depth, shown, flags, stopped, rim, Plan(effort, tuple(record.steps)))
 
     def _region(self, raw: NDArray[Any], record: PlanRecord, everywhere: bool) -> Region | None:
@@ -196,8 +184,9 @@ class LiveSolver:
         """Solve a region and write it into the maps of the whole grid."""
         maps, nodes = self.maps, region.nodes
         with record.done(tr("resampling and comparing"), nodes * SAMPLED_BYTES) as reason:
-            half, quarter = self._compare(raw, region)
-            reason.append(tr("averages over 2 x 2 nodes need no denoising"))
+            half, quarter = self._sampler.compare(raw, region, linear=self._linear)
+            reason.append(tr("averages over 2 x 2 nodes, crosstalk and response undone on the way"))
+        record.left_out(tr("denoising"), tr("such an average has half the noise already"))
         if maps.membrane.bounce is None:
             record.left_out(tr("light from the surroundings"), tr("this membrane gives none"))
         with record.done(tr("near light, quarter scale"), ROUNDS * nodes * SOLVED_BYTES) as reason:
@@ -207,7 +196,7 @@ class LiveSolver:
             record.left_out(tr("second near-light round"), tr("the press is that shallow"))
         scale, picture = (maps.half, half) if effort == "balanced" else (maps.quarter, quarter)
         corner, shape = region.at(4 // scale.factor)
-        start = cv2.resize(start, shape[::-1], interpolation=cv2.INTER_LINEAR)
+        start = np.asarray(cv2.resize(start, shape[::-1], interpolation=cv2.INTER_LINEAR))
         if effort != "balanced":
             record.left_out(tr("near light, half scale"), tr("this effort does without it"))
         size = shape[0] * shape[1] * SOLVED_BYTES
@@ -218,94 +207,29 @@ class LiveSolver:
             solved = self._integrate(scale, picture, corner, start, slopes, TOLERANCE)
             moved = held_back(start, solved.depth_mm, longest_step_mm(self._full))
             reason.append(tr("{n} rounds of conjugate gradients").format(n=solved.rounds))
+        if picture.let_go is None:
+            record.left_out(tr("free rim"), tr("no contact crosses the rim"))
         with record.done(tr("true positions"), 16 * nodes * SHOWN_BYTES) as reason:
             self._show(scale, region, slopes, moved, depth, flags, normals)
             reason.append(tr("and to the whole grid's scale"))
         return stopped, "held" if picture.let_go is None else "free"
 
     def _rounds(
-        self, region: Region, picture: _Picture
+        self, region: Region, picture: PressPicture
     ) -> tuple[Map, tuple[tuple[float, ...], str]]:
         """Return the depth after the near-light rounds at quarter scale; as `coarse_depth`."""
         scale, corner = self.maps.quarter, region.corner
+        tolerances = chain(FIRST_TOLERANCES, repeat(FIRST_TOLERANCES[-1]))
 
         def solve(depth: Map) -> Map:
             slopes = self._slopes(scale, picture, corner, depth)
-            return self._integrate(scale, picture, corner, depth, slopes, FIRST_TOLERANCE).depth_mm
+            return self._integrate(scale, picture, corner, depth, slopes, next(tolerances)).depth_mm
 
         longest = longest_step_mm(self._full)
         return near_light_rounds(solve, region.shape, longest, ROUNDS, shallow_mm=SHALLOW_MM)
 
-    def _compare(self, raw: NDArray[Any], region: Region) -> tuple[_Picture, _Picture]:
-        """Return press over background at half and at quarter scale."""
-        maps = self.maps
-        corner, shape = region.at(2)
-        small = region.shape
-        ratio, coarse = self._take("ratio", (3, *shape)), self._take("coarse", (3, *small))
-        marks = self._take("saturated", shape, np.uint8)
-        coarse_marks = self._take("coarse saturated", small, np.uint8)
-        limit = np.float32(SATURATED)
-        self._workers.run(
-            shape[0],
-            sample_rows,
-            raw,
-            self._levels(raw.dtype, self._linear),
-            limit,
-            maps.u_px,
-            maps.v_px,
-            self._unmix,
-            maps.gain,
-            maps.half.kind,
-            corner,
-            ratio,
-            marks,
-        )
-        halve(ratio, marks, coarse, coarse_marks)
-        around = coarse_around = self._take("no surroundings", (3, 1, 1))
-        let_go = None
-        (top, left), kind = region.corner, maps.quarter.kind
-        kind = kind[top : top + small[0], left : left + small[1]]
-        if (
-            maps.membrane.bounce is not None
-            or not kind.all()
-            or region.at_border(maps.quarter.shape)
-        ):
-            coarse_around = self._around(coarse)
-            let_go = self._released(coarse_around, kind)
-        if maps.membrane.bounce is not None:
-            around = self._take("around", (3, *shape))
-            for k in range(3):
-                cv2.resize(coarse_around[k], shape[::-1], around[k])
-        large = None
-        if let_go is not None:
-            large = np.repeat(np.repeat(let_go, 2, axis=0), 2, axis=1)
-        return (
-            _Picture(ratio, marks, around, large),
-            _Picture(coarse, coarse_marks, coarse_around, let_go),
-        )
-
-    def _around(self, coarse: Map) -> Map:
-        """Return press over background, averaged over the surroundings; as `neighbourhood`."""
-        reach = self._full.membrane.bounce_reach_mm / self.maps.quarter.pitch_mm
-        factor = max(int(reach / 4.0), 1)
-        rows, columns = coarse.shape[1:]
-        size = (max(columns // factor, 1), max(rows // factor, 1))
-        result = self._take("coarse around", coarse.shape)
-        for k in range(3):
-            known = np.clip(coarse[k], 0.0, 4.0)
-            small = cv2.resize(known, size, interpolation=cv2.INTER_AREA)
-            small = cv2.GaussianBlur(small, (0, 0), reach / factor)
-            cv2.resize(small, (columns, rows), result[k])
-        return result
-
-    def _released(self, around: Map, kind: NDArray[np.uint8]) -> NDArray[np.bool_] | None:
-        """Return where a contact crosses the rim, or None where it does not."""
-        disturbed = np.abs(around - 1.0).max(axis=0) > RIM_CHANGE
-        let_go = crossed_rim(kind > 0, disturbed, self.maps.quarter.pitch_mm)
-        return let_go if let_go.any() else None
-
     def _slopes(
-        self, scale: LiveScale, picture: _Picture, corner: tuple[int, int], depth: Map
+        self, scale: LiveScale, picture: PressPicture, corner: tuple[int, int], depth: Map
     ) -> _Solved:
         """Return slopes along the rays at the present depth; as `solve_near_light`."""
         membrane, shape = self.maps.membrane, depth.shape
@@ -347,7 +271,7 @@ class LiveSolver:
     def _integrate(
         self,
         scale: LiveScale,
-        picture: _Picture,
+        picture: PressPicture,
         corner: tuple[int, int],
         depth: Map,
         slopes: _Solved,
@@ -415,23 +339,6 @@ class LiveSolver:
                 normals,
             )
 
-    def _levels(self, dtype: np.dtype[Any], linear: bool) -> Map:
-        kind = (dtype, linear)
-        if kind not in self._light:
-            response = None if linear else self.calibration.response
-            self._light[kind] = light_levels(response, dtype)
-        return self._light[kind]
-
-    def _take(
-        self, name: str, shape: tuple[int, ...], dtype: type[np.generic] = np.float32
-    ) -> NDArray[Any]:
-        """Return a work buffer; what it held before is of no use."""
-        size = int(np.prod(shape))
-        kept = self._buffers.get(name)
-        if kept is None or kept.size < size:
-            kept = self._buffers[name] = np.empty(size, dtype)
-        return kept[:size].reshape(shape)
-
 
 def flat_normals(shape: tuple[int, ...]) -> Map:
     """Return normals (rows, columns, 3) of the flat membrane."""
@@ -443,6 +350,7 @@ def flat_normals(shape: tuple[int, ...]) -> Map:
 def _whole_numbers(frame: NDArray[Any]) -> NDArray[Any]:
     """Return a frame as whole numbers; what is not finite in floats counts as saturated."""
     if frame.dtype.kind != "f":
-        return np.ascontiguousarray(frame)
+        # Compiled code is made anew for an array that must not be written to.
+        return np.require(frame, requirements=["C", "W"])
     known = np.nan_to_num(frame, nan=1.0, posinf=1.0, neginf=1.0)
     return np.asarray(np.clip(known, 0.0, 1.0) * 65535.0 + 0.5, np.uint16)

@@ -9,8 +9,10 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.weighted import MAX_ROUNDS
+
 Map = NDArray[np.float32]
-MAX_ROUNDS = 40
+
 
 _whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract", "reassoc"}, cache=True)
 _single = np.float32
@@ -104,10 +106,10 @@ def _divide(spectrum, by_row, by_column):  # type: ignore[no-untyped-def]  # pra
 
 @_whole
 def _dot(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    total = 0.0
+    total = np.float64(0.0)
     for i in range(a.shape[0]):
         p, q = a[i], b[i]
-        part = _0
+        part = np.float32(0.0)
         for j in range(p.shape[0]):
             part += p[j] * q[j]
         total += part
@@ -174,7 +176,7 @@ def _apply(depth, weight, firm, out):  # type: ignore[no-untyped-def]  # pragma:
     rows, columns = depth.shape
     edge = np.empty(columns, np.float32)
     before = np.zeros(columns, np.float32)
-    total = 0.0
+    total = np.float64(0.0)
     for i in range(rows):
         d, w, target = depth[i], weight[i], out[i]
         for j in range(columns - 1):
@@ -199,7 +201,7 @@ def _apply(depth, weight, firm, out):  # type: ignore[no-untyped-def]  # pragma:
                 target[j] += firm[columns + j] * d[j]
         target[0] += firm[2 * columns + i] * d[0]
         target[columns - 1] += firm[2 * columns + rows + i] * d[columns - 1]
-        part = _0
+        part = np.float32(0.0)
         for j in range(columns):
             part += target[j] * d[j]
         total += part

@@ -167,7 +167,8 @@ def _polynomials(membrane: Membrane) -> tuple[tuple[tuple[float, ...], ...], flo
             error,
             float(np.abs(fitted(cosines) / wanted[-1, k] - wanted[:, k] / wanted[-1, k]).max()),
         )
-        share = (1.0 - membrane.gloss) / pi * fitted.convert(domain=(-1, 1)).coef
+        share = np.asarray(fitted.convert(domain=(-1, 1)).coef, np.float64)
+        share *= (1.0 - membrane.gloss) / pi
         curves.append(tuple(_single(v) for v in np.pad(share, (0, DEGREE + 1 - len(share)))))
     return tuple(curves), error
 
@@ -188,13 +189,7 @@ def _scale(
     drift = _planes(_average(calibration.table.drift, factor)).astype(np.float64)
     # Averaging a block leaves the noise of one node over the block's width.
     noise = calibration.noise / np.sqrt(2.0) / factor
-    static = np.empty((12, y.size, x.size), np.float32)
-    static[:3] = _flat_brightness(full, x, y, drift)
-    static[3:6] = _planes(noise / _average(base, factor))
-    static[6:8] = drift
-    for place, axis in ((8, 1), (10, 0)):
-        for k in range(2):
-            static[place + k] = np.gradient(drift[k], pitch, axis=axis)
+    static = static_maps(full, x, y, drift, _planes(noise / _average(base, factor)))
     return LiveScale(
         factor,
         (y.size, x.size),
@@ -203,6 +198,24 @@ def _scale(
         static,
         np.where(all_usable, 2, mostly_inside).astype(np.uint8),
     )
+
+
+def static_maps(
+    full: FullModel,
+    x_mm: NDArray[np.float64],
+    y_mm: NDArray[np.float64],
+    drift: NDArray[np.float64],
+    sigma: Map,
+) -> Map:
+    """Return `LiveScale.static` from the rays' drift (2, ...) and the noise (3, ...)."""
+    static = np.empty((12, y_mm.size, x_mm.size), np.float32)
+    static[:3] = _flat_brightness(full, x_mm, y_mm, drift)
+    static[3:6] = sigma
+    static[6:8] = drift
+    for place, axis in ((8, 1), (10, 0)):
+        for k in range(2):
+            static[place + k] = np.gradient(drift[k], x_mm[1] - x_mm[0], axis=axis)
+    return static
 
 
 def _flat_brightness(

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
@@ -99,10 +99,18 @@ class Reconstructor:
         assert self.calibration.full is not None
         return LiveSolver(self.calibration, self.calibration.full, workers=self.workers)
 
-    def warm_up(self) -> None:
-        """Make ready all that the first frame would wait for: maps, compiled parts, buffers."""
+    def warm_up(self, dtype: DTypeLike = np.uint8) -> None:
+        """Make ready all that the first frame would wait for: maps, compiled parts, buffers.
+
+        The compiled parts are kept on disk; the very first time they take most of a minute.
+
+        Parameters
+        ----------
+        dtype : dtype, optional
+            Of the frames to come.
+        """
         camera = self.calibration.camera
-        self.depth(np.zeros((camera.height, camera.width, 3), np.uint8))
+        self.depth(np.zeros((camera.height, camera.width, 3), dtype))
 
     def plan(self, frame: NDArray[Any], *, normals: bool = True, uncertainty: bool = False) -> Plan:
         """Return which steps a frame needs, and why the others are left out.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 # More blocks than threads, so that an uneven picture keeps all of them busy.
@@ -30,7 +31,7 @@ class RowWorkers:
             action(0, rows, *arguments)
             return
         edges = [rows * k // blocks for k in range(blocks + 1)]
-        waiting = iter(list(zip(edges[:-1], edges[1:], strict=True)))
+        waiting = iter(list(pairwise(edges)))
 
         def work() -> None:
             # A list's iterator hands each block to one thread.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import mmap
 import os
 import struct
 import zlib
@@ -21,6 +20,8 @@ from gelpolight_core.recording.pixels import strip_rows, unpack_strip
 from gelpolight_core.recording.recording import VERSION, RecordedFrame, RecordingHeader, Rgb
 from gelpolight_core.session.wholeness import MAX_PIXELS, unreadable
 from gelpolight_core.translation import tr
+
+SEARCH_BYTES = 1 << 20
 
 
 class Recording:
@@ -210,9 +211,17 @@ def _find_frames(file: int, begin: int, size: int) -> list[FrameMark]:
 
 def _next_magic(file: int, place: int, size: int) -> int:
     """Return where the next frame may begin behind a damaged place; `size` if nowhere."""
-    with mmap.mmap(file, size, access=mmap.ACCESS_READ) as view:
-        found = view.find(layout.FRAME_MAGIC, place)
-    return size if found < 0 else found
+    overlap = len(layout.FRAME_MAGIC) - 1
+    while place + overlap < size:
+        # Not mapped into memory: a file that shrinks meanwhile would end the program.
+        part = os.pread(file, SEARCH_BYTES, place)
+        found = part.find(layout.FRAME_MAGIC)
+        if found >= 0:
+            return place + found
+        if len(part) <= overlap:
+            break
+        place += len(part) - overlap
+    return size
 
 
 def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bool:

@@ -143,7 +143,7 @@ def find_ball(
                 c=contact, r=radius_mm
             ),
             where=name,
-            advice=tr("Correct the ball's radius (not its diameter) in [balls] of session.toml"),
+            advice=tr("Correct the stated radius of this ball (not its diameter)"),
         )
     depth = ball_depth_from_contact(contact, radius_mm)
     drift = _drift_at(table, seen)

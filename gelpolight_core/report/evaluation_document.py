@@ -84,7 +84,7 @@ def _judged(evaluation: Evaluation, direction: str, limits: dict[str, float]) ->
         )
     ]
     for group in evaluation.groups:
-        overall = group.shape == ALL and group.dimension_mm is None
+        overall = group.shape == ALL and group.dimension_mm is None and group.statistic.count
         if group.direction == direction and overall and group.regions != ALL:
             label = tr("Mean absolute error, {direction}, {regions}")
             found.append(

@@ -347,5 +347,7 @@ def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Fig
         100.0 * difference,
         "%",
         warn=1.0,
-        advice=tr("Correct or remove [camera] in session.toml; the measured response was used"),
+        advice=tr(
+            "Correct or remove what is declared of the camera; the measured response was used"
+        ),
     )

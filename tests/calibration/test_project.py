@@ -194,3 +194,35 @@ def test_an_unfinished_session_says_which_stage_is_open(
         project.finish()
     with pytest.raises(InputError, match="already holds a session"):
         create_session(replace(session, folder=tmp_path / "new"))
+
+
+def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
+    project: CalibrationProject,
+) -> None:
+    path = project.session.folder / "session.toml"
+    path.write_text(path.read_text().replace("[balls]", '[balls]\n"ball_00.png" = 4.5'))
+    written = path.read_bytes()
+    assert project.changed_outside() == (path,)
+    with pytest.raises(InputError, match=r"session\.toml.*Reload"):
+        project.set_ball_radius("ball_01.png", 3.5)
+    assert path.read_bytes() == written
+    project.exclude(Stage.BALLS, "ball_02.png")  # the other file is as it was
+    project.reload()
+    assert project.session.ball_radii_mm["ball_00.png"] == 4.5
+    project.set_ball_radius("ball_01.png", 3.5)
+    assert read_session(path.parent).ball_radii_mm["ball_00.png"] == 4.5
+
+
+def test_a_session_that_somebody_broke_can_be_kept_as_it_was_read(
+    project: CalibrationProject,
+) -> None:
+    before = project.session
+    path = before.folder / "session.toml"
+    path.write_text("broken = ")
+    with pytest.raises(InputError):
+        project.reload()
+    assert project.session is before
+    assert project.changed_outside() == (path,)
+    project.overwrite()
+    assert project.changed_outside() == ()
+    assert read_session(before.folder) == before

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import struct
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -140,6 +142,74 @@ def test_gsf_follows_the_published_format(tmp_path: Path, heightmap: HeightMap, 
     assert float(header["YReal"]) / rows == pytest.approx(PITCH_MM / 1000)
     assert float(header["XOffset"]) + step_m / 2 == pytest.approx(-1.25e-3)
     assert float(header["YOffset"]) + step_m / 2 == pytest.approx(-0.75e-3)
+
+
+def png_chunks(path: Path) -> list[tuple[bytes, bytes]]:
+    """Return the chunks of a PNG file by its published format, their checksums checked."""
+    data = path.read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    chunks, at = [], 8
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        body = data[at + 4 : at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(body)
+        chunks.append((body[:4], body[4:]))
+        at += 12 + length
+    return chunks
+
+
+def png_values(chunks: list[tuple[bytes, bytes]]) -> np.ndarray:
+    """Return the grey values of 16 bits: deflate, then the five filters taken back."""
+    columns, rows, bits, colour, *rest = struct.unpack(">IIBBBBB", dict(chunks)[b"IHDR"])
+    assert (bits, colour, rest) == (16, 0, [0, 0, 0])
+    packed = zlib.decompress(b"".join(body for kind, body in chunks if kind == b"IDAT"))
+    above, lines = bytearray(2 * columns), []
+    for row in range(rows):
+        kind, *line = packed[row * (2 * columns + 1) : (row + 1) * (2 * columns + 1)]
+        for k in range(2 * columns):
+            a, c = (line[k - 2], above[k - 2]) if k > 1 else (0, 0)
+            b = above[k]
+            nearest = min((a, b, c), key=lambda v: abs(a + b - c - v))
+            line[k] = (line[k] + (0, a, b, (a + b) // 2, nearest)[kind]) & 255
+        above = bytearray(line)
+        lines.append(above)
+    return np.frombuffer(b"".join(lines), ">u2").reshape(rows, columns)
+
+
+@pytest.mark.parametrize("hole", [False, True])
+def test_png_keeps_depths_within_half_a_step_and_says_its_scale(
+    tmp_path: Path, heightmap: HeightMap, hole: bool
+) -> None:
+    depth_mm = heightmap.depth_mm.copy()
+    if hole:
+        depth_mm[3, 4], depth_mm[8, 2] = np.nan, np.inf
+    path = write_one(replace(heightmap, depth_mm=depth_mm), tmp_path, "png")
+    chunks = png_chunks(path)
+    assert [kind for kind, _ in chunks][:3] == [b"IHDR", b"pHYs", b"tEXt"]
+    value = png_values(chunks)
+    assert np.array_equal(value, cv2.imread(str(path), cv2.IMREAD_UNCHANGED))
+    keyword, text = dict(chunks)[b"tEXt"].split(b"\0", 1)
+    about = json.loads(text)
+    known = np.isfinite(depth_mm)
+    assert np.array_equal(value == about["unknown"], ~known)
+    found = about["offset_mm"] + about["step_mm"] * value[known].astype(float)
+    half = 0.5 * about["step_mm"]
+    assert found == pytest.approx(depth_mm[known].astype(float), abs=half * (1 + 1e-9))
+    assert about["step_mm"] == pytest.approx(np.ptp(depth_mm[known]) / 65534, rel=1e-4)
+    assert keyword == b"GelPoLight"
+    assert about["calibration_id"] == heightmap.calibration_id
+    assert (about["pitch_mm"], about["x0_mm"], about["y0_mm"]) == (PITCH_MM, -1.25, -0.75)
+    assert struct.unpack(">IIB", dict(chunks)[b"pHYs"]) == (8000, 8000, 1)
+
+
+def test_png_of_a_map_without_any_difference_has_a_step_all_the_same(
+    tmp_path: Path, heightmap: HeightMap
+) -> None:
+    flat = replace(heightmap, depth_mm=np.full((ROWS, COLUMNS), 0.25, np.float32))
+    chunks = png_chunks(write_one(flat, tmp_path, "png"))
+    about = json.loads(dict(chunks)[b"tEXt"].split(b"\0", 1)[1])
+    found = about["offset_mm"] + about["step_mm"] * png_values(chunks)
+    assert found == pytest.approx(0.25, abs=1e-9)
 
 
 def read_with_vtk(path: Path):

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from recorded import noisy, write_recording
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.recording import layout
+from gelpolight_core.recording import layout, reader
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import VERSION, RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
@@ -71,6 +71,18 @@ def test_a_changed_byte_spoils_one_frame_at_most_or_is_refused(
         assert len(right_frames(place)) >= 2
     except InputError as error:
         assert at < whole.index(layout.FRAME_MAGIC), f"byte {at}: {error}"
+
+
+@pytest.mark.parametrize("search_bytes", [8, 9, 100, 10_000])
+def test_behind_a_damaged_place_the_next_frame_is_found(
+    whole: bytes, place: Path, monkeypatch: pytest.MonkeyPatch, search_bytes: int
+) -> None:
+    """Wherever the file is cut into the parts that are searched."""
+    monkeypatch.setattr(reader, "SEARCH_BYTES", search_bytes)
+    spoilt = bytearray(whole)
+    spoilt[whole.index(layout.FRAME_MAGIC) + 20] ^= 1
+    place.write_bytes(spoilt)
+    assert right_frames(place) == {1, 2}
 
 
 @settings(deadline=None, max_examples=80)

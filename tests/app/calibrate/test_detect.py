@@ -261,6 +261,24 @@ def test_the_whiteboard_left_on_is_not_taken_for_the_membrane(
 ) -> None:
     seen = detect_background(pictures["whiteboard"], whiteboard=pictures["whiteboard"])
     assert "just like the whiteboard's" in seen.sentence
+    assert "capture that again" in seen.sentence
+
+
+def test_the_membrane_left_on_is_not_taken_for_the_whiteboard(
+    pictures: dict[str, np.ndarray], known: Known
+) -> None:
+    bare = pictures["background"]
+    seen = detect_whiteboard(bare, table=known.table, background=bare)
+    assert not seen.ready
+    assert "just like the background's" in seen.sentence
+    assert detect_whiteboard(pictures["whiteboard"], table=known.table, background=bare).ready
+
+
+def test_without_a_whiteboard_nothing_is_said_about_presses_but_that(
+    pictures: dict[str, np.ndarray], known: Known
+) -> None:
+    seen = detect_background(pictures["background"], table=known.table)
+    assert "once the whiteboard is captured" in seen.sentence
 
 
 def test_a_ball_is_circled_where_it_is_seen(

@@ -54,29 +54,31 @@ def test_a_black_picture_is_still() -> None:
     assert moving_share(black, black) == 0.0
 
 
-def test_stillness_must_last_and_begins_anew_after_a_movement() -> None:
-    watch = Still(3)
-    quiet = [shot(scene(), i, noise=0.005) for i in range(5)]
-    assert [watch.update(rgb) for rgb in quiet] == [False, False, False, True, True]
-    assert not watch.update(shot(scene(20.0), 9, noise=0.005))
-    assert [watch.update(shot(scene(20.0), 10 + i, noise=0.005)) for i in range(3)] == [
-        False,
-        False,
-        True,
-    ]
+@pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 4), (10.0, 6), (30.0, 16)])
+def test_stillness_must_last_half_a_second_whatever_the_rate_at_which_frames_are_looked_at(
+    rate_hz: float, frames: int
+) -> None:
+    watch = Still()
+    for place in (0.0, 20.0):  # and begins anew after a movement
+        told = [
+            watch.update(shot(scene(place), i, noise=0.005), place + i / rate_hz)
+            for i in range(frames)
+        ]
+        assert told == [False] * (frames - 1) + [True]
 
 
 def test_a_movement_is_told_while_it_lasts() -> None:
-    watch = Still(2)
+    watch = Still()
     told = []
     for number, place in enumerate((0.0, 0.0, 20.0, 20.0)):
-        watch.update(shot(scene(place), number, noise=0.005))
+        watch.update(shot(scene(place), number, noise=0.005), 0.1 * number)
         told.append(watch.moves)
     assert told == [False, False, True, False]
 
 
 def test_another_picture_size_starts_the_watch_again() -> None:
-    watch = Still(1)
-    watch.update(shot(scene(), 1, noise=0.005))
-    small = cv2.resize(shot(scene(), 2, noise=0.005), (160, 120))
-    assert not watch.update(small)
+    watch = Still()
+    told = [watch.update(shot(scene(), i, noise=0.005), float(i)) for i in range(4)]
+    assert told[-1]
+    small = cv2.resize(shot(scene(), 4, noise=0.005), (160, 120))
+    assert not watch.update(small, 4.0)

@@ -342,3 +342,68 @@ def test_nothing_is_cut_off_and_no_sentence_moves_what_is_below(
             heights.add(panel.sentence.mapTo(panel, panel.sentence.rect().topLeft()).y())
         assert len(heights) == 1
     technician.rest()
+
+
+def test_a_step_with_too_few_pictures_is_begun_and_has_not_failed(
+    technician: Technician, camera: ToldCamera, fresh: CalibrationProject, small_session: Path
+) -> None:
+    technician.begin(fresh, "lens")
+    camera.show(read_rgb(sorted((small_session / "checkerboard").glob("*.png"))[0]))
+    technician.capture()
+    technician.rest()
+    assert technician.state("lens") == "begun"
+    assert technician.wizard.panel.sentence.text().startswith("1 taken; at least 4 are needed")
+
+
+def test_a_file_changed_by_something_else_is_said_and_read_when_asked(
+    technician: Technician, computed_project: Made
+) -> None:
+    technician.begin(computed_project(), "balls")
+    wizard = technician.wizard
+    path = technician.session / "decisions.toml"
+    path.write_text(
+        'format = "gelpolight-decisions"\nversion = 1\nexcluded = ["balls/ball_01.png"]'
+    )
+    stage = wizard.step.stage
+    assert stage is not None
+    wizard.controller.exclude(stage, "ball_02.png", True)
+    technician.rest()
+    assert "decisions.toml was changed" in wizard.outside.sentence.text()
+    technician.click("calibrate.outside.reload")
+    technician.rest()
+    assert not wizard.outside.isVisible()
+    wizard.controller.exclude(stage, "ball_02.png", True)
+    technician.rest()
+    kept = {"balls/ball_01.png", "balls/ball_02.png"}
+    assert read_session(technician.session).decisions.excluded == kept
+
+
+def test_a_file_broken_by_something_else_can_be_written_anew(
+    technician: Technician, computed_project: Made
+) -> None:
+    technician.begin(computed_project(), "balls")
+    wizard = technician.wizard
+    (technician.session / "session.toml").write_text("broken = ")
+    wizard.outside.look()
+    technician.click("calibrate.outside.reload")
+    assert "session.toml" in wizard.outside.sentence.text()
+    technician.click("calibrate.outside.overwrite")
+    assert not wizard.outside.isVisible()
+    assert read_session(technician.session) == wizard.project.session
+
+
+def test_a_press_is_validated_from_its_picture_with_the_truth_beside_it(
+    technician: Technician, computed_project: Made, small_session: Path
+) -> None:
+    technician.begin(computed_project(), "result")
+    technician.click("result.save")
+    technician.rest()
+    technician.click("calibrate.next")
+    wizard = technician.wizard
+    assert not wizard.validation.measure.isEnabled()  # there is no camera
+    wizard.validating.import_press(small_session / "presses" / "cylinder_s5_d100.png")
+    technician.until(lambda: "Diameter" in wizard.validation.result.text())
+    known = wizard.validation.known()
+    assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
+    technician.click("validation.keep")
+    assert technician.state("validation") == "pass"

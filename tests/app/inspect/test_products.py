@@ -11,8 +11,8 @@ import pytest
 from app.inspect import shading
 from app.inspect.cuts import Section
 from app.inspect.look import Light, Look, colour_table
-from app.inspect.products import LIVE_NODES, QUALITY_COLOURS, SURROUND, Maker, Wanted
-from app.inspect.surface import surface_of
+from app.inspect.products import QUALITY_COLOURS, SURROUND, Maker, Wanted
+from app.inspect.surface import LIVE_NODES, surface_of
 from app.sources.source import Frame
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
@@ -50,9 +50,7 @@ def test_only_the_view_that_is_shown_is_computed(dome: HeightMap, frame: Frame, 
     assert shown.cut is None
 
 
-def test_with_only_the_camera_shown_nothing_is_reconstructed(
-    dome: HeightMap, frame: Frame
-) -> None:
+def test_with_only_the_camera_shown_nothing_is_reconstructed(dome: HeightMap, frame: Frame) -> None:
     shown, reconstruction = _made(dome, frame, camera=True)
     assert shown.heightmap is None
     assert reconstruction.asked == []
@@ -106,15 +104,15 @@ def test_a_line_beside_the_sensor_says_so_and_measures_nothing(
 
 def test_the_live_mesh_is_coarse_and_the_standing_one_has_every_node(dome: HeightMap) -> None:
     texture = np.zeros((8, 8, 3), np.uint8)
-    live = surface_of(dome, texture, 60)
-    whole = surface_of(dome, texture, None)
+    live = surface_of(dome, texture, largest=60)
+    whole = surface_of(dome, texture)
     assert live is not None and whole is not None
     assert max(live.depth_mm.shape) <= 61 < LIVE_NODES
     assert whole.depth_mm.shape[1] == dome.depth_mm.shape[1]
 
 
 def test_the_mesh_ends_at_the_rim_and_has_the_map_s_depth(dome: HeightMap) -> None:
-    surface = surface_of(dome, np.zeros((8, 8, 3), np.uint8), None)
+    surface = surface_of(dome, np.zeros((8, 8, 3), np.uint8))
     assert surface is not None
     rim = np.hypot(surface.x_mm[:, [0, -1]], surface.y_mm[:, None])
     assert np.abs(rim[5:-5] - 8.0).max() < 0.15
@@ -125,16 +123,22 @@ def test_the_mesh_ends_at_the_rim_and_has_the_map_s_depth(dome: HeightMap) -> No
 def test_the_side_towards_the_light_is_brighter() -> None:
     x = np.linspace(-3.0, 3.0, 121)
     dome = np.maximum(1.0 - 0.2 * (x[:, None] ** 2 + x**2), 0.0).astype(np.float32)
-    grey = np.full((*dome.shape, 3), 128, np.uint8)
-    lit = shading.shaded(grey, dome, 0.05, Light(azimuth_deg=270.0), 1.0)
+    grey = np.full((256, 3), 128, np.uint8)
+    lit = shading.shaded(dome, 0.05, grey, (0.0, 1.0), Light(azimuth_deg=270.0))
     assert lit[60, 40].mean() > lit[60, 60].mean() > lit[60, 80].mean()
 
 
-def test_contour_lines_lie_where_the_depth_is_a_multiple_of_the_step() -> None:
+@pytest.mark.parametrize("shade", [False, True])
+def test_contour_lines_lie_where_the_depth_is_a_multiple_of_the_step(
+    shade: bool,
+) -> None:
     ramp = np.broadcast_to(np.linspace(0.0, 1.0, 401, dtype=np.float32), (50, 401)).copy()
     white = np.full((50, 401, 3), 255, np.uint8)
-    lines = shading.with_contours(white, ramp, 0.25)[25, :, 0]
-    dark = np.flatnonzero(lines < 140)
+    lit = shading.with_contours(white, ramp, 0.25)
+    if shade:
+        lit = shading.shaded(ramp, 1.0, white[0, :256], (0.0, 1.0), Light(), contour_mm=0.25)
+    lines = lit[25, :, 0]
+    dark = np.flatnonzero(lines < 0.6 * lines.max())
     assert {round(0.0025 * k, 2) for k in dark} == {0.25, 0.5, 0.75, 1.0}
 
 
@@ -146,9 +150,7 @@ def test_colours_say_the_same_depth_whatever_the_frame_when_the_range_is_locked(
     np.testing.assert_array_equal(below[0, 0], table[0])
 
 
-def test_flags_have_their_colour_and_the_outside_is_no_flag(
-    dome: HeightMap, frame: Frame
-) -> None:
+def test_flags_have_their_colour_and_the_outside_is_no_flag(dome: HeightMap, frame: Frame) -> None:
     shown, _ = _made(dome, frame, quality="flags", still=True)
     assert tuple(shown.quality[85, 45]) == QUALITY_COLOURS[Flag.DARK]
     assert tuple(shown.quality[0, 0]) == SURROUND

@@ -440,3 +440,36 @@ def test_tools_follow_the_theme(view: LiveView) -> None:
     finally:
         QApplication.setPalette(usual)
         application.setStyleSheet(sheet)
+
+
+def test_drags_are_handed_on_where_they_are_wanted_and_the_picture_stays(
+    view: LiveView, qtbot: QtBot
+) -> None:
+    view.show_picture(black())
+    view.hand_drags_on(True)
+    picture = child(view, "live.picture")
+    before = picture.view_position(40.0, 30.0)
+    told: list[tuple[str, float, float]] = []
+    view.dragged.connect(lambda *what: told.append(what))
+    with qtbot.assertNotEmitted(view.clicked):
+        drag(view, (40.0, 30.0), (50.0, 20.0))
+    assert [phase for phase, _, _ in told] == ["begin", *["move"] * (len(told) - 2), "end"]
+    assert told[0][1:] == pytest.approx((40.0, 30.0), abs=0.2)
+    assert told[-1][1:] == pytest.approx((50.0, 20.0), abs=0.2)
+    assert picture.view_position(40.0, 30.0) == before
+
+
+def test_a_handle_is_dragged_before_what_lies_below_it(view: LiveView, qtbot: QtBot) -> None:
+    view.show_picture(black())
+    view.hand_drags_on(True)
+    view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
+    with qtbot.assertNotEmitted(view.dragged), qtbot.waitSignal(view.moved):
+        drag(view, (40.0, 30.0), (45.0, 30.0))
+
+
+def test_no_magnification_is_told_without_a_picture(view: LiveView) -> None:
+    assert child(view, "live.zoom").text() == ""
+    view.show_picture(black())
+    assert child(view, "live.zoom").text().endswith("%")
+    view.set_stream(None)
+    assert child(view, "live.zoom").text() == ""

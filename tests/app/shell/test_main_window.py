@@ -240,6 +240,15 @@ def test_dropped_calibrations_go_to_the_library(window: MainWindow, tmp_path: Pa
     assert window.page("sensors").opened == files
 
 
+def test_a_dropped_recording_plays_the_camera(window: MainWindow, tmp_path: Path) -> None:
+    (tmp_path / "coin.gplrec").touch()
+    assert drop_on(window, tmp_path / "coin.gplrec")
+    info = window.context.source.info
+    assert info is not None
+    assert (info.kind, info.name) == ("recording", "coin")
+    assert "coin.gplrec" in window.context.toasts.shown()[0].text
+
+
 def test_other_files_are_not_taken(window: MainWindow, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
     assert not drop_on(window, tmp_path / "notes.txt")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from recorded import noisy
 
-from app.sources.recorder import LEAST_QUEUE, Recorder, RecorderFigures
+from app.sources.recorder import LEAST_QUEUE, Recorder, RecorderFigures, header_for
 from app.sources.source import Frame, Setting
 from app.sources.stream import Stream
 from gelpolight_core.recording.reader import Recording
@@ -34,8 +34,8 @@ class Silent:
         return None
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return none."""
-        return ()
+        """Return one."""
+        return (Setting("exposure_ms", "Exposure", "ms", 0.1, 50.0, 0.1, 4.0),)
 
     def set(self, key: str, value: float) -> float:
         """Change nothing."""
@@ -186,3 +186,10 @@ def test_a_place_that_cannot_be_written_is_one_sentence(stream: HandedOn, tmp_pa
     assert failure is not None
     assert "the folder does not exist" in failure
     recorder.stop()
+
+
+def test_a_recording_says_what_it_is_of() -> None:
+    header = header_for(Silent(), serial="A", calibration_id="c1", note="warm")
+    assert (header.source, header.kind) == ("silent", "virtual")
+    assert header.settings == {"exposure_ms": 4.0}
+    assert (header.serial, header.calibration_id, header.note) == ("A", "c1", "warm")

@@ -150,6 +150,7 @@ def test_it_goes_to_any_frame_and_steps(path: Path, clock: Clock) -> None:
     playback = source.playback()
     assert (playback.position, playback.count, playback.number) == (0, 6, 0)
     assert playback.duration_s == pytest.approx(0.5)
+    assert (playback.lost, playback.truncated) == (0, False)
     source.close()
 
 

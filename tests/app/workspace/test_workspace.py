@@ -26,6 +26,7 @@ from app.workspace.workspace import Workspace, folder_name
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
 GOOD = Comparison("height", 1.02, 1.0, 8.0)
 BAD = Comparison("diameter", 5.6, 5.0, 5.0)
@@ -306,3 +307,34 @@ def test_a_session_that_cannot_be_read_is_listed_under_its_folder(workspace: Wor
 
 def test_a_workspace_that_is_not_there_has_no_sessions(workspace: Workspace) -> None:
     assert workspace.sessions() == ()
+
+
+def measured(serial: str) -> MeasurementRecord:
+    return MeasurementRecord(serial, "c", "ball", (Quantity("diameter_mm", 5.0),))
+
+
+def test_the_records_are_begun_when_they_are_asked_for(workspace: Workspace) -> None:
+    assert not workspace.folder.exists()
+    workspace.records.add(measured("A"))
+    assert workspace.records is workspace.records
+    workspace.close()
+    assert [record.serial for record in workspace.records.measurements()] == ["A"]
+    workspace.close()
+
+
+def test_another_folder_has_records_of_its_own(workspace: Workspace, tmp_path: Path) -> None:
+    workspace.records.add(measured("A"))
+    workspace.folder = tmp_path / "other"
+    assert workspace.records.measurements() == ()
+    workspace.close()
+
+
+def test_every_recording_has_a_place_of_its_own(workspace: Workspace) -> None:
+    paths = set()
+    for _ in range(3):
+        path = workspace.recording_path("A/1")
+        path.touch()
+        paths.add(path)
+    assert len(paths) == 3
+    assert {path.parent for path in paths} == {workspace.recordings_folder("A/1")}
+    assert {path.suffix for path in paths} == {".gplrec"}

@@ -1,0 +1,79 @@
+"""A camera before the small sensor of the scene: bare, or with something pressed where one says."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import scene
+from numpy.typing import NDArray
+
+from app.sources.source import Frame, Setting
+from gelpolight_core.calibration.calibration import Calibration
+
+RATE_HZ = 60.0
+WALL_MM = 0.25
+
+
+def picture(
+    calibration: Calibration, place_mm: tuple[float, float] | None, size_mm: float = 5.0
+) -> NDArray[np.float64]:
+    """Return what the camera sees (240, 320, 3), 0..1, of a round press 0.5 mm high, or of none."""
+
+    def slopes(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        if place_mm is None:
+            return np.zeros_like(points)
+        away = points - np.array(place_mm)
+        radius = np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-9)
+        fall = 0.25 / WALL_MM / np.cosh((radius - 0.5 * size_mm) / WALL_MM) ** 2
+        return np.asarray(-fall * away / radius)
+
+    return np.asarray(scene.raw_picture(slopes, calibration), np.float64)
+
+
+class SceneCamera:
+    """Shows what a test puts before it, each frame with a noise of its own."""
+
+    kind, name, size = "camera", "Scene camera", (320, 240)
+
+    def __init__(self, calibration: Calibration) -> None:
+        self._calibration = calibration
+        self._lock = threading.Lock()
+        self._light = picture(calibration, None)
+        self._number = 0
+        self.shaking = False
+
+    def press(self, place_mm: tuple[float, float] | None) -> None:
+        """Press at a place from the next frame on; None: lift."""
+        light = picture(self._calibration, place_mm)
+        with self._lock:
+            self._light = light
+
+    def open(self) -> None:
+        """Do nothing."""
+
+    def frame(self, timeout_s: float) -> Frame | None:
+        """Return the next frame."""
+        time.sleep(min(1.0 / RATE_HZ, timeout_s))
+        with self._lock:
+            light, self._number = self._light, self._number + 1
+            if self.shaking:
+                light = np.roll(light, self._number % 5, axis=1)
+        rng = np.random.default_rng(self._number)
+        value = 255.0 * light + rng.standard_normal(light.shape, dtype=np.float32)
+        return Frame(
+            np.clip(np.rint(value), 0, 255).astype(np.uint8), self._number, time.monotonic()
+        )
+
+    def settings(self) -> tuple[Setting, ...]:
+        """Return none."""
+        return ()
+
+    def set(self, key: str, value: float) -> Any:
+        """Refuse."""
+        raise KeyError(key, value)
+
+    def close(self) -> None:
+        """Do nothing."""

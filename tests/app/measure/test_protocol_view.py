@@ -1,0 +1,225 @@
+"""The protocol as a technician goes through it: shown where, taken when still, left, reported."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scene
+from protocol_camera import SceneCamera, picture
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from app.command_line.main import main
+from app.measure.protocol_bench import BenchHand
+from app.measure.protocol_look import TOLERANCE_MM, PictureMap, PressLooker, make_target
+from app.measure.protocol_view import ProtocolView
+from app.shell.context import AppContext
+from app.sources.bench import Bench
+from app.sources.source import SourceInfo
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.measurement.protocol import PressWanted, Protocol
+from gelpolight_core.measurement.result import Truth
+from gelpolight_core.optics.refraction import camera_to_membrane
+
+WAIT_MS = 30_000
+
+
+def frame(place_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
+    light = picture(scene.calibration(), place_mm)
+    noise = np.random.default_rng(seed).standard_normal(light.shape)
+    return np.clip(np.rint(255.0 * light + noise), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "cuboid"])
+def test_the_mark_lies_where_the_camera_will_see_the_object(shape: str) -> None:
+    calibration = scene.calibration()
+    press = PressWanted(Truth(shape, 4.0, 1.0), (3.0, -2.0), 30.0, "r01", 1)
+    target = make_target(press, PictureMap(calibration))
+    seen = np.vstack([target.outline_px, [target.centre_px]])
+    back, _ = camera_to_membrane(
+        calibration.camera.directions(seen), calibration.plane, calibration.stack
+    )
+    away = np.linalg.norm(back - np.array(press.place_mm), axis=1)
+    assert away[-1] == pytest.approx(0.0, abs=1e-6)
+    assert away[:-1].min() == pytest.approx(2.0, abs=1e-3)
+    widest = 2.0 if shape == "cylinder" else 2.0 * np.sqrt(2.0)
+    assert away[:-1].max() == pytest.approx(widest, abs=1e-3)
+    assert target.pixels_per_mm == pytest.approx(1.0 / calibration.table.grid.pitch_mm, rel=0.05)
+
+
+def test_the_live_picture_is_followed_from_lifting_to_holding() -> None:
+    press = PressWanted(Truth("cylinder", 5.0, 0.5), (2.0, 1.0), 0.0, "r01", 1)
+    target = make_target(press, PictureMap(scene.calibration()))
+    looker = PressLooker(target, frame(None, 0))
+    assert looker(frame(press.place_mm, 1)).sentence == "Lift everything off the sensor."
+    assert looker.phase == "lift"
+    assert looker(frame(None, 2)).sentence.startswith("Press it in at the mark")
+    beside = (2.0 + 2 * TOLERANCE_MM, 1.0)
+    assert "mm beside the mark" in looker(frame(beside, 3)).sentence
+    assert looker.phase == "press"
+    held = looker(frame(press.place_mm, 4))
+    assert held.ready and looker.phase == "hold"
+    assert not looker(np.zeros((12, 16, 3), np.uint8)).ready
+
+
+def test_the_bench_presses_once_about_where_it_should() -> None:
+    bench = Bench(SensorDesign().scaled(0.1))
+    hand = BenchHand(bench)
+    press = Protocol().presses()[-1]
+    hand.press(press)
+    scene_ = bench.scene
+    assert (scene_.item, scene_.size_mm) == ("cuboid", press.truth.size_mm)
+    assert scene_.depth_mm == press.truth.height_mm
+    # Four standard deviations of the hand in each direction.
+    assert np.hypot(*np.subtract((scene_.x_mm, scene_.y_mm), press.place_mm)) < 0.6
+    bench.arrange(x_mm=0.0)
+    hand.press(press)
+    assert bench.scene.x_mm == 0.0
+    hand.lift()
+    assert bench.scene.item == "bare"
+
+
+@pytest.fixture
+def camera(context: AppContext) -> SceneCamera:
+    """Return the chosen camera; its calibration is in the library."""
+    calibration = scene.calibration()
+    write_calibration(calibration, context.workspace.calibration_path("T-1", "first"))
+    made = SceneCamera(calibration)
+    context.source.choose(SourceInfo("camera", made.name, "", lambda: made))
+    return made
+
+
+@pytest.fixture
+def view(context: AppContext, camera: SceneCamera, qtbot: QtBot) -> Iterator[ProtocolView]:
+    made = ProtocolView(context=context)
+    made.resize(1280, 800)
+    made.show()
+    made.enter()
+    yield made
+    made.leave()
+    made.may_close()
+    made.close()
+    made.deleteLater()
+
+
+def choose(view: ProtocolView, *, repeats: int, regions: int = 0) -> None:
+    """Choose a cylinder of 5 mm and 0.5 mm height alone."""
+    for boxes, kept in (
+        (view.setup.shapes, "cylinder"),
+        (view.setup.sizes, None),
+        (view.setup.heights, 0.5),
+    ):
+        for value, box in boxes.items():
+            box.setChecked(value == kept)
+    view.setup.repeats.setValue(repeats)
+    view.setup.regions.setValue(regions)
+
+
+def begin(view: ProtocolView, qtbot: QtBot) -> None:
+    view.setup.begin.click()
+    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
+    take_bare(view, qtbot)
+
+
+def take_bare(view: ProtocolView, qtbot: QtBot) -> None:
+    panel = view.pressing.panel
+    qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
+    panel.bare.click()
+    qtbot.waitUntil(panel.capture.isEnabled, timeout=WAIT_MS)
+
+
+def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
+    """Press where the program says, wait until it has taken it, and lift."""
+    run = view.work.run
+    before, wanted = run.progress.done, run.next()
+    camera.press(wanted.place_mm)
+    qtbot.waitUntil(lambda: run.progress.done == before + 1, timeout=WAIT_MS)
+    camera.press(None)
+
+
+def test_what_is_chosen_is_counted_before_it_is_begun(view: ProtocolView) -> None:
+    assert "18 objects, 540 presses" in view.setup.summary.text()
+    choose(view, repeats=2, regions=3)
+    assert "1 objects, 5 presses" in view.setup.summary.text()
+    choose(view, repeats=0)
+    assert not view.setup.begin.isEnabled()
+
+
+def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
+    view: ProtocolView, camera: SceneCamera, context: AppContext, qtbot: QtBot, tmp_path: Path
+) -> None:
+    choose(view, repeats=1, regions=1)
+    begin(view, qtbot)
+    assert view.pressing.panel.title.text() == "Cylinder 5 mm, height 0.5 mm"
+    press_next(view, camera, qtbot)
+    folder = view.work.run.folder
+    assert view.pressing.panel.where.text().startswith("Random region 1")
+
+    view.pressing.panel.leave.click()
+    assert view.work is None
+    again = view.findChild(QPushButton, "protocol.run.0")
+    assert "1 of 2 presses" in again.text()
+    again.click()
+    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
+    assert view.work.run.folder == folder
+    take_bare(view, qtbot)
+    press_next(view, camera, qtbot)
+
+    # The last press leads to the result by itself.
+    qtbot.waitUntil(lambda: "all 2 presses" in view.result.verdict.text(), timeout=WAIT_MS)
+    view.result.save(folder / "report")
+    qtbot.waitUntil((folder / "report" / "gauge.csv").is_file, timeout=WAIT_MS)
+    names = {path.suffix for path in (folder / "report").iterdir()}
+    assert {".csv", ".html", ".pdf"} <= names
+
+    calibration = context.workspace.entries()[0].path
+    assert main(["evaluate", str(calibration), str(folder), "-o", str(tmp_path / "out")]) == 0
+    for name in ("evaluation.csv", "evaluation.json", "gauge.csv"):
+        on_screen = (folder / "report" / name).read_bytes()
+        assert (tmp_path / "out" / name).read_bytes() == on_screen
+
+
+def test_an_unsteady_press_is_refused_with_its_reason_and_asked_for_again(
+    view: ProtocolView, camera: SceneCamera, qtbot: QtBot
+) -> None:
+    choose(view, repeats=2)
+    begin(view, qtbot)
+    run, panel = view.work.run, view.pressing.panel
+    camera.shaking = True
+    camera.press(run.next().place_mm)
+    qtbot.waitUntil(lambda: panel.live.text() == "Hold it still.", timeout=WAIT_MS)
+    panel.capture.click()
+    qtbot.waitUntil(lambda: run.progress.refused == 1, timeout=WAIT_MS)
+    assert run.progress.done == 0
+    with (run.folder / "refused.csv").open() as file:
+        assert "It moved" in next(csv.reader(file))[2]
+    assert "1 refused" in panel.counts.text()
+    camera.shaking = False
+    qtbot.waitUntil(lambda: run.progress.done == 1, timeout=WAIT_MS)
+    # It has to be lifted in between: one press does not count twice.
+    qtbot.waitUntil(lambda: panel.live.text().startswith("Lift"), timeout=WAIT_MS)
+    panel.take_back.click()
+    assert run.progress.done == 0
+    assert len(list((run.folder / "discarded").iterdir())) == 1
+
+
+def test_a_run_that_cannot_be_opened_says_why(
+    view: ProtocolView, context: AppContext, qtbot: QtBot
+) -> None:
+    choose(view, repeats=1)
+    begin(view, qtbot)
+    folder = view.work.run.folder
+    view.pressing.panel.leave.click()
+    for entry in context.workspace.entries():
+        context.workspace.remove(entry.path)
+    view.open_run(folder)
+    qtbot.waitUntil(lambda: "not in the library" in view.setup.problem.text(), timeout=WAIT_MS)
+    (folder / "protocol.toml").write_text("damaged [")
+    view.enter()
+    assert "damaged" in view.findChild(QPushButton, "protocol.run.0").text()
+    assert not view.setup.begin.isEnabled()

@@ -1,0 +1,67 @@
+"""Work goes on in its order, is stopped when asked, and never keeps a page from closing."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.shell.jobs import Job, Jobs
+from app.sources.stopping import join_left_behind
+from gelpolight_core.errors import InputError
+
+Tell = Callable[[float], None]
+
+
+def test_jobs_are_done_one_after_the_other(qtbot: QtBot) -> None:
+    jobs, done = Jobs("jobs"), list[Any]()
+    for number in range(3):
+        jobs.submit(Job("count", lambda _tell, n=number: n, done.append))
+    qtbot.waitUntil(lambda: not jobs.busy)
+    assert done == [0, 1, 2]
+    assert jobs.close()
+
+
+def test_a_refusal_is_told_in_one_sentence_and_the_next_job_is_done(qtbot: QtBot) -> None:
+    jobs, done = Jobs("jobs"), list[Any]()
+
+    def refuse(_tell: Tell) -> None:
+        raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+
+    with qtbot.waitSignal(jobs.refused) as told:
+        jobs.submit(Job("look", refuse))
+        jobs.submit(Job("count", lambda _tell: 1, done.append))
+    assert "the picture is grey" in told.args[0]
+    qtbot.waitUntil(lambda: done == [1])
+    assert jobs.close()
+
+
+def test_what_must_be_done_is_done_though_all_else_is_cancelled() -> None:
+    jobs, go, written = Jobs("jobs"), threading.Event(), list[str]()
+    jobs.submit(Job("wait", lambda _tell: go.wait(10.0)))
+    jobs.submit(Job("compute", lambda _tell: written.append("computed")))
+    jobs.submit(Job("save", lambda _tell: written.append("saved"), must=True))
+    jobs.cancel()
+    go.set()
+    assert jobs.close()
+    assert written == ["saved"]
+
+
+def test_work_that_hangs_does_not_keep_the_page_from_closing(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    jobs, begun, go = Jobs("hanging"), threading.Event(), threading.Event()
+
+    def hang(_tell: Tell) -> bool:
+        begun.set()
+        return go.wait(30.0)
+
+    jobs.submit(Job("hang", hang))
+    assert begun.wait(10.0)
+    assert not jobs.close(timeout_s=0.05)
+    assert "hanging did not stop" in caplog.text
+    go.set()
+    assert join_left_behind(10.0)

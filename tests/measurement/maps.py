@@ -1,0 +1,57 @@
+"""Height maps with a known answer, for tests of the measuring tools."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import zoom
+
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+
+Array = NDArray[np.float64]
+PITCH = 0.05
+X = np.arange(-8.0, 8.0, PITCH)
+Y = np.arange(-6.0, 6.0, PITCH)
+
+
+def made(surface: Callable[[Array, Array], Array] | Array, **more: object) -> HeightMap:
+    """Return the map of a surface, given as depths or as a function of x and y; rim outside."""
+    x, y = np.meshgrid(X, Y)
+    depth = surface(x, y) if callable(surface) else surface
+    flags = np.zeros(depth.shape, np.uint8)
+    flags[:4] = flags[-4:] = int(Flag.OUTSIDE)
+    return HeightMap(
+        depth_mm=np.asarray(depth, np.float32),
+        x_mm=X,
+        y_mm=Y,
+        pitch_mm=PITCH,
+        normals=None,
+        flags=flags,
+        calibration_id="T-1",
+        model="full",
+        source="made.png",
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def stated(count: int, sigma_mm: float, *, model_mm: float = 0.0) -> dict[str, object]:
+    """Return noise that is even over blocks of four nodes, and what a map says of it."""
+    shape = (Y.size, X.size)
+    noise = np.random.default_rng(1).normal(0.0, sigma_mm, (count, Y.size // 4, X.size // 4))
+    return {
+        "noise_mm": noise.astype(np.float32),
+        "depth_sd_mm": np.full(shape, sigma_mm, np.float32),
+        "depth_model_sd_mm": np.full(shape, model_mm, np.float32),
+        "slope_model_sd": np.zeros(shape, np.float32),
+        "depth_scale_sd": 0.0,
+        "lateral_scale_sd": 0.0,
+    }
+
+
+def drawn(sigma_mm: float, seed: int) -> Array:
+    """Return another noise of the same kind, at full scale."""
+    random = np.random.default_rng(seed)
+    coarse = random.normal(0.0, sigma_mm, (Y.size // 4, X.size // 4))
+    return np.asarray(zoom(coarse, 4, order=1, grid_mode=True, mode="nearest"))

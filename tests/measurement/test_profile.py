@@ -1,0 +1,163 @@
+"""A user draws a line and reads steps, widths, slopes and angles off the section."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from maps import PITCH, X, Y, drawn, made, stated
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.measurement.profile import (
+    angle_between,
+    slope,
+    step_height,
+    take_profile,
+    width_at,
+    width_ends,
+)
+from gelpolight_core.reconstruction.heightmap import Flag
+
+
+@given(
+    angle=st.floats(0.0, 6.28),
+    length=st.floats(0.5, 4.0),
+    width=st.floats(0.0, 1.0),
+    steep=st.floats(-1.0, 1.0),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_line_in_any_direction_reads_a_tilted_plane_as_it_is(
+    angle: float, length: float, width: float, steep: float
+) -> None:
+    plane = made(lambda x, y: 1.0 + steep * x + 0.3 * y)
+    end = (1.0 + length * math.cos(angle), -0.5 + length * math.sin(angle))
+    profile = take_profile(plane, (1.0, -0.5), end, width_mm=width)
+    along = steep * math.cos(angle) + 0.3 * math.sin(angle)
+    assert np.diff(profile.along_mm).max() <= PITCH / 2 + 1e-9
+    expected = 1.0 + steep - 0.15 + along * profile.along_mm
+    assert profile.depth_mm == pytest.approx(expected, abs=2e-6)
+    assert profile.points_mm[-1] == pytest.approx(end)
+    found = slope(profile, 0.0, length)
+    assert found.value == pytest.approx(math.degrees(math.atan(along)), abs=1e-3)
+    assert (found.unit, found.sd) == ("deg", None)
+
+
+def test_outside_the_map_and_its_working_area_there_is_no_depth() -> None:
+    profile = take_profile(made(lambda x, y: x), (0.0, -7.0), (0.0, 0.0))
+    inside = profile.points_mm[:, 1] >= Y[4]
+    assert np.isfinite(profile.depth_mm[inside]).all()
+    assert np.isnan(profile.depth_mm[profile.points_mm[:, 1] < Y[3]]).all()
+    assert (profile.flags[~inside][1:-4] & int(Flag.OUTSIDE)).all()
+    with pytest.raises(InputError, match="outside the working area"):
+        take_profile(made(lambda x, y: x), (20.0, 0.0), (30.0, 0.0))
+
+
+def test_the_width_of_a_roof_at_a_level_and_at_half_its_height() -> None:
+    roof = made(lambda x, y: np.maximum(1.0 - np.abs(x - 0.3) / 2.0, 0.0))
+    profile = take_profile(roof, (-5.0, 1.0), (5.0, 1.0), width_mm=0.4)
+    assert width_at(profile, 0.25).value == pytest.approx(3.0, abs=1e-4)
+    assert width_at(profile).value == pytest.approx(2.0, abs=0.01)
+    left, right, level = width_ends(profile, 0.25)
+    assert (left, right, level) == pytest.approx((3.8, 6.8, 0.25), abs=1e-4)
+    with pytest.raises(InputError, match="come back"):
+        width_at(profile, 0.25, between=(0.0, 5.3))
+    with pytest.raises(InputError, match="come back"):
+        width_at(profile, 2.0)
+
+
+def test_a_groove_has_a_width_too() -> None:
+    groove = made(lambda x, y: 1.0 - np.clip(1.5 - np.abs(x), 0.0, 0.5))
+    profile = take_profile(groove, (-4.0, 0.0), (4.0, 0.0))
+    assert width_at(profile).value == pytest.approx(2.5, abs=0.01)
+
+
+def test_a_stair_has_its_step_and_a_ridge_its_angle() -> None:
+    profile = take_profile(made(lambda x, y: np.where(x > 0.0, 0.7, 0.2)), (-3, 0), (3, 0))
+    step = step_height(profile, first_mm=(0.5, 2.0), second_mm=(4.0, 5.5))
+    assert (step.value, step.unit, step.name) == (pytest.approx(0.5, abs=1e-6), "mm", "step_height")
+    ridge = take_profile(
+        made(lambda x, y: -np.abs(x) * math.tan(math.radians(20))), (-3, 0), (3, 0)
+    )
+    assert angle_between(ridge, (0.5, 2.5), (3.5, 5.5)).value == pytest.approx(40.0, abs=1e-3)
+    assert angle_between(ridge, (0.5, 1.5), (1.5, 2.5)).value == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_range_without_the_map_is_refused() -> None:
+    profile = take_profile(made(lambda x, y: x), (0.0, 0.0), (3.0, 0.0))
+    with pytest.raises(InputError, match="too few points"):
+        step_height(profile, first_mm=(4.0, 5.0), second_mm=(0.0, 1.0))
+    for bad in ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, math.nan, 0.0), (1e7, 0.0, 0.0)):
+        with pytest.raises(InputError, match="a line of"):
+            take_profile(made(lambda x, y: x), (0.0, 0.0), bad[:2], width_mm=bad[2])
+
+
+def test_figures_scatter_by_what_they_state() -> None:
+    def surface(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.maximum(1.0 - np.abs(x) / 2.0, 0.0)
+
+    def figures(heightmap):
+        p = take_profile(heightmap, (-4.0, 0.3), (4.0, 0.3), width_mm=0.5)
+        return [
+            step_height(p, first_mm=(0.2, 1.4), second_mm=(3.8, 4.2)),
+            slope(p, 2.4, 3.6),
+            angle_between(p, (2.4, 3.6), (4.4, 5.6)),
+        ]
+
+    sigma = 0.01
+    said = figures(made(surface, **stated(200, sigma)))
+    x, y = np.meshgrid(X, Y)
+    repeats = [figures(made(surface(x, y) + drawn(sigma, seed))) for seed in range(60)]
+    for k, figure in enumerate(said):
+        scatter = np.std([repeat[k].value for repeat in repeats], ddof=1)
+        # 60 repeats know their scatter to 9 %, 200 examples theirs to 5 %.
+        assert figure.sd == pytest.approx(scatter, rel=0.3), figure.name
+
+
+def test_the_calibrations_share_goes_to_depths_and_to_lengths() -> None:
+    surface = made(lambda x, y: np.maximum(1.0 - np.abs(x) / 2.0, 0.0), **stated(4, 0.0))
+    scaled = replace(surface, depth_scale_sd=0.01, lateral_scale_sd=0.002)
+    profile = take_profile(scaled, (-4.0, 0.0), (4.0, 0.0))
+    step = step_height(profile, first_mm=(0.2, 1.0), second_mm=(3.9, 4.1))
+    assert step.sd == pytest.approx(0.01 * step.value, rel=1e-3)
+    width = width_at(profile)
+    assert width.sd == pytest.approx(
+        math.hypot(0.002 * width.value, math.sqrt(2) * PITCH), rel=1e-3
+    )
+    leaning = slope(profile, 2.5, 3.5)
+    share = math.degrees(0.5 * math.hypot(0.01, 0.002) / 1.25)
+    assert leaning.sd == pytest.approx(share, rel=0.02)
+    assert profile.depth_sd_mm == pytest.approx(0.01 * profile.depth_mm, abs=1e-9)
+
+
+def test_what_the_model_leaves_open_is_larger_between_far_places_than_near_ones() -> None:
+    flat = made(lambda x, y: 0.0 * x, **stated(64, 0.0, model_mm=0.01))
+    profile = take_profile(flat, (-4.0, 0.0), (4.0, 0.0))
+    near = step_height(profile, first_mm=(3.9, 4.0), second_mm=(4.0, 4.1)).sd
+    far = step_height(profile, first_mm=(0.0, 0.1), second_mm=(7.9, 8.0)).sd
+    assert near < 0.2 * far
+    assert far == pytest.approx(math.sqrt(2.0) * 0.01, rel=0.3)
+
+
+def test_a_spreadsheet_reads_the_profile(tmp_path: Path) -> None:
+    heightmap = made(lambda x, y: 0.1 * x + 0.2, **stated(8, 0.003))
+    profile = take_profile(heightmap, (0.0, -6.0), (1.0, 5.0), width_mm=0.3)
+    write_profile(profile, tmp_path / "section.csv")
+    with (tmp_path / "section.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == profile.along_mm.size
+    known = [k for k, row in enumerate(rows) if row["depth_mm"]]
+    assert known == np.flatnonzero(np.isfinite(profile.depth_mm)).tolist()
+    for name in ("along_mm", "depth_mm", "depth_sd_mm"):
+        found = [float(rows[k][name]) for k in known]
+        assert found == pytest.approx(getattr(profile, name)[known], abs=1e-6)
+    places = np.array([[float(row["x_mm"]), float(row["y_mm"])] for row in rows])
+    assert places == pytest.approx(profile.points_mm, abs=1e-6)
+    assert [int(row["flags"]) for row in rows] == profile.flags.tolist()
+    assert rows[0]["depth_sd_mm"] == rows[0]["depth_mm"] == ""

@@ -1,0 +1,113 @@
+"""A user presses an object, and the program says which of the three it is, or that it is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.proposal import propose
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, nut, press
+from gelpolight_core.simulation.surface import PressedSurface
+
+PITCH = 0.08
+X = np.arange(-9.0, 9.0, PITCH)
+Y = np.arange(-8.0, 8.0, PITCH)
+
+
+def map_of(*surfaces: PressedSurface, noise_mm: float = 0.003) -> HeightMap:
+    """Return a noisy height map of what the virtual sensor's membrane does."""
+    depth = noise_mm * np.random.default_rng(3).standard_normal((Y.size, X.size))
+    for surface in surfaces:
+        column = (X - surface.x0_mm) / surface.pitch_mm
+        row = (Y - surface.y0_mm) / surface.pitch_mm
+        grid = np.meshgrid(column.astype(np.float32), row.astype(np.float32))
+        depth += cv2.remap(surface.depth_mm.astype(np.float32), *grid, cv2.INTER_LINEAR)
+    return whole(depth, X, Y)
+
+
+def whole(depth: np.ndarray, x: np.ndarray, y: np.ndarray) -> HeightMap:
+    return HeightMap(
+        depth_mm=depth.astype(np.float32),
+        x_mm=x,
+        y_mm=y,
+        pitch_mm=float(x[1] - x[0]),
+        normals=None,
+        flags=np.zeros(depth.shape, np.uint8),
+        calibration_id="T-1",
+        model="full",
+        source="made.png",
+    )
+
+
+@pytest.mark.parametrize(
+    ("shape", "make"),
+    [
+        ("ball", lambda: press(Ball(3.0, 0.8), x_mm=1.0, y_mm=-2.0, pitch_mm=0.04)),
+        ("cylinder", lambda: press(Cylinder(4.0, 0.7), x_mm=-2.0, y_mm=1.0, pitch_mm=0.04)),
+        ("cuboid", lambda: press(Cuboid(5.0, 1.0), x_mm=0.5, yaw_deg=25.0, pitch_mm=0.06)),
+    ],
+)
+def test_what_the_virtual_sensor_presses_is_recognised(
+    shape: str, make: Callable[[], PressedSurface]
+) -> None:
+    found = propose(map_of(make()))
+    assert found is not None
+    assert (found.shape, found.candidates) == (shape, (shape,))
+    assert min(found.residual_mm, key=lambda name: found.residual_mm[name]) == shape
+
+
+def test_a_nut_is_none_of_them() -> None:
+    assert propose(map_of(press(nut(), pitch_mm=0.06))) is None
+
+
+def test_where_nothing_is_pressed_nothing_is_proposed() -> None:
+    assert propose(map_of()) is None
+    assert propose(map_of(press(Cylinder(4.0, 0.7), x_mm=-8.0, pitch_mm=0.04))) is None
+
+
+def test_what_noise_hides_is_unclear() -> None:
+    # Shallow and small: cylinder and ball differ by less than the noise.
+    found = propose(map_of(press(Cylinder(1.2, 0.3), pitch_mm=0.04), noise_mm=0.012))
+    assert found is None or found.shape == "unclear"
+    assert found is None or len(found.candidates) == 2
+
+
+def test_of_several_the_tallest_or_the_one_pointed_at_is_told() -> None:
+    both = map_of(
+        press(Ball(3.0, 0.9), x_mm=-4.5, pitch_mm=0.04),
+        press(Cylinder(3.0, 0.5), x_mm=4.5, pitch_mm=0.04),
+    )
+    tallest, pointed = propose(both), propose(both, seed_mm=(4.5, 0.5))
+    assert tallest is not None
+    assert pointed is not None
+    assert (tallest.shape, pointed.shape) == ("ball", "cylinder")
+    assert tallest.at_mm == pytest.approx((-4.5, 0.0), abs=0.1)
+    with pytest.raises(InputError, match="seed"):
+        propose(both, seed_mm=(0.0, 7.0))
+
+
+@pytest.mark.parametrize(
+    ("sensor", "name", "expected"),
+    [
+        ("sensor-A", "cuboid_s5_d125", "cuboid"),
+        ("sensor-B", "cylinder_s3_d100", "cylinder"),
+        ("sensor-A", "object_coin", None),
+    ],
+)
+def test_true_surfaces_of_another_renderer_are_recognised(
+    shared_data: Path, sensor: str, name: str, expected: str | None
+) -> None:
+    with np.load(shared_data / sensor / "truth" / f"{name}.npz") as data:
+        depth = data["depth_mm"].astype(np.float64)
+        pitch, x0, y0 = (float(data[key]) for key in ("pitch_mm", "x0_mm", "y0_mm"))
+    stride = max(round(0.08 / pitch), 1)
+    depth = depth[::stride, ::stride]
+    x, y = (a + stride * pitch * np.arange(n) for a, n in ((x0, depth.shape[1]), (y0, len(depth))))
+    found = propose(whole(depth, x, y))
+    assert (None if found is None else found.shape) == expected

@@ -1,0 +1,203 @@
+"""A user places a measuring tool on a map, reads it, stores it and repeats it."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from maps import PITCH, made, stated
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.drape import ball_depth, cuboid_depth, cylinder_depth
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.tools import (
+    TOOLS,
+    Angle,
+    Ball,
+    Circle,
+    Cuboid,
+    Cylinder,
+    Distance,
+    ProfileAngle,
+    ProfileStep,
+    ProfileWidth,
+    Rectangle,
+    RectangleTool,
+    StepHeight,
+    Tool,
+    result_as_dict,
+    tool_as_dict,
+    tool_from_dict,
+    tools_from_json,
+)
+from gelpolight_core.reconstruction.heightmap import Flag
+
+ALL: tuple[Tool, ...] = (
+    Distance((0.0, 0.0), (1.0, 2.0)),
+    StepHeight(Rectangle((-5.0, 0.0), (1.0, 1.0)), Rectangle((0.0, 0.0), (1.0, 2.0), 30.0)),
+    ProfileStep((-6.0, 0.0), (0.0, 0.0), (0.0, 1.0), (5.0, 6.0), 0.5),
+    ProfileWidth((-6.0, 0.0), (6.0, 0.0)),
+    ProfileWidth((-6.0, 0.0), (6.0, 0.0), 0.2, 0.3, (1.0, 11.0)),
+    ProfileAngle((-6.0, 0.0), (0.0, 0.0), (0.0, 1.0), (5.0, 6.0)),
+    Angle((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)),
+    Circle(((3.0, 0.2), (-2.0, 1.5), (0.0, -2.5)), "steepest"),
+    RectangleTool(Rectangle((0.0, 0.0), (2.0, 1.0), 10.0)),
+    Ball(),
+    Cylinder((0.5, 0.0)),
+    Cuboid(),
+)
+
+
+def cylinder(**more: Any):
+    """Return the map of a cylinder of 5 mm, pressed 1 mm deep at (0.3, -0.2)."""
+    return made(
+        lambda x, y: cylinder_depth(
+            np.hypot(x - 0.3, y + 0.2), cylinder_radius_mm=2.5, height_mm=1.0, decay_mm=0.7
+        ),
+        **more,
+    )
+
+
+def test_every_tool_is_stored_as_plain_json_and_read_back() -> None:
+    assert {tool.name for tool in ALL} == set(TOOLS)
+    for tool in ALL:
+        text = json.dumps(tool_as_dict(tool), allow_nan=False)
+        assert tool_from_dict(json.loads(text)) == tool
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({}, "unknown tool"),
+        ({"tool": "ruler"}, "unknown tool 'ruler'"),
+        ({"tool": "distance", "a_mm": [0, 0]}, "b_mm is missing"),
+        ({"tool": "ball", "colour": 1}, "colour is not known"),
+        ({"tool": "distance", "a_mm": [0, 0], "b_mm": [0]}, r"b_mm is \[0\]"),
+        ({"tool": "distance", "a_mm": [0, 0], "b_mm": [0, "1"]}, "b_mm is"),
+        ({"tool": "distance", "a_mm": [0, 0], "b_mm": [0, float("nan")]}, "b_mm is"),
+        ({"tool": "circle", "points_mm": 3}, "points_mm is 3"),
+        ({"tool": "rectangle", "rectangle": {"centre_mm": [0, 0]}}, "rectangle is"),
+        ({"tool": "rectangle", "rectangle": {"centre_mm": [0, 0], "sides_mm": [1, 0]}}, "1 x 0"),
+    ],
+)
+def test_a_stored_tool_that_is_not_right_is_refused(content: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        tool_from_dict(content)
+
+
+def test_stored_results_are_measured_again_to_the_last_bit() -> None:
+    heightmap = cylinder(**stated(8, 0.002))
+    tools = [tool for tool in ALL if tool.name not in ("ball", "cylinder", "cuboid")]
+    results = [tool.apply(heightmap) for tool in tools]
+    stored = json.loads(json.dumps({"results": [result_as_dict(r) for r in results]}))
+    again = [result_as_dict(tool.apply(heightmap)) for tool in tools_from_json(stored)]
+    assert again == stored["results"]
+    for result in results:
+        assert result.drawing_mm
+        assert all(line.ndim == 2 and line.shape[1] == 2 for line in result.drawing_mm)
+    assert results[0].figures[0].label == "distance in the plane"
+    with pytest.raises(InputError, match="no measuring tool"):
+        tools_from_json([])
+
+
+def test_a_distance_is_told_in_the_plane_in_space_and_in_depth() -> None:
+    result = Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: 4.0 / 3.0 * x))
+    assert result["distance"].value == 3.0
+    assert result["distance_3d"].value == pytest.approx(5.0, rel=1e-6)
+    assert result["depth_difference"].value == pytest.approx(4.0, rel=1e-6)
+    with pytest.raises(InputError, match="outside the working area"):
+        Distance((0.0, 0.0), (30.0, 0.0)).apply(made(lambda x, y: x))
+
+
+def test_an_angle_is_told_in_the_plane_and_in_space() -> None:
+    result = Angle((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
+    assert result["angle"].value == pytest.approx(90.0)
+    # (1, 0, 1) and (0, 1, 1) meet at 60 degrees.
+    assert result["angle_3d"].value == pytest.approx(60.0, abs=1e-4)
+    with pytest.raises(InputError, match="no length"):
+        Angle((0.0, 0.0), (0.0, 0.0), (1.0, 0.0)).apply(made(lambda x, y: x))
+
+
+def test_the_step_of_a_cylinder_is_its_height() -> None:
+    step = StepHeight(Rectangle((7.0, 3.0), (1.0, 1.0)), Rectangle((0.3, -0.2), (2.0, 2.0), 20.0))
+    result = step.apply(cylinder(**stated(64, 0.004)))
+    assert result["step_height"].value == pytest.approx(1.0, abs=2e-3)
+    # Averages over 6 x 6 and 10 x 10 blocks of noise that is even over 4 x 4 nodes.
+    assert result["step_height"].sd == pytest.approx(0.004 * math.hypot(1 / 5, 1 / 10), rel=0.35)
+
+
+@pytest.mark.parametrize("around", [(0.0, 0.0, 1.0), (0.3, -0.2, 1.1), (0.1, 0.2, 0.95)])
+def test_a_circle_drawn_roughly_snaps_to_the_cylinders_edge(
+    around: tuple[float, float, float],
+) -> None:
+    x, y, share = around
+    turns = (0.3, 2.0, 4.4)
+    rim = tuple(
+        (0.3 + x + 2.5 * share * math.cos(a), -0.2 + y + 2.5 * share * math.sin(a)) for a in turns
+    )
+    heightmap = cylinder(**stated(8, 0.0))
+    snapped = Circle(rim).apply(heightmap)
+    assert snapped["diameter"].value == pytest.approx(5.0, abs=1.5 * PITCH)
+    assert abs(snapped["diameter"].value - 5.0) < 2.0 * snapped["diameter"].sd
+    assert snapped["centre_x"].value == pytest.approx(0.3, abs=0.01)
+    assert snapped["centre_y"].value == pytest.approx(-0.2, abs=0.01)
+    plain = Circle(rim, "plain").apply(heightmap)
+    assert plain["diameter"].value == pytest.approx(5.0 * share, rel=1e-6)
+    assert plain["centre_x"].value == pytest.approx(0.3 + x, abs=1e-6)
+
+
+def test_a_circle_needs_a_rim() -> None:
+    with pytest.raises(InputError, match="no circle"):
+        Circle(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), "plain").apply(cylinder())
+    with pytest.raises(InputError, match="no circle"):
+        Circle(((0.0, 0.0), (1.0, 1.0)), "plain").apply(cylinder())
+    with pytest.raises(InputError, match="no edge"):
+        Circle(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))).apply(made(lambda x, y: 0.0 * x))
+    with pytest.raises(InputError, match="unknown edge"):
+        Circle(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)), "outer").apply(cylinder())  # type: ignore[arg-type]
+
+
+def test_a_rectangle_drawn_roughly_snaps_to_the_cuboids_edges() -> None:
+    yaw = math.radians(12.0)
+
+    def surface(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        along = math.cos(yaw) * (x - 0.4) + math.sin(yaw) * y
+        across = math.cos(yaw) * y - math.sin(yaw) * (x - 0.4)
+        return cuboid_depth(along, across, side_mm=(5.0, 3.0), height_mm=1.0, decay_mm=0.7)
+
+    heightmap = made(surface, **stated(8, 0.0))
+    drawn = Rectangle((0.5, -0.1), (5.3, 2.8), 9.0)
+    found = RectangleTool(drawn, "steepest").apply(heightmap)
+    assert found["side_a"].value == pytest.approx(5.0, abs=1.5 * PITCH)
+    assert found["side_b"].value == pytest.approx(3.0, abs=1.5 * PITCH)
+    assert found["yaw"].value == pytest.approx(12.0, abs=0.2)
+    plain = RectangleTool(Rectangle((0.4, 0.0), (3.0, 1.5), 12.0)).apply(heightmap)
+    assert plain["mean_depth"].value == pytest.approx(1.0, abs=1e-6)
+    assert plain["deepest"].value == pytest.approx(1.0, abs=1e-6)
+    assert plain["tilt"].value == pytest.approx(0.0, abs=1e-3)
+    assert plain["sq"].value == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_fitted_indenter_says_what_the_measurement_says() -> None:
+    heightmap = made(
+        lambda x, y: ball_depth(np.hypot(x, y), ball_radius_mm=3.0, height_mm=0.8, decay_mm=0.7),
+        **stated(8, 0.001),
+    )
+    result = Ball().apply(heightmap)
+    fit = measure_heightmap(heightmap, shape="ball")
+    assert result.measurement is not None
+    assert result["diameter"].value == fit.diameter_mm
+    assert result["height"].sd == fit.sd["height_mm"]
+    assert (result.verdict, result.reason) == (fit.verdict, fit.reason)
+    assert result["diameter"].value == pytest.approx(6.0, abs=0.01)
+
+
+def test_what_rests_on_guessed_depths_is_doubtful() -> None:
+    heightmap = cylinder()
+    heightmap.flags[:, 150:] |= int(Flag.SATURATED)
+    result = ProfileWidth((-6.0, 0.0), (6.0, 0.0)).apply(heightmap)
+    assert result.verdict == "doubtful"
+    assert "saturated" in result.reason

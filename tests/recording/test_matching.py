@@ -1,0 +1,37 @@
+"""A recording goes with the calibrations of its own sensor only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import scene
+from recorded import write_recording
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording.matching import require_match
+from gelpolight_core.recording.reader import Recording
+from gelpolight_core.recording.recording import RecordingHeader
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_another_calibration_of_the_same_sensor_will_do(tmp_path: Path, named: bool) -> None:
+    calibration = scene.calibration()
+    serial = calibration.sensor.serial if named else ""
+    header = RecordingHeader(serial=serial, calibration_id="an older one")
+    shape = (calibration.camera.height, calibration.camera.width)
+    write_recording(tmp_path / "a.gplrec", frames=1, shape=shape, header=header)
+    with Recording.open(tmp_path / "a.gplrec") as recording:
+        require_match(recording, calibration)
+
+
+def test_another_sensor_or_size_is_refused_by_name(tmp_path: Path) -> None:
+    calibration = scene.calibration()
+    write_recording(tmp_path / "a.gplrec", header=RecordingHeader(serial="other"))
+    with Recording.open(tmp_path / "a.gplrec") as recording:
+        with pytest.raises(InputError, match="is of sensor other and the calibration of sensor"):
+            require_match(recording, calibration)
+    write_recording(tmp_path / "b.gplrec", shape=(5, 7))
+    with Recording.open(tmp_path / "b.gplrec") as recording:
+        with pytest.raises(InputError, match="the frames are 7x5 pixels"):
+            require_match(recording, calibration)

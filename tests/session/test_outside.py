@@ -1,0 +1,57 @@
+"""What somebody else writes into an open session's files is noticed before it is lost."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.outside import KnownFiles
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Return a file that holds something."""
+    path = tmp_path / "session.toml"
+    path.write_text("a = 1")
+    return path
+
+
+def test_a_file_that_was_changed_or_removed_is_told_and_not_written_over(path: Path) -> None:
+    files = KnownFiles([path])
+    assert files.changed() == ()
+    for change in (lambda: path.write_text("a = 22"), path.unlink):
+        change()
+        assert files.changed() == (path,)
+        with pytest.raises(InputError, match="Reload"):
+            files.refuse_changed(path)
+
+
+def test_a_file_that_is_written_where_there_was_none_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "decisions.toml"
+    files = KnownFiles([path])
+    path.write_text("a = 1")
+    assert files.changed() == (path,)
+
+
+def test_a_change_of_the_same_length_is_told(path: Path) -> None:
+    files = KnownFiles([path])
+    path.write_text("a = 2")
+    os.utime(path, ns=(1, 1))
+    assert files.changed() == (path,)
+
+
+def test_a_file_that_was_only_saved_again_is_none_that_was_changed(path: Path) -> None:
+    files = KnownFiles([path])
+    path.write_text("a = 1")
+    os.utime(path, ns=(1, 1))
+    assert files.changed() == ()
+
+
+def test_what_was_written_here_is_known(path: Path) -> None:
+    files = KnownFiles([path])
+    path.write_text("a = 22")
+    files.take(path)
+    files.refuse_changed(path)
