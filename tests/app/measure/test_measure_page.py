@@ -97,6 +97,19 @@ def test_without_a_calibration_the_page_says_what_to_do(page: MeasurePage) -> No
     assert page.results.stack.currentIndex() == 0
 
 
+def test_damaged_records_are_kept_aside_and_it_is_said(context: AppContext, qtbot: QtBot) -> None:
+    context.workspace.folder.mkdir(parents=True)
+    (context.workspace.folder / "records.sqlite").write_bytes(b"no database at all" * 100)
+    page = _open(context)
+    told: list[str] = []
+    page.book.noticed.connect(told.append)
+    qtbot.waitUntil(lambda: bool(told))
+    assert "damaged" in told[0]
+    assert len(list(context.workspace.folder.glob("records.damaged-*"))) == 1
+    _close(page)
+    context.toasts.clear()
+
+
 @pytest.mark.usefixtures("library")
 def test_a_press_is_recognised_measured_compared_and_kept_like_the_command_says(
     page: MeasurePage,
