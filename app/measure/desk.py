@@ -2,43 +2,26 @@
 
 from __future__ import annotations
 
-import getpass
 from datetime import datetime
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
-    QCheckBox,
-    QDockWidget,
     QFileDialog,
-    QHBoxLayout,
-    QLabel,
-    QMainWindow,
-    QScrollArea,
-    QToolBar,
-    QVBoxLayout,
-    QWidget,
 )
 
-from app.inspect.banner import Banner
-from app.inspect.library import CalibrationBox, Library
+from app.inspect.advice import Known, Situation
 from app.inspect.link import LiveLink
 from app.inspect.look import Look
 from app.inspect.products import Shown, Wanted
-from app.measure.advice import Situation, advice
+from app.measure.advice import measuring_advice
+from app.measure.desk_frame import DeskFrame
 from app.measure.judging import Judged, judge
 from app.measure.keeping import Kept
 from app.measure.measuring import Taken
-from app.measure.side_panel import SidePanel
 from app.measure.steady import SteadyPress
-from app.measure.tool_map import ToolMap
-from app.measure.work import Work
-from app.shell import theme
-from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.jobs import Jobs
-from app.widgets.naming import named
-from app.widgets.source_button import SourceButton
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -48,7 +31,7 @@ from gelpolight_core.translation import tr
 PICTURES = (".png", ".tif", ".tiff")
 
 
-class Desk(QMainWindow):
+class Desk(DeskFrame):
     """Measures what is pressed.
 
     Parameters
@@ -72,100 +55,20 @@ class Desk(QMainWindow):
     limits_wanted = Signal()
 
     def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
-        super().__init__()
-        named(self, "measure.desk", tr("Measure a press"))
-        self.setWindowFlags(Qt.WindowType.Widget)
-        self.context = context
-        self.work = Work(self)
+        super().__init__(jobs, context=context)
         self.link = LiveLink(self._on_live, context=context, parent=self)
-        self.box = CalibrationBox()
-        self.box.setObjectName("measure.calibration")
-        self.library = Library(jobs, self.box, context=context)
-        self.banner = Banner()
-        self.map = ToolMap(self.work)
-        self.panel = SidePanel()
-        self.panel.who.setText(getpass.getuser())
-        self.validated = named(QLabel(), "measure.validated", tr("Validated or not"))
-        self.auto = named(
-            QCheckBox(tr("Hold when steady")),
-            "measure.auto",
-            tr("Hold the picture and say what is pressed when a press is steady"),
-        )
-        self.auto.setChecked(True)
         self._steady = SteadyPress()
-        self._has_calibration = False
-        self._trouble = ""
-        self._build()
+        self._loaded: tuple[Reconstructor | None, Reconstructor | None] = (None, None)
+        self._size: tuple[int, int] | None = None
+        self._shown: Shown | None = None
+        self._trouble = self._refused = ""
         self._connect()
 
-    # Layout
-
-    def _build(self) -> None:
-        middle = QWidget()
-        across = QHBoxLayout()
-        across.setSpacing(0)
-        across.addWidget(self.map, 1)
-        across.addWidget(self.panel)
-        column = QVBoxLayout(middle)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.banner)
-        column.addLayout(across, 1)
-        self.setCentralWidget(middle)
-        self._build_bar()
-        self._bench = QDockWidget(tr("Virtual bench"), self)
-        named(self._bench, "measure.bench", tr("Virtual bench"))
-        self.addDockWidget(Qt.DockWidgetArea.LeftDockWidgetArea, self._bench)
-        self._bench.hide()
-
-    def _build_bar(self) -> None:
-        bar = named(QToolBar(tr("Measure")), "measure.bar", tr("Measure"))
-        bar.setMovable(False)
-        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
-        self.hold_action = make_action(
-            self, "measure.hold", tr("Hold"), self.toggle_hold, keys=("Space",),
-            icon_name="hold", tip=tr("Hold the picture and measure on it, or go on (Space)"),
-        )  # fmt: skip
-        self.hold_action.setCheckable(True)
-        open_action = make_action(
-            self, "measure.open", tr("Open a picture…"), self.choose_file, keys=("Ctrl+P",),
-            icon_name="folder", tip=tr("Measure on a picture from a file (Ctrl+P)"),
-        )  # fmt: skip
-        stack = self.work.undo
-        undo = make_action(
-            self, "measure.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",), icon_name="undo",
-            tip=tr("Undo (Ctrl+Z)"),
-        )  # fmt: skip
-        redo = make_action(
-            self, "measure.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"),
-            icon_name="redo", tip=tr("Redo (Ctrl+Y)"),
-        )  # fmt: skip
-        for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
-            action.setEnabled(False)
-            can.connect(action.setEnabled)
-        self.source = SourceButton(context=self.context, page="measure", none=tr("No camera"))
-        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        bar.addWidget(self.source)
-        bar.addAction(open_action)
-        bar.addSeparator()
-        bar.addWidget(self.box)
-        bar.addWidget(self.validated)
-        bar.addSeparator()
-        bar.addAction(self.hold_action)
-        bar.addWidget(self.auto)
-        bar.addSeparator()
-        bar.addActions([undo, redo])
-        for action in (undo, redo):
-            bar.widgetForAction(action).setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
-        self.addToolBar(bar)
-        make_action(self, "measure.propose", tr("What is pressed?"), self.propose, keys=("Q",))
-        make_action(self, "measure.fit", tr("Whole map"), self.map.view.fit, keys=("F",))
-        make_action(
-            self, "measure.keep_result", tr("Keep in the records"), self.keep,
-            keys=("Ctrl+Return",),
-        )  # fmt: skip
-
     def _connect(self) -> None:
+        self.hold_pressed.connect(self.toggle_hold)
+        self.open_pressed.connect(self.choose_file)
+        self.propose_pressed.connect(self.propose)
+        self.keep_pressed.connect(self.keep)
         self.library.loaded.connect(self._use)
         self.context.source.changed.connect(self._on_source)
         self.link.said.connect(self._on_said)
@@ -191,20 +94,22 @@ class Desk(QMainWindow):
     def enter(self) -> None:
         """Look at the source through the calibration in use."""
         self.library.refresh()
-        self._show_validated()
+        self.show_validated()
         self.link.want(Wanted(height=True))
         self.link.enter(True)
-        self._follow_bench()
-        self._advise()
+        self.follow_bench()
+        self._refresh()
 
     def leave(self) -> None:
         """Let the source go; a picture that is held stays."""
         self.link.enter(False)
 
     def close_work(self) -> None:
-        """End every thread."""
+        """End every thread, those of the reconstructors, too: they go with them."""
         self.link.enter(False)
         self.work.close()
+        self.link.use(None)
+        self._loaded, self._shown = (None, None), None
 
     def open_file(self, path: Path) -> None:
         """Measure on a picture, or play a recording as the camera.
@@ -256,8 +161,8 @@ class Desk(QMainWindow):
 
     def hold(self, by_hand: bool = True) -> None:
         """Hold the picture that is shown, to measure on it."""
-        shown = self.link.last
-        if self.work.taken is None and shown is not None and shown.heightmap is not None:
+        shown = self._shown
+        if self.work.taken is None and shown is not None:
             now = datetime.now().astimezone()
             name = tr("{camera}, {time:%H:%M:%S}").format(camera=self._camera(), time=now)
             self._take(Taken(name, frame=shown.frame), propose=not by_hand)
@@ -274,7 +179,7 @@ class Desk(QMainWindow):
 
     def _take(self, taken: Taken, *, propose: bool = False) -> None:
         self.link.pause(True)
-        self._trouble = ""
+        self._refused = ""
         self.panel.say_kept("")
         self.work.take(taken, propose=propose)
         if taken.path is not None:
@@ -288,10 +193,17 @@ class Desk(QMainWindow):
         self._refresh()
 
     def _on_live(self, shown: Shown) -> None:
+        rows, columns = shown.frame.rgb.shape[:2]
+        if self._size != (columns, rows):
+            self._size = columns, rows
+            self._advise()
         if self.work.taken is not None:
             return
         self.map.show_live(shown, Look())
         heightmap = shown.heightmap
+        could, self._shown = self._can_hold, None if heightmap is None else shown
+        if could != self._can_hold:
+            self._refresh()
         if heightmap is None:
             return
         frame = shown.frame
@@ -315,8 +227,8 @@ class Desk(QMainWindow):
     def keep(self) -> None:
         """Send the chosen tool's result to the records."""
         result, heightmap = self.work.result, self.work.heightmap
-        entry = next((e for e in self.library.entries if e.in_use), None)
-        if result is None or heightmap is None or entry is None:
+        best = self._loaded[1]
+        if result is None or heightmap is None or best is None:
             return
         kept = Kept(
             result=result,
@@ -324,7 +236,7 @@ class Desk(QMainWindow):
             stated=self.panel.truth.stated,
             limits=self.context.settings.limits,
             heightmap=heightmap,
-            serial=entry.serial,
+            serial=best.calibration.sensor.serial,
             operator=self.panel.who.text().strip(),
             note=self.panel.note.text().strip(),
         )
@@ -356,7 +268,7 @@ class Desk(QMainWindow):
 
     @property
     def _can_hold(self) -> bool:
-        return self.link.last is not None and self.link.last.heightmap is not None
+        return self._shown is not None
 
     def _on_proposed(self, proposal: Proposal | None) -> None:
         if proposal is None:
@@ -368,51 +280,30 @@ class Desk(QMainWindow):
             self.context.toasts.show(text.format(names=names), "warn")
 
     def _on_refused(self, sentence: str) -> None:
-        self._trouble = sentence
+        self._refused = sentence
         self.map.say(tr("This picture cannot be measured on."))
         self._advise()
 
     # The calibration and the source
 
-    def _use(self, reconstructor: Reconstructor | None) -> None:
-        self._has_calibration = reconstructor is not None
-        self._trouble = ""
-        self.link.use(reconstructor)
-        self.work.use(reconstructor)
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Measure with another calibration; live only where it belongs to the pictures."""
+        self._loaded = live, best
+        self._refused, self._shown = "", None
+        self.link.use(None)
+        self.work.use(best)
         if self.work.taken is None:
             self.map.say(tr("No depth yet."))
-        self._show_validated()
+        self.show_validated()
         self._refresh()
 
-    def _show_validated(self) -> None:
-        entry = next((e for e in self.library.entries if e.in_use), None)
-        text, role = "", "muted"
-        if entry is not None:
-            text, role = (
-                (tr("validated"), "pass") if entry.validated else (tr("not validated"), "warn")
-            )
-        self.validated.setText(f"  {text}  ")
-        self.validated.setStyleSheet(f"color: {theme.colour(role).name()};")
-
     def _on_source(self) -> None:
+        self._shown = self._size = None
         self.link.open()
-        self._follow_bench()
+        self.follow_bench()
         if self.work.taken is None:
             self.map.say(tr("No depth yet."))
         self._advise()
-
-    def _follow_bench(self) -> None:
-        """Have the bench beside the map where the virtual sensor is the camera."""
-        source = self.context.source
-        virtual = source.info is not None and source.info.kind == "virtual"
-        if virtual and source.bench is not None and self._bench.widget() is None:
-            from app.bench.bench_panel import BenchPanel  # only the demo needs it
-
-            scroll = QScrollArea()
-            scroll.setWidgetResizable(True)
-            scroll.setWidget(BenchPanel(bench=source.bench))
-            self._bench.setWidget(scroll)
-        self._bench.setVisible(virtual)
 
     # What to do next
 
@@ -420,18 +311,30 @@ class Desk(QMainWindow):
         self._trouble = sentence
         self._advise()
 
-    def _advise(self) -> None:
-        info = self.context.source.info
-        situation = Situation(
+    def _situation(self) -> Situation:
+        info, (live, _) = self.context.source.info, self._loaded
+        used = None
+        if live is not None:
+            camera = live.calibration.camera
+            used = Known(live.calibration.sensor.serial, (camera.width, camera.height))
+        summaries = (entry.summary for entry in self.library.entries)
+        return Situation(
             kind="" if info is None else info.kind,
-            has_calibration=self._has_calibration,
-            held=self.work.taken is not None,
-            busy=self.work.busy,
-            has_tools=bool(self.work.sheet.items),
+            serial=self.link.serial,
+            size=self._size,
+            used=used,
+            library=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
             trouble=self._trouble,
         )
-        text, act, role = advice(situation)
-        self.banner.advise(text, act, role=role)
+
+    def _advise(self) -> None:
+        """Say what to do next, and look through the calibration only where it fits."""
+        held = self.work.taken is not None
+        advice = measuring_advice(self._situation(), held=held, refused=self._refused)
+        self.banner.advise(advice.text, (advice.act, advice.button), role=advice.role)
+        live, best = self._loaded if advice.usable else (None, None)
+        if live is not self.link.live:
+            self.link.use(live, best)
 
     def _on_act(self, name: str) -> None:
         match name:
@@ -443,5 +346,7 @@ class Desk(QMainWindow):
                 self.context.requests.page.emit("sensors")
             case "live":
                 self.release()
+            case "fitting":
+                self.library.use_what_fits(self.link.serial, self._size)
             case "reopen":
                 self.link.open()

@@ -141,8 +141,9 @@ class RecordFilter(QSortFilterProxyModel):
 
     def choose(self, serial: str, shape: str) -> None:
         """Show those of this sensor and shape; empty: of all."""
+        self.beginFilterChange()
         self.serial, self.shape = serial, shape
-        self.invalidateFilter()
+        self.endFilterChange()
 
     def filterAcceptsRow(self, row: int, parent: Index) -> bool:  # noqa: D102
         record = self._model.records[row]

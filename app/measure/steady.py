@@ -41,9 +41,9 @@ class SteadyPress:
         coarse = depth_mm[::STRIDE, ::STRIDE]
         before, self._before = self._before, coarse
         depth = float(np.percentile(coarse, 99.5))
-        if before is None or before.shape != coarse.shape or not settled:
-            return self._moved()
-        if depth < PRESSED_MM:
+        if before is None or before.shape != coarse.shape:
+            return False
+        if not settled or depth < PRESSED_MM:
             return self._moved()
         if float(np.abs(coarse - before).max()) > STILL_MM + STILL_SHARE * depth:
             return self._moved()

@@ -21,6 +21,8 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
 POLL_MS = 30
+STOP_S = 30.0
+"""The longest that a picture with its uncertainty takes on a slow machine."""
 
 
 class Work(QObject):
@@ -200,8 +202,9 @@ class Work(QObject):
         """End the thread."""
         self._timer.stop()
         if self._worker is not None:
-            self._worker.stop(30.0)
+            self._worker.stop(STOP_S)
             self._worker = None
+        self._reconstructor = None
 
     def _ask(self) -> None:
         if self._reconstructor is None or self.taken is None:

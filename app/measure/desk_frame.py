@@ -1,0 +1,171 @@
+"""The widgets of the desk where a press is measured, and where they stand."""
+
+from __future__ import annotations
+
+import getpass
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDockWidget,
+    QHBoxLayout,
+    QLabel,
+    QMainWindow,
+    QScrollArea,
+    QToolBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.inspect.banner import Banner
+from app.inspect.library import CalibrationBox, Library
+from app.measure.side_panel import SidePanel
+from app.measure.tool_map import ToolMap
+from app.measure.work import Work
+from app.shell import theme
+from app.shell.actions import make_action
+from app.shell.context import AppContext
+from app.shell.jobs import Jobs
+from app.widgets.naming import named
+from app.widgets.source_button import SourceButton
+from gelpolight_core.translation import tr
+
+BENCH_WIDTH = 270
+
+
+class DeskFrame(QMainWindow):
+    """The map with its tools, the panel beside it, the bar above, and the virtual bench.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        For long work.
+    context : AppContext
+        The program's.
+
+    Signals
+    -------
+    hold_pressed(), open_pressed(), propose_pressed(), keep_pressed()
+        A button or key of the bar was pressed.
+    """
+
+    hold_pressed = Signal()
+    open_pressed = Signal()
+    propose_pressed = Signal()
+    keep_pressed = Signal()
+
+    def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "measure.desk", tr("Measure a press"))
+        self.setWindowFlags(Qt.WindowType.Widget)
+        self.context = context
+        self.work = Work(self)
+        self.box = CalibrationBox()
+        self.box.setObjectName("measure.calibration")
+        self.library = Library(jobs, self.box, context=context)
+        self.banner = Banner()
+        self.map = ToolMap(self.work)
+        self.panel = SidePanel()
+        self.panel.who.setText(getpass.getuser())
+        self.validated = named(QLabel(), "measure.validated", tr("Validated or not"))
+        self.auto = named(
+            QCheckBox(tr("Hold when steady")),
+            "measure.auto",
+            tr("Hold the picture and say what is pressed when a press is steady"),
+        )
+        self.auto.setChecked(True)
+        self._build()
+
+    def _build(self) -> None:
+        middle = QWidget()
+        across = QHBoxLayout()
+        across.setSpacing(0)
+        across.addWidget(self.map, 1)
+        across.addWidget(self.panel)
+        column = QVBoxLayout(middle)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.banner)
+        column.addLayout(across, 1)
+        self.setCentralWidget(middle)
+        self._build_bar()
+        self._bench = QDockWidget(tr("Virtual bench"), self)
+        named(self._bench, "measure.bench", tr("Virtual bench"))
+        self.addDockWidget(Qt.DockWidgetArea.LeftDockWidgetArea, self._bench)
+        self._bench.hide()
+
+    def _build_bar(self) -> None:
+        bar = named(QToolBar(tr("Measure")), "measure.bar", tr("Measure"))
+        bar.setMovable(False)
+        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        self.hold_action = make_action(
+            self, "measure.hold", tr("Hold"), self.hold_pressed.emit, keys=("Space",),
+            icon_name="hold", tip=tr("Hold the picture and measure on it, or go on (Space)"),
+        )  # fmt: skip
+        self.hold_action.setCheckable(True)
+        open_action = make_action(
+            self, "measure.open", tr("Open a picture…"), self.open_pressed.emit, keys=("Ctrl+P",),
+            icon_name="folder", tip=tr("Measure on a picture from a file (Ctrl+P)"),
+        )  # fmt: skip
+        stack = self.work.undo
+        undo = make_action(
+            self, "measure.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",), icon_name="undo",
+            tip=tr("Undo (Ctrl+Z)"),
+        )  # fmt: skip
+        redo = make_action(
+            self, "measure.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"),
+            icon_name="redo", tip=tr("Redo (Ctrl+Y)"),
+        )  # fmt: skip
+        for action, can in ((undo, stack.canUndoChanged), (redo, stack.canRedoChanged)):
+            action.setEnabled(False)
+            can.connect(action.setEnabled)
+        self.source = SourceButton(context=self.context, page="measure", none=tr("No camera"))
+        bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        bar.addWidget(self.source)
+        bar.addAction(open_action)
+        bar.addSeparator()
+        bar.addWidget(self.box)
+        bar.addWidget(self.validated)
+        bar.addSeparator()
+        bar.addAction(self.hold_action)
+        bar.addWidget(self.auto)
+        bar.addSeparator()
+        bar.addActions([undo, redo])
+        for action in (undo, redo):
+            bar.widgetForAction(action).setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
+        self.addToolBar(bar)
+        make_action(
+            self, "measure.propose", tr("What is pressed?"), self.propose_pressed.emit, keys=("Q",)
+        )
+        make_action(self, "measure.fit", tr("Whole map"), self.map.view.fit, keys=("F",))
+        make_action(
+            self, "measure.keep_result", tr("Keep in the records"), self.keep_pressed.emit,
+            keys=("Ctrl+Return",),
+        )  # fmt: skip
+
+    def show_validated(self) -> None:
+        """Say whether the calibration in use was tried on an object of known size."""
+        entry = next((e for e in self.library.entries if e.in_use), None)
+        text, role = "", "muted"
+        if entry is not None:
+            text, role = (
+                (tr("validated"), "pass") if entry.validated else (tr("not validated"), "warn")
+            )
+        self.validated.setText(f"  {text}  ")
+        self.validated.setStyleSheet(f"color: {theme.colour(role).name()};")
+
+    def follow_bench(self) -> None:
+        """Have the bench beside the map where the virtual sensor is the camera."""
+        source = self.context.source
+        virtual = source.info is not None and source.info.kind == "virtual"
+        if virtual and source.bench is not None and self._bench.widget() is None:
+            from app.bench.bench_panel import BenchPanel  # only the demo needs it
+
+            panel = BenchPanel(bench=source.bench)
+            scroll = QScrollArea()
+            scroll.setWidgetResizable(True)
+            scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+            scroll.setWidget(panel)
+            scroll.setMinimumWidth(BENCH_WIDTH)
+            self._bench.setWidget(scroll)
+        self._bench.setVisible(virtual)

@@ -1,0 +1,112 @@
+"""Errors and verdicts: those of the core's comparison, and nothing where no truth is stated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.measure.judging import Stated, judge
+from app.measure.keeping import Kept, record_of
+from app.shell.settings import Limits
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.result import Measurement, Truth, compare
+from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED
+
+LENGTHS = st.floats(0.01, 50.0)
+FIT = Measurement(
+    shape="cylinder",
+    diameter_mm=5.1,
+    side_mm=None,
+    height_mm=1.02,
+    centre_mm=(0.0, 0.0),
+    yaw_deg=None,
+    drape_decay_mm=0.7,
+    sd={"diameter_mm": 0.02, "height_mm": 0.003, "centre_mm": (0.01, 0.01), "drape_decay_mm": 0.1},
+    edge_radius_mm=0.08,
+    blur_mm=0.05,
+    baseline_mm=0.0,
+    residual_rms_mm=0.001,
+    correlated_pixels=10.0,
+    outline_mm=np.zeros((3, 2)),
+    verdict="ok",
+    reason="",
+)
+PRESSED = ToolResult(
+    Cylinder((0.0, 0.0)), (Measured(5.1, 0.02, "mm", "diameter"),), (), measurement=FIT
+)
+APART = ToolResult(Distance((0.0, 0.0), (3.0, 0.0)), (Measured(3.0, 0.01, "mm", "distance"),), ())
+
+
+def _kept(result: ToolResult, stated: Stated, limits: Limits | None = None) -> Kept:
+    limits = limits or Limits()
+    flat = np.zeros((2, 2), np.float32)
+    heightmap = HeightMap(
+        flat,
+        np.arange(2.0),
+        np.arange(2.0),
+        1.0,
+        None,
+        flat.astype(np.uint8),
+        "A-1",
+        "full",
+        "p.png",
+    )
+    judged = judge(result, stated, limits)
+    return Kept(result, judged, stated, limits, heightmap, "A", "Ada", "by hand")
+
+
+@given(size=LENGTHS, height=LENGTHS)
+def test_the_errors_are_those_of_the_comparison_to_the_last_bit(size: float, height: float) -> None:
+    found = compare(FIT, Truth("cylinder", size, height))
+    rows = judge(PRESSED, Stated(size, height), Limits())
+    assert [row.error_percent for row in rows] == [
+        found.size_error_percent,
+        found.height_error_percent,
+    ]
+    record = record_of(_kept(PRESSED, Stated(size, height)))
+    assert [q.error_percent for q in record.quantities] == [row.error_percent for row in rows]
+    assert record.details["error_percent"] == found.error_percent
+
+
+def test_only_what_is_known_is_judged() -> None:
+    assert judge(PRESSED, Stated(), Limits()) == ()
+    (row,) = judge(PRESSED, Stated(size_mm=5.0), Limits())
+    assert (row.quantity, row.limit_percent) == ("size", 5.0)
+    (row,) = judge(PRESSED, Stated(height_mm=1.0), Limits())
+    assert (row.quantity, row.limit_percent) == ("height", 8.0)
+    (row,) = judge(APART, Stated(size_mm=2.0), Limits())
+    assert row.error_percent == pytest.approx(50.0)
+    assert not row.passed
+
+
+def test_the_verdict_follows_the_limits() -> None:
+    stated = Stated(5.0, 1.0)
+    assert record_of(_kept(PRESSED, stated)).verdict == PASSED
+    strict = Limits(size_percent=1.0)
+    assert record_of(_kept(PRESSED, stated, strict)).verdict == FAILED
+    doubtful = replace(PRESSED, verdict="doubtful", reason="cut")
+    assert record_of(_kept(doubtful, stated)).verdict == DOUBTFUL
+    assert record_of(_kept(PRESSED, Stated())).verdict == UNJUDGED
+
+
+def test_a_record_says_what_was_measured_with_what_and_by_whom() -> None:
+    record = record_of(_kept(APART, Stated(size_mm=3.01, name="Gauge")))
+    assert (record.serial, record.calibration_id, record.picture) == ("A", "A-1", "p.png")
+    assert (record.operator, record.note) == ("Ada", "by hand")
+    assert record.settings["tool"] == {"tool": "distance", "a_mm": [0.0, 0.0], "b_mm": [3.0, 0.0]}
+    assert record.settings["indenter"] == "Gauge"
+    assert record.quantities[0].truth == 3.01
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
+@pytest.mark.parametrize("result", [PRESSED, APART])
+def test_a_truth_of_zero_or_less_is_refused(result: ToolResult, value: float) -> None:
+    with pytest.raises(InputError, match="greater than zero"):
+        judge(result, Stated(size_mm=value), Limits())
