@@ -18,7 +18,7 @@ def test_a_recording_can_play_the_camera(
     context: AppContext, qtbot: QtBot, tmp_path: Path, monkeypatch: MonkeyPatch
 ) -> None:
     write_recording(tmp_path / "coin.gplrec")
-    button = SourceButton(context=context)
+    button = SourceButton(context=context, page="calibrate", none="No camera")
     qtbot.addWidget(button)
     chosen = (str(tmp_path / "coin.gplrec"), "")
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: chosen)
