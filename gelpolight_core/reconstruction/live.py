@@ -191,7 +191,7 @@ class LiveSolver:
             record.left_out(tr("light from the surroundings"), tr("this membrane gives none"))
         with record.done(tr("near light, quarter scale"), ROUNDS * nodes * SOLVED_BYTES) as reason:
             start, (changes, stopped) = self._rounds(region, quarter)
-            reason.append(tr("{n} rounds, {d:.2f} mm deep").format(n=len(changes), d=start.max()))
+            reason.append(tr("rounds: {n}; {d:.2f} mm deep").format(n=len(changes), d=start.max()))
         if len(changes) < ROUNDS:
             record.left_out(tr("second near-light round"), tr("the press is that shallow"))
         scale, picture = (maps.half, half) if effort == "balanced" else (maps.quarter, quarter)
@@ -206,7 +206,7 @@ class LiveSolver:
         with record.done(tr("integration"), 5 * start.nbytes) as reason:
             solved = self._integrate(scale, picture, corner, start, slopes, TOLERANCE)
             moved = held_back(start, solved.depth_mm, longest_step_mm(self._full))
-            reason.append(tr("{n} rounds of conjugate gradients").format(n=solved.rounds))
+            reason.append(tr("conjugate gradients, rounds: {n}").format(n=solved.rounds))
         if picture.let_go is None:
             record.left_out(tr("free rim"), tr("no contact crosses the rim"))
         with record.done(tr("true positions"), 16 * nodes * SHOWN_BYTES) as reason:
