@@ -32,8 +32,8 @@ class MapPicture:
 def map_picture(heightmap: HeightMap, look: Look) -> MapPicture:
     """Return a height map with all its detail as colours."""
     depth = heightmap.depth_mm
-    low, high = look.range_mm or shading.automatic_range(depth, LEAST_RANGE_MM)
-    flat = shading.coloured(depth, colour_table(look.colours), low, high)
-    rgb = shading.shaded(flat, depth, heightmap.pitch_mm, look.light, look.exaggeration)
+    shown = look.range_mm or shading.automatic_range(depth, LEAST_RANGE_MM)
+    table = colour_table(look.colours)
+    rgb = shading.shaded(depth, heightmap.pitch_mm, table, shown, look.light)
     outside = heightmap.flags & np.uint8(Flag.OUTSIDE)
-    return MapPicture(shading.outside_filled(rgb, outside, SURROUND), (low, high))
+    return MapPicture(shading.outside_filled(rgb, outside, SURROUND), shown)

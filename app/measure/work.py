@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -20,6 +21,7 @@ from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
+_LOG = logging.getLogger(__name__)
 POLL_MS = 30
 STOP_S = 30.0
 """The longest that a picture with its uncertainty takes on a slow machine."""
@@ -229,7 +231,9 @@ class Work(QObject):
         if isinstance(answered.error, InputError):
             self.refused.emit(str(answered.error))
         elif answered.error is not None:
-            raise answered.error
+            _LOG.error("Measuring failed", exc_info=answered.error)
+            kind = type(answered.error).__name__
+            self.refused.emit(tr("A fault of this program: {k}; the log has it.").format(k=kind))
         elif answered.answer is not None:
             self._show(answered.question, answered.answer)
 
