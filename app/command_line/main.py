@@ -50,6 +50,7 @@ def build_parser() -> argparse.ArgumentParser:
         reconstruct,
         report,
         simulate,
+        stability,
     )
 
     parser = _Parser(
@@ -75,6 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
         report,
         benchmark,
         ablation,
+        stability,
         design,
         board,
     ):

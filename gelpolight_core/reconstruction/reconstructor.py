@@ -11,6 +11,15 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.acceptance import (
+    RimCheck,
+    accepted,
+    refuse_coplanar_lights,
+    refuse_dark_membrane,
+    rim_check,
+    rim_let_go,
+    unsolved_note,
+)
 from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.normals import (
@@ -43,7 +52,8 @@ class Reconstructor:
     Raises
     ------
     InputError
-        If the calibration was not made for the model.
+        If the calibration was not made for the model, its lights lie nearly in one plane,
+        or there is light on next to nothing of the membrane.
 
     Examples
     --------
@@ -66,6 +76,10 @@ class Reconstructor:
                 where=calibration.identity,
                 advice=tr("Calibrate again with --model full, or use --model paper"),
             )
+        used = calibration.full if self.model == "full" else None
+        leds_mm = calibration.led_positions_mm if used is None else used.led_positions_mm
+        refuse_coplanar_lights(calibration, leds_mm)
+        refuse_dark_membrane(calibration)
         self.terms = terms
         self.workers = workers
 
@@ -80,16 +94,24 @@ class Reconstructor:
         grid = self.calibration.table.grid
         return PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=self.workers)
 
+    @cached_property
+    def rim(self) -> RimCheck:
+        """What the rim shows while nothing crosses it."""
+        return rim_check(self.calibration)
+
     def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
         """Return the depth's slopes of a raw frame (height, width, 3), RGB.
 
         Raises
         ------
         InputError
-            If the frame is not of the calibration's size, or not in colour.
+            If the frame is not of the calibration's size, not in colour, or holds other numbers
+            than :meth:`depth` takes.
         """
-        self._check(frame, name)
-        return solve_slopes(self.linearise(frame), self.maps, workers=self.workers)
+        return self._slopes(self._light(frame, name))
+
+    def _slopes(self, light: NDArray[Any]) -> SlopeField:
+        return solve_slopes(light, self.maps, workers=self.workers)
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
         """Return a frame with the camera's response undone; floats are linear light already."""
@@ -121,39 +143,41 @@ class Reconstructor:
         Raises
         ------
         InputError
-            If the frame is not of the calibration's size.
+            If the frame is not of the calibration's size, or holds other numbers than these.
         """
-        self._check(frame, name)
+        light = self._light(frame, name)
         if self.model == "full":
-            return self._depth_full(frame, name, normals, uncertainty)
-        field = self.slopes(frame, name=name)
+            return self._depth_full(light, name, normals, uncertainty)
+        field = self._slopes(light)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
-        return self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name)
+        notes = self._rim_notes(light)
+        return self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name, notes)
 
     def _depth_full(
-        self, frame: NDArray[Any], name: str, normals: bool, uncertainty: bool
+        self, light: NDArray[Any], name: str, normals: bool, uncertainty: bool
     ) -> HeightMap:
         full = self.calibration.full
         assert full is not None
         result = reconstruct_full(
-            as_linear(self.linearise(frame)),
+            as_linear(light),
             self.calibration,
             full,
             terms=self.terms,
             workers=self.workers,
             uncertainty=uncertainty,
         )
-        notes = []
+        notes = list(self._rim_notes(light))
         if result.rim == "free":
-            notes.append(tr("a contact crosses the rim: the rim was let go there"))
+            notes.append(rim_let_go())
         if result.stopped == "damped":
             notes.append(tr("the press is deep for its lights: the near-light rounds were damped"))
         if result.stopped == "unsettled":
             notes.append(tr("the near-light rounds did not settle: damping did not help"))
         if result.stopped == "grows":
             notes.append(tr("the near-light rounds did not settle: the last was taken back"))
+        notes += [note for note in (unsolved_note(result.unsolved),) if note]
         shown = result.normals if normals else None
         heightmap = self._heightmap(result.depth_mm, shown, result.flags, name, tuple(notes))
         scale, noise = full.scale_sd, result.noise
@@ -174,7 +198,7 @@ class Reconstructor:
         normals: NDArray[np.float32] | None,
         flags: NDArray[np.uint8],
         name: str,
-        notes: tuple[str, ...] = (),
+        notes: tuple[str, ...],
     ) -> HeightMap:
         grid = self.calibration.table.grid
         return HeightMap(
@@ -190,7 +214,12 @@ class Reconstructor:
             notes=notes,
         )
 
-    def _check(self, frame: NDArray[Any], name: str) -> None:
+    def _rim_notes(self, light: NDArray[Any]) -> tuple[str, ...]:
+        note = self.rim.note(light)
+        return (note,) if note else ()
+
+    def _light(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
+        """Return a frame of the right size and kind with the camera's response undone."""
         camera = self.calibration.camera
         if frame.shape != (camera.height, camera.width, 3):
             shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
@@ -201,6 +230,7 @@ class Reconstructor:
                 where=name or tr("picture"),
                 advice=tr("Use the calibration of this sensor at this picture size"),
             )
+        return self.linearise(accepted(frame, name=name))
 
 
 def shading_maps(calibration: Calibration) -> ShadingMaps:
