@@ -74,7 +74,7 @@ class KnownSensor:
     def noisy(self, frame: Map, *, seed: int = 0) -> NDArray[np.unsignedinteger[Any]]:
         """Return what the camera makes of a linear picture: noise, and its own whole numbers."""
         camera = self.sensor.design.camera
-        return exposed(frame, camera, np.random.default_rng(seed), averaged=1)
+        return exposed(frame.astype(np.float64), camera, np.random.default_rng(seed), averaged=1)
 
     def bare(self) -> Map:
         """Return the picture of the membrane that nothing touches."""

@@ -134,8 +134,14 @@ def _whole_pictures() -> list[Case]:
         ("scale_255", tr("floats of 0..255 in place of 0..1"), lambda f: f * np.float32(255.0)),
         ("twelve_bit", tr("12 bits in a 16 bit file"), lambda f: (f * 4095.0).astype(np.uint16)),
         ("light_10_percent", tr("light 10 % weaker"), lambda f: f * np.float32(0.9)),
+        ("light_2_percent", tr("light 2 % stronger"), lambda f: f * np.float32(1.02)),
+        ("red_2_percent", tr("red light 2 % stronger"), _redder),
     ]
     return [_case(name, label, required, like(make)) for name, label, make in cases]
+
+
+def _redder(frame: Map) -> Map:
+    return frame * np.array([1.02, 1.0, 1.0], np.float32)
 
 
 def _noise(frame: Map) -> Map:

@@ -250,7 +250,7 @@ def _cone(degrees: float) -> Seen:
 def _deep_cases() -> list[Case]:
     low = replace(matt_design(SCALE), leds=_ring(3.0, 3.0))
     said = tr("right, or damped, stopped, and said so")
-    entries = [
+    entries: list[tuple[str, str, Indenter, tuple[float, float], float]] = [
         ("depth_4_mm", tr("4 mm deep, LEDs at 13.7 mm"), Ball(6.0, 4.0), (1.2, -0.8), 40.0),
         ("depth_8_mm", tr("8 mm deep, LEDs at 13.7 mm"), Ball(8.0, 8.0), (1.2, -0.8), 80.0),
         ("depth_12_mm", tr("12 mm deep, LEDs at 13.7 mm"), Ball(8.0, 12.0), (1.2, -0.8), 120.0),

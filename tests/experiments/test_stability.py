@@ -20,29 +20,18 @@ from gelpolight_core.experiments.stability_trial import standard_sensor
 CASES = all_cases()
 # One of each kind of hard thing; the command runs all of them.
 QUICK = (
-    "pixels_nan",
     "pixels_huge",
-    "patch_saturated",
     "patch_two_dark",
-    "all_grey",
-    "blue_first",
-    "kind_uint16_other_byte_order",
-    "kind_int32",
-    "no_contact",
     "leds_0.5_mm_apart",
     "leds_0.5_mm_below",
-    "slab_60_mm",
     "index_2.5",
     "distortion_-0.6",
-    "beyond_the_field",
     "factor_zero",
     "table_not_monotone",
     "crosstalk_singular",
     "plane_backwards",
     "brighter_than_the_table",
-    "threads_paper",
     "threads_full",
-    "runs_full",
 )
 
 
@@ -108,25 +97,24 @@ def test_numbers_that_are_none_stay_out_of_the_json() -> None:
 
 def test_the_depth_answers_to_leds_and_light_as_the_shading_says() -> None:
     """Nearer light falls off faster: LEDs taken as lower make the same picture a deeper press."""
-    chosen = [p for p in parameters() if p.name in ("leds_z", "factors", "k1")]
+    chosen = [p for p in parameters() if p.name in ("leds_z", "factors")]
     found = {s.parameter.name: s for s in sensitivities(standard_sensor(), chosen=chosen)}
     assert np.sign(found["leds_z"].low_percent) == -np.sign(found["leds_z"].high_percent)
     assert found["factors"].swing_percent > 10.0 * found["leds_z"].swing_percent
-    assert found["k1"].swing_percent < 0.1
 
 
 def test_the_report_holds_every_case_that_was_asked_for(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    assert main(["stability", "-o", str(out), "--only", "kind_uint8,kind_int8,slopes_1e4"]) == 0
+    assert main(["stability", "-o", str(out), "--only", "grid_127x131,kind_int8,slopes_1e4"]) == 0
     captured = capsys.readouterr()
     assert "2 right, 1 refused" in captured.out
     assert "%" in captured.err  # progress
     rows = json.loads((out / "stability.json").read_text())["cases"]
     assert {row["case"]: row["verdict"] for row in rows} == {
-        "kind_uint8": "passed",
         "kind_int8": "refused",
+        "grid_127x131": "passed",
         "slopes_1e4": "passed",
     }
     with (out / "stability.csv").open() as stream:
