@@ -173,8 +173,8 @@ def _drift_note(drift: NDArray[np.floating]) -> str:
     if abs(worst) <= MOST_DRIFT:
         return ""
     return tr(
-        "the rim's brightness is {percent:+.1f} % off its calibration: exposure or LEDs have drifted, "
-        "and the depth with them; take the background again"
+        "the rim's brightness is {percent:+.1f} % off its calibration: exposure or LEDs have "
+        "drifted, and the depth with them; take the background again"
     ).format(percent=100.0 * worst)
 
 
