@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import add_model, load_reconstructor, refuse_overwriting, write_json
+from app.command_line.common import (
+    add_effort,
+    add_model,
+    load_reconstructor,
+    plan_lines,
+    refuse_overwriting,
+    write_json,
+)
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.session.session import read_picture, require_colour
@@ -22,6 +29,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("image", type=Path, metavar="IMAGE")
     parser.add_argument("--json", type=Path, metavar="FILE")
     parser.add_argument("--repeats", type=int, default=25, metavar="N")
+    add_effort(parser)
     add_model(parser)
     parser.set_defaults(run=run)
 
@@ -31,7 +39,9 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         refuse_overwriting([options.json], [options.calibration, options.image])
         refuse_unwritable(options.json)
-    reconstructor = load_reconstructor(options.calibration, model=options.model)
+    reconstructor = load_reconstructor(
+        options.calibration, model=options.model, effort=options.effort
+    )
     picture = read_picture(options.image)
     require_colour(picture, where=str(options.image))
     frame = np.round(picture.rgb * (2**picture.bit_depth - 1)).astype(f"u{picture.bit_depth // 8}")
@@ -50,6 +60,7 @@ def run(options: argparse.Namespace) -> int:
             floor=result.total.median_ms / result.copy_floor_ms,
         )
     )
+    print("\n".join(plan_lines(result.plan)))
     if options.json:
         write_json(
             {
@@ -59,7 +70,8 @@ def run(options: argparse.Namespace) -> int:
                 "plain": result.plain.as_dict(),
                 "threads": result.threads,
                 "model": reconstructor.model,
-                "plan": [{"step": row.name, "done": True} for row in result.steps],
+                "effort": reconstructor.effort,
+                "plan": result.plan.as_dicts(),
                 "versions": result.versions,
             },
             options.json,

@@ -17,6 +17,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.reconstruction.plan import EFFORTS, Plan
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
@@ -59,9 +60,25 @@ def add_model(parser: argparse.ArgumentParser, *, default: str | None = None) ->
     )
 
 
-def load_reconstructor(path: Path, *, model: str | None = None) -> Reconstructor:
+def add_effort(parser: argparse.ArgumentParser) -> None:
+    """Add ``--effort``."""
+    parser.add_argument(
+        "--effort",
+        choices=EFFORTS,
+        default=EFFORTS[-1],
+        help=tr(
+            "how much work the full model's picture is worth: best solves the whole field at full "
+            "scale (the default); balanced does what the picture needs, at half scale; fast at "
+            "quarter scale"
+        ),
+    )
+
+
+def load_reconstructor(
+    path: Path, *, model: str | None = None, effort: str = EFFORTS[-1]
+) -> Reconstructor:
     """Read a calibration and make its reconstructor ready, for its own model or another."""
-    return Reconstructor(read_calibration(path), model=model)
+    return Reconstructor(read_calibration(path), model=model, effort=effort)
 
 
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
@@ -86,6 +103,16 @@ def write_json(content: Mapping[str, Any], path: Path) -> None:
         stream.write(text.encode())
 
     write_atomically(path, write)
+
+
+def plan_lines(plan: Plan) -> list[str]:
+    """Return a frame's plan as lines of text."""
+    lines = []
+    for step in plan.steps:
+        took = "" if step.milliseconds is None else f"{step.milliseconds:8.1f} ms"
+        mark = tr("done") if step.done else tr("left out")
+        lines.append(f"  {mark:<10}{step.name:<28}{took:<12} {step.reason}".rstrip())
+    return lines
 
 
 def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:

@@ -10,7 +10,13 @@ from typing import Any
 
 from tqdm import tqdm
 
-from app.command_line.common import add_model, load_reconstructor, refuse_overwriting
+from app.command_line.common import (
+    add_effort,
+    add_model,
+    load_reconstructor,
+    plan_lines,
+    refuse_overwriting,
+)
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
@@ -39,6 +45,12 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help=tr("also standard deviations, in npz; takes several times as long"),
     )
+    parser.add_argument(
+        "--explain",
+        action="store_true",
+        help=tr("say which steps each picture needed, and why the others were left out"),
+    )
+    add_effort(parser)
     add_model(parser)
     parser.set_defaults(run=run)
 
@@ -70,7 +82,9 @@ def run(options: argparse.Namespace) -> int:
     endings = dict.fromkeys([*formats, *(["png"] if options.pictures else [])])
     outputs = [options.output / f"{path.stem}.{e}" for path in options.images for e in endings]
     refuse_overwriting(outputs, [options.calibration, *options.images])
-    reconstructor = load_reconstructor(options.calibration, model=options.model)
+    reconstructor = load_reconstructor(
+        options.calibration, model=options.model, effort=options.effort
+    )
     make_folder(options.output)
     for path in tqdm(options.images, file=sys.stderr, unit=tr("picture")):
         picture = read_picture(path, response=reconstructor.calibration.response)
@@ -79,6 +93,8 @@ def run(options: argparse.Namespace) -> int:
             picture.rgb, name=path.name, uncertainty=options.uncertainty
         )
         write_heightmap(heightmap, options.output, formats=formats)
+        if options.explain and heightmap.plan is not None:
+            tqdm.write("\n".join([f"{path}:", *plan_lines(heightmap.plan)]))
         for note in heightmap.notes:
             tqdm.write(f"{path}: {note}", file=sys.stderr)
         if options.pictures:

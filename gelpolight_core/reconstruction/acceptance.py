@@ -145,16 +145,14 @@ class RimCheck:
     expected: Map
     allowed: Map
 
-    def note(self, frame: NDArray[Any]) -> str:
-        """Return what is to be said of a frame in linear light; empty where it fits.
+    def note(self, seen: Map) -> str:
+        """Return what is to be said of a picture; empty where it fits.
 
         Parameters
         ----------
-        frame : (height, width, 3) uint8, uint16 or float32
-            Whole numbers of a linear camera, or linear light 0..1.
+        seen : (nodes, 3) float32
+            Its linear light at the pixels.
         """
-        scale = 1.0 if frame.dtype.kind == "f" else 1.0 / float(np.iinfo(frame.dtype).max)
-        seen = frame[self.row, self.column].astype(np.float32) * np.float32(scale)
         # A missing value fits nothing.
         fits = (np.abs(seen - self.expected) <= self.allowed).all(axis=1)
         if not fits.size:

@@ -16,6 +16,7 @@ from gelpolight_core.reconstruction.full import as_linear, coarse_depth, shaded_
 from gelpolight_core.reconstruction.near_light import solve_near_light
 from gelpolight_core.reconstruction.placement import place_on_grid
 from gelpolight_core.reconstruction.plain import plain_depth, plain_slopes
+from gelpolight_core.reconstruction.plan import Plan
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.weighted import integrate_weighted
 
@@ -69,6 +70,8 @@ class BenchmarkResult:
         Of the transforms.
     versions : dict
         Python, processor and libraries.
+    plan : Plan
+        Which steps the frame needed.
     """
 
     total: Timing
@@ -77,6 +80,7 @@ class BenchmarkResult:
     copy_floor_ms: float
     threads: int
     versions: dict[str, str]
+    plan: Plan
 
 
 def benchmark_frame(
@@ -95,18 +99,27 @@ def benchmark_frame(
     """
     calibration = reconstructor.calibration
     light = reconstructor.linearise(frame)
-    steps = _full_steps(reconstructor, light)
+    steps: Steps = {}
     if reconstructor.model == "paper":
         steps = _paper_steps(reconstructor, light)
-    if calibration.response is not None:
+    elif reconstructor.effort == "best":
+        steps = _full_steps(reconstructor, light)
+    if calibration.response is not None and steps:
         undo = (lambda: reconstructor.linearise(frame), frame.nbytes + light.nbytes)
         steps = {"linear light": undo, **steps}
     table = calibration.table
     read = frame.nbytes + table.u_px.nbytes + table.v_px.nbytes + calibration.radiance.nbytes
     must = read + table.u_px.nbytes
     source, target = np.zeros(must // 2, np.uint8), np.empty(must // 2, np.uint8)
+    plans: list[Plan] = []
+
+    def whole() -> None:
+        plan = reconstructor.depth(frame, normals=False).plan
+        assert plan is not None
+        plans.append(plan)
+
     fast: dict[str, Callable[[], object]] = {
-        "picture to depth": lambda: reconstructor.depth(frame, normals=False),
+        "picture to depth": whole,
         **{name: action for name, (action, _) in steps.items()},
         # Reading one half and writing the other touches as many bytes as the frame must.
         "copy of the bytes": lambda: np.copyto(target, source),
@@ -120,7 +133,10 @@ def benchmark_frame(
     slow = _time_in_turn({"plain": plain}, plain_repeats)["plain"]
     return BenchmarkResult(
         _timing("picture to depth", times["picture to depth"], must),
-        tuple(_timing(name, times[name], size) for name, (_, size) in steps.items()),
+        (
+            *(_timing(name, times[name], size) for name, (_, size) in steps.items()),
+            *_planned_steps(plans[-repeats:]),
+        ),
         _timing("paper's model, plain NumPy and SciPy", slow, must),
         float(np.median(times["copy of the bytes"])),
         reconstructor.workers,
@@ -129,10 +145,22 @@ def benchmark_frame(
             "machine": platform.machine(),
             **{name: version(name) for name in LIBRARIES},
         },
+        plans[-1],
     )
 
 
 Steps = dict[str, tuple[Callable[[], object], int]]
+
+
+def _planned_steps(plans: list[Plan]) -> list[Timing]:
+    """Return the times of the steps of a planned frame, as it noted them itself."""
+    times: dict[str, list[float]] = {}
+    sizes: dict[str, int] = {}
+    for step in (step for plan in plans for step in plan.steps):
+        if step.milliseconds is not None:
+            times.setdefault(step.name, []).append(step.milliseconds)
+            sizes[step.name] = step.bytes
+    return [_timing(name, taken, sizes[name]) for name, taken in times.items()]
 
 
 def _paper_steps(reconstructor: Reconstructor, frame: NDArray[Any]) -> Steps:

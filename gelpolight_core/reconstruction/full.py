@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -152,25 +153,63 @@ def coarse_depth(
         As in :class:`FullDepth`.
     """
     coarse = coarsen(field)
-    depth = np.zeros(coarse.usable.shape, np.float32)
+
+    def solve(depth: Map) -> Map:
+        return _round(coarse, depth, full, pitch_mm * COARSE, workers, terms)[1]
+
+    depth, said = near_light_rounds(
+        solve, coarse.usable.shape, longest_step_mm(full), terms.near_light_rounds
+    )
+    rows, columns = field.usable.shape
+    whole = cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(whole), said
+
+
+def near_light_rounds(
+    solve: Callable[[Map], Map],
+    shape: tuple[int, ...],
+    longest_mm: float,
+    wanted: int,
+    *,
+    shallow_mm: float = 0.0,
+) -> tuple[Map, tuple[tuple[float, ...], str]]:
+    """Repeat a round until as many as wanted are done, and until they settle where held back.
+
+    Parameters
+    ----------
+    solve : function of the present depth (rows, columns)
+        One round.
+    shape : tuple of int
+        Of the depth, which starts at 0.
+    longest_mm : float
+        How far a round may move the surface.
+    wanted : int
+        Rounds.
+    shallow_mm : float, optional
+        One round is enough where it moves the surface by less.
+
+    Returns
+    -------
+    depth_mm : (rows, columns) float32
+    changes_mm, stopped
+        As in :class:`FullDepth`.
+    """
+    depth = np.zeros(shape, np.float32)
     changes: list[float] = []
-    longest = longest_step_mm(full)
-    wanted = terms.near_light_rounds
     stopped = "unsettled" if wanted else "done"
     for _ in range(HELD_ROUNDS if wanted else 0):
-        _, solved, _ = _round(coarse, depth, full, pitch_mm * COARSE, workers, terms)
+        solved = solve(depth)
         changes.append(float(np.abs(solved - depth).max()))
         if len(changes) > 1 and changes[-1] > changes[-2]:
             stopped = "grows"
             break
-        depth = held_back(depth, solved, longest)
-        held = max(changes) > longest
-        if len(changes) >= wanted and (not held or changes[-1] <= SETTLED * longest):
+        depth = held_back(depth, solved, longest_mm)
+        held = max(changes) > longest_mm
+        enough = len(changes) >= wanted or changes[-1] < shallow_mm
+        if enough and (not held or changes[-1] <= SETTLED * longest_mm):
             stopped = "damped" if held else "done"
             break
-    rows, columns = field.usable.shape
-    whole = cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(whole), (tuple(changes), stopped)
+    return depth, (tuple(changes), stopped)
 
 
 def longest_step_mm(full: FullModel) -> float:
@@ -280,14 +319,21 @@ def released_rim(field: ShadedField, pitch_mm: float) -> NDArray[np.bool_]:
     There depth 0 outside would be wrong (PHYSICS, integration); elsewhere the rim stays held, so
     that the membrane that is not in contact anchors the depth.
     """
+    disturbed = np.abs(field.around - 1.0).max(axis=2) > RIM_CHANGE
+    return crossed_rim(field.inside, disturbed, pitch_mm)
+
+
+def crossed_rim(
+    inside: NDArray[np.bool_], disturbed: NDArray[np.bool_], pitch_mm: float
+) -> NDArray[np.bool_]:
+    """Return the nodes about those next to the rim whose neighbourhood is disturbed."""
 
     def disc(radius_mm: float) -> NDArray[np.uint8]:
         size = 2 * max(round(radius_mm / pitch_mm), 1) + 1
         return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
 
-    seen = field.inside.astype(np.uint8)
+    seen = inside.astype(np.uint8)
     core = cv2.erode(seen, disc(RIM_MM), borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    disturbed = np.abs(field.around - 1.0).max(axis=2) > RIM_CHANGE
     touched = (disturbed & (seen > 0) & (core == 0)).astype(np.uint8)
     if not touched.any():
         return np.zeros(seen.shape, dtype=bool)

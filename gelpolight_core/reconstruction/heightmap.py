@@ -9,6 +9,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.plan import Plan
+
 
 class Flag(IntFlag):
     """Why the depth of a pixel is to be trusted less; several may hold at once."""
@@ -76,6 +78,8 @@ class HeightMap:
         deviation of a depth is the root of the sum of squares of `depth_sd_mm`,
         `depth_model_sd_mm`, and `depth_scale_sd` times the depth. None where the calibration does
         not say.
+    plan : Plan or None
+        Which steps were done, and why the others were left out.
 
     Raises
     ------
@@ -100,6 +104,7 @@ class HeightMap:
     noise_mm: NDArray[np.float32] | None = None
     depth_scale_sd: float | None = None
     lateral_scale_sd: float | None = None
+    plan: Plan | None = None
 
     def __post_init__(self) -> None:
         """Check that the shapes fit each other."""

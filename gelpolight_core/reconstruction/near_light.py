@@ -113,7 +113,7 @@ def solve_near_light(
         [membrane.exponent, membrane.gloss, membrane.roughness, membrane.bounce], np.float64
     )
     curves = membrane.curves if membrane.diffuse else None
-    dark = np.ascontiguousarray(_dark_brightness(membrane))
+    dark = np.ascontiguousarray(dark_brightness(membrane))
     depth = np.ascontiguousarray(depth_mm, np.float32)
     leds = np.ascontiguousarray(led_positions_mm, np.float64)
 
@@ -150,7 +150,7 @@ def solve_near_light(
     return RaySlopes(slope_x, slope_y, normals, weight, flags)
 
 
-def _dark_brightness(membrane: Membrane) -> NDArray[np.float64]:
+def dark_brightness(membrane: Membrane) -> NDArray[np.float64]:
     """Return the brightness (3,) below which a channel counts as dark whatever its noise."""
     if not membrane.diffuse:
         return np.full(3, DARK_COSINE * (1.0 - membrane.gloss) / pi)

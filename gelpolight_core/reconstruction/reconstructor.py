@@ -22,16 +22,20 @@ from gelpolight_core.reconstruction.acceptance import (
 )
 from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.live import LiveSolver
+from gelpolight_core.reconstruction.live_maps import CURVE_ERROR
 from gelpolight_core.reconstruction.normals import (
     ShadingMaps,
     SlopeField,
     normals_from_slopes,
     solve_slopes,
 )
+from gelpolight_core.reconstruction.plan import EFFORTS, Plan, PlanStep
 from gelpolight_core.reconstruction.poisson import PoissonSolver
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.translation import tr
 
+Notes = tuple[str, ...]
 LOOKUP_SIZE = 2048
 
 
@@ -46,6 +50,10 @@ class Reconstructor:
         ``paper`` or ``full``; by default the one that the calibration was made for.
     terms : Terms, optional
         What the full model reckons with; by default everything.
+    effort : str, optional
+        How much work the full model's frame is worth: ``best``, the whole grid at its full scale;
+        ``balanced``, what the frame needs, at half scale, for live pictures; ``fast``, at quarter
+        scale. The paper's model knows one way only.
     workers : int, optional
         Threads of the solve and the transforms.
 
@@ -54,6 +62,8 @@ class Reconstructor:
     InputError
         If the calibration was not made for the model, its lights lie nearly in one plane,
         or there is light on next to nothing of the membrane.
+    ValueError
+        If there is no such effort.
 
     Examples
     --------
@@ -66,8 +76,11 @@ class Reconstructor:
         *,
         model: str | None = None,
         terms: Terms = ALL_TERMS,
+        effort: str = "best",
         workers: int = 2,
     ) -> None:
+        if effort not in EFFORTS:
+            raise ValueError(f"effort = {effort!r}, expected one of {EFFORTS}")
         self.calibration = calibration
         self.model = model or calibration.model
         if self.model == "full" and calibration.full is None:
@@ -81,6 +94,7 @@ class Reconstructor:
         refuse_coplanar_lights(calibration, leds_mm)
         refuse_dark_membrane(calibration)
         self.terms = terms
+        self.effort = effort
         self.workers = workers
 
     @cached_property
@@ -99,6 +113,29 @@ class Reconstructor:
         """What the rim shows while nothing crosses it."""
         return rim_check(self.calibration)
 
+    @cached_property
+    def live(self) -> LiveSolver:
+        """The planned solve of ``balanced`` and ``fast``."""
+        assert self.calibration.full is not None
+        return LiveSolver(self.calibration, self.calibration.full, workers=self.workers)
+
+    def warm_up(self) -> None:
+        """Make ready all that the first frame would wait for: maps, compiled parts, buffers."""
+        camera = self.calibration.camera
+        self.depth(np.zeros((camera.height, camera.width, 3), np.uint8))
+
+    def plan(self, frame: NDArray[Any], *, normals: bool = True, uncertainty: bool = False) -> Plan:
+        """Return which steps a frame needs, and why the others are left out.
+
+        Parameters
+        ----------
+        frame, normals, uncertainty
+            As in :meth:`depth`, which is what finds out.
+        """
+        plan = self.depth(frame, normals=normals, uncertainty=uncertainty).plan
+        assert plan is not None
+        return plan
+
     def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
         """Return the depth's slopes of a raw frame (height, width, 3), RGB.
 
@@ -108,10 +145,10 @@ class Reconstructor:
             If the frame is not of the calibration's size, not in colour, or holds other numbers
             than :meth:`depth` takes.
         """
-        return self._slopes(self._light(frame, name))
+        return self._slopes(self._accepted(frame, name))
 
-    def _slopes(self, light: NDArray[Any]) -> SlopeField:
-        return solve_slopes(light, self.maps, workers=self.workers)
+    def _slopes(self, frame: NDArray[Any]) -> SlopeField:
+        return solve_slopes(self.linearise(frame), self.maps, workers=self.workers)
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
         """Return a frame with the camera's response undone; floats are linear light already."""
@@ -145,41 +182,71 @@ class Reconstructor:
         InputError
             If the frame is not of the calibration's size, or holds other numbers than these.
         """
-        light = self._light(frame, name)
+        frame = self._accepted(frame, name)
+        notes = self._rim_notes(frame)
         if self.model == "full":
-            return self._depth_full(light, name, normals, uncertainty)
-        field = self._slopes(light)
+            why = self._why_unplanned(uncertainty)
+            if why is None:
+                return self._depth_live(frame, name, normals, notes)
+            return self._depth_full(frame, name, normals, uncertainty, why, notes)
+        field = self._slopes(frame)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
-        notes = self._rim_notes(light)
-        return self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name, notes)
+        depth_mm = np.asarray(depth_mm, np.float32)
+        heightmap = self._heightmap(depth_mm, shown, field.flags, name, notes)
+        names = [tr("resampling and normals"), tr("integration")]
+        plan = _unplanned(self.effort, names, tr("the paper's model knows one way"), normals, False)
+        return replace(heightmap, plan=plan)
+
+    def _why_unplanned(self, uncertainty: bool) -> str | None:
+        """Return why everything is done for a frame, or None where it is planned."""
+        if self.effort == "best":
+            return tr("the effort is best")
+        if uncertainty:
+            return tr("standard deviations are asked for")
+        if self.terms != ALL_TERMS:
+            return tr("terms of the model are left out by hand")
+        if self.live.maps.membrane.curve_error > CURVE_ERROR:
+            return tr("the membrane's curve is too bent for the fast solve")
+        return None
+
+    def _depth_live(self, frame: NDArray[Any], name: str, normals: bool, notes: Notes) -> HeightMap:
+        full = self.calibration.full
+        assert full is not None
+        found = self.live.depth(frame, effort=self.effort, normals=normals)
+        notes += _notes(found.rim, found.stopped)
+        heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
+        scale = full.scale_sd
+        return replace(
+            heightmap,
+            depth_scale_sd=None if scale is None else scale.depth,
+            lateral_scale_sd=None if scale is None else scale.lateral,
+            plan=found.plan,
+        )
 
     def _depth_full(
-        self, light: NDArray[Any], name: str, normals: bool, uncertainty: bool
+        self,
+        frame: NDArray[Any],
+        name: str,
+        normals: bool,
+        uncertainty: bool,
+        why: str,
+        notes: Notes,
     ) -> HeightMap:
         full = self.calibration.full
         assert full is not None
         result = reconstruct_full(
-            as_linear(light),
+            as_linear(self.linearise(frame)),
             self.calibration,
             full,
             terms=self.terms,
             workers=self.workers,
             uncertainty=uncertainty,
         )
-        notes = list(self._rim_notes(light))
-        if result.rim == "free":
-            notes.append(rim_let_go())
-        if result.stopped == "damped":
-            notes.append(tr("the press is deep for its lights: the near-light rounds were damped"))
-        if result.stopped == "unsettled":
-            notes.append(tr("the near-light rounds did not settle: damping did not help"))
-        if result.stopped == "grows":
-            notes.append(tr("the near-light rounds did not settle: the last was taken back"))
-        notes += [note for note in (unsolved_note(result.unsolved),) if note]
+        notes += _notes(result.rim, result.stopped, result.unsolved)
         shown = result.normals if normals else None
-        heightmap = self._heightmap(result.depth_mm, shown, result.flags, name, tuple(notes))
+        heightmap = self._heightmap(result.depth_mm, shown, result.flags, name, notes)
         scale, noise = full.scale_sd, result.noise
         return replace(
             heightmap,
@@ -190,6 +257,7 @@ class Reconstructor:
             noise_mm=None if noise is None else noise.examples_mm,
             depth_scale_sd=None if scale is None else scale.depth,
             lateral_scale_sd=None if scale is None else scale.lateral,
+            plan=_unplanned(self.effort, _full_names(), why, normals, uncertainty),
         )
 
     def _heightmap(
@@ -198,7 +266,7 @@ class Reconstructor:
         normals: NDArray[np.float32] | None,
         flags: NDArray[np.uint8],
         name: str,
-        notes: tuple[str, ...],
+        notes: Notes,
     ) -> HeightMap:
         grid = self.calibration.table.grid
         return HeightMap(
@@ -214,12 +282,13 @@ class Reconstructor:
             notes=notes,
         )
 
-    def _rim_notes(self, light: NDArray[Any]) -> tuple[str, ...]:
-        note = self.rim.note(light)
+    def _rim_notes(self, frame: NDArray[Any]) -> Notes:
+        rim = self.rim
+        note = rim.note(as_linear(self.linearise(frame[rim.row, rim.column][None]))[0])
         return (note,) if note else ()
 
-    def _light(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
-        """Return a frame of the right size and kind with the camera's response undone."""
+    def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
+        """Return a frame of the right size as numbers that every step takes."""
         camera = self.calibration.camera
         if frame.shape != (camera.height, camera.width, 3):
             shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
@@ -230,7 +299,50 @@ class Reconstructor:
                 where=name or tr("picture"),
                 advice=tr("Use the calibration of this sensor at this picture size"),
             )
-        return self.linearise(accepted(frame, name=name))
+        return accepted(frame, name=name)
+
+
+def _notes(rim: str, stopped: str, unsolved: float = 0.0) -> Notes:
+    """Return what is to be said of a reconstruction, in sentences for a person."""
+    notes = []
+    if rim == "free":
+        notes.append(rim_let_go())
+    if stopped == "damped":
+        notes.append(tr("the press is deep for its lights: the near-light rounds were damped"))
+    if stopped == "unsettled":
+        notes.append(tr("the near-light rounds did not settle: damping did not help"))
+    if stopped == "grows":
+        notes.append(tr("the near-light rounds did not settle: the last was taken back"))
+    notes += [note for note in (unsolved_note(unsolved),) if note]
+    return tuple(notes)
+
+
+def _full_names() -> list[str]:
+    return [
+        tr("resampling and comparing"),
+        tr("near light, quarter scale"),
+        tr("near light, full scale"),
+        tr("integration"),
+        tr("true positions"),
+    ]
+
+
+def _unplanned(effort: str, names: list[str], why: str, normals: bool, uncertainty: bool) -> Plan:
+    """Return the plan of a frame for which everything is done."""
+    asked = {tr("normals"): normals, tr("standard deviations"): uncertainty}
+    return Plan(
+        effort,
+        (
+            *(
+                PlanStep(name, True, tr("nothing is left out: {why}").format(why=why))
+                for name in names
+            ),
+            *(
+                PlanStep(name, wanted, tr("asked for") if wanted else tr("nobody asked for them"))
+                for name, wanted in asked.items()
+            ),
+        ),
+    )
 
 
 def shading_maps(calibration: Calibration) -> ShadingMaps:

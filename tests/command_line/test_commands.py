@@ -147,6 +147,33 @@ def test_the_benchmark_says_where_the_time_goes(
     timing = json.loads(result.read_text())
     assert {"total_ms", "copy_floor_ms", "steps", "threads", "model", "plan"} <= set(timing)
     assert {"name", "median_ms", "p95_ms", "bytes"} <= set(timing["steps"][0])
+    assert all(step["done"] for step in timing["plan"][: len(timing["steps"])])
+
+
+def test_the_benchmark_of_a_planned_frame_says_what_was_left_out(
+    calibration: Path, press: Path, tmp_path: Path
+) -> None:
+    result = tmp_path / "b.json"
+    arguments = ["benchmark", str(calibration), str(press), "--effort", "fast"]
+    assert main([*arguments, "--repeats", "2", "--json", str(result)]) == 0
+    timing = json.loads(result.read_text())
+    assert timing["effort"] == "fast"
+    done = {step["step"] for step in timing["plan"] if step["done"]}
+    assert done == {step["name"] for step in timing["steps"]}
+    assert all(step["reason"] for step in timing["plan"])
+    assert any(not step["done"] for step in timing["plan"])
+
+
+def test_a_plan_is_explained(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["-o", str(tmp_path / "out")]
+    explained = ["reconstruct", str(calibration), str(press), *out, "--explain"]
+    assert main([*explained, "--effort", "balanced"]) == 0
+    shown = capsys.readouterr().out
+    assert press.name in shown
+    assert "looking for a contact" in shown
+    assert "left out" in shown
 
 
 def test_a_design_is_checked_from_its_file(

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
 from gelpolight_core.experiments.stability_trial import standard_press, standard_sensor
 from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.plan import EFFORTS
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.simulation.indenters import Ball
 
@@ -23,7 +23,10 @@ HEIGHT, WIDTH = TINY.calibration.camera.height, TINY.calibration.camera.width
 STANDARD = [
     Reconstructor(standard_sensor().calibration, model=model) for model in ("full", "paper")
 ]
-RECONSTRUCTORS = [Reconstructor(TINY.calibration, model=model) for model in MODELS]
+RECONSTRUCTORS = [
+    Reconstructor(TINY.calibration, model="paper"),
+    *(Reconstructor(TINY.calibration, model="full", effort=effort) for effort in EFFORTS),
+]
 KINDS = st.one_of(
     npst.unsigned_integer_dtypes(sizes=(8, 16, 32)),
     npst.integer_dtypes(sizes=(8, 16)),

@@ -1,0 +1,450 @@
+"""The full model for live pictures: planned, in the region of the contact, at half scale.
+
+What is left out, and by how much that may change the depth beside the same model on the whole
+grid at its full scale, is said with each constant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain, repeat
+from threading import Lock
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.reconstruction.contact import contact_finder
+from gelpolight_core.reconstruction.full import (
+    LET_GO,
+    RIM_CHANGE,
+    SATURATED,
+    crossed_rim,
+    held_back,
+    longest_step_mm,
+    near_light_rounds,
+)
+from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.live_integration import LiveIntegration, integrate_live
+from gelpolight_core.reconstruction.live_kernel import solve_rows
+from gelpolight_core.reconstruction.live_maps import LiveMaps, LiveScale, light_levels, live_maps
+from gelpolight_core.reconstruction.live_pixels import (
+    halve,
+    place_rows,
+    sample_rows,
+    show_depth,
+    show_normals,
+)
+from gelpolight_core.reconstruction.plan import Plan, PlanRecord
+from gelpolight_core.reconstruction.region import Region, padded_region
+from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+# The drape about a contact falls by a factor e over its decay length.
+MARGIN_DECAYS = 1.5
+LEAST_MARGIN_MM = 0.8
+# A region of this share of the grid is taken as all of it.
+WHOLE = 0.85
+ROUNDS = 2
+# A second round moves the surface by about twice its depth squared over the lights' height; below
+# this depth, by less than half a micrometre.
+SHALLOW_MM = 0.05
+# Of the integration, round by round: the first ones only have to say where the surface is.
+FIRST_TOLERANCES = (0.05, 0.005)
+TOLERANCE = 2e-3
+# Bytes that a node at quarter scale, a solved node and a shown node must read and write once.
+SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 4 * (12 + 20 + 13), 88, 6
+
+
+@dataclass(frozen=True, slots=True)
+class LiveDepth:
+    """A planned reconstruction.
+
+    Attributes
+    ----------
+    depth_mm, normals, flags
+        As in :class:`FullDepth`; `normals` None where they were not asked for.
+    stopped, rim : str
+        As in :class:`FullDepth`.
+    plan : Plan
+        What was done and what was left out.
+    """
+
+    depth_mm: Map
+    normals: Map | None
+    flags: NDArray[np.uint8]
+    stopped: str
+    rim: str
+    plan: Plan
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    """Slopes along the rays of one scale's region."""
+
+    slope_x: Map
+    slope_y: Map
+    weight: Map
+    flags: NDArray[np.uint8]
+    normal_x: Map
+    normal_y: Map
+
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """Press over background in a region of one scale."""
+
+    ratio: Map
+    saturated: NDArray[np.uint8]
+    around: Map
+    let_go: NDArray[np.bool_] | None
+
+
+class LiveSolver:
+    """Reconstructs frames by the full model, doing for each what it needs.
+
+    Work buffers are kept from frame to frame; results are always new. It may be called from
+    several threads, which then wait for each other.
+
+    Parameters
+    ----------
+    calibration, full
+        The sensor's.
+    workers : int
+        Threads.
+    """
+
+    def __init__(self, calibration: Calibration, full: FullModel, *, workers: int) -> None:
+        self.calibration = calibration
+        self.maps: LiveMaps = live_maps(calibration, full)
+        self.finder = contact_finder(calibration, full)
+        self._full = full
+        self._workers = RowWorkers(workers)
+        self._margin_mm = max(MARGIN_DECAYS * full.decay_mm, LEAST_MARGIN_MM)
+        inverse = np.linalg.inv(calibration.crosstalk).astype(np.float32)
+        self._unmix = tuple(tuple(row) for row in inverse)
+        self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
+        self._linear = False
+        self._buffers: dict[str, NDArray[Any]] = {}
+        self._lock = Lock()
+
+    def depth(
+        self, frame: NDArray[Any], *, effort: str, normals: bool, everywhere: bool = False
+    ) -> LiveDepth:
+        """Reconstruct a raw frame (height, width, 3), uint8, uint16 or float.
+
+        Parameters
+        ----------
+        frame
+            RGB, as the camera encodes it; floats linear light 0..1.
+        effort : str
+            ``balanced`` or ``fast``.
+        normals : bool
+            Whether they are wanted.
+        everywhere : bool, optional
+            Whether to solve the whole grid without looking for a contact.
+        """
+        # A float picture is linear already, the background of a bent camera is not.
+        linear = frame.dtype.kind == "f"
+        everywhere = everywhere or (linear and self.calibration.response is not None)
+        with self._lock:
+            self._linear = linear
+            return self._depth(_whole_numbers(frame), effort, normals, everywhere)
+
+    def _depth(self, raw: NDArray[Any], effort: str, normals: bool, everywhere: bool) -> LiveDepth:
+        record = PlanRecord()
+        depth = np.zeros(self.maps.flags.shape, np.float32)
+        flags = self.maps.flags.copy()
+        shown = flat_normals(depth.shape) if normals else None
+        region, stopped, rim = self._region(raw, record, everywhere), "done", "held"
+        if region is None:
+            for name in (tr("resampling and comparing"), tr("near light"), tr("integration")):
+                record.left_out(name, tr("nothing is pressed into the membrane"))
+        else:
+            stopped, rim = self._solve(raw, region, effort, record, depth, flags, shown)
+        if not normals:
+            record.left_out(tr("normals"), tr("nobody asked for them"))
+        return LiveDepth(depth, shown, flags, stopped, rim, Plan(effort, tuple(record.steps)))
+
+    def _region(self, raw: NDArray[Any], record: PlanRecord, everywhere: bool) -> Region | None:
+        whole = Region((0, 0), self.maps.quarter.shape)
+        if everywhere:
+            record.left_out(tr("looking for a contact"), tr("the whole field is wanted"))
+            return whole
+        with record.done(tr("looking for a contact"), raw.nbytes) as reason:
+            contact = self.finder.find(raw, self._workers)
+            if contact is None:
+                reason.append(tr("the picture is the background's"))
+                return None
+            region = padded_region(contact, self.maps.quarter, self._margin_mm)
+            share = region.nodes / whole.nodes
+            reason.append(tr("{share:.0%} of the field is solved").format(share=share))
+        return whole if share > WHOLE else region
+
+    def _solve(
+        self,
+        raw: NDArray[Any],
+        region: Region,
+        effort: str,
+        record: PlanRecord,
+        depth: Map,
+        flags: NDArray[np.uint8],
+        normals: Map | None,
+    ) -> tuple[str, str]:
+        """Solve a region and write it into the maps of the whole grid."""
+        maps, nodes = self.maps, region.nodes
+        with record.done(tr("resampling and comparing"), nodes * SAMPLED_BYTES) as reason:
+            half, quarter = self._compare(raw, region)
+            reason.append(tr("averages over 2 x 2 nodes need no denoising"))
+        if maps.membrane.bounce is None:
+            record.left_out(tr("light from the surroundings"), tr("this membrane gives none"))
+        with record.done(tr("near light, quarter scale"), ROUNDS * nodes * SOLVED_BYTES) as reason:
+            start, (changes, stopped) = self._rounds(region, quarter)
+            reason.append(tr("{n} rounds, {d:.2f} mm deep").format(n=len(changes), d=start.max()))
+        if len(changes) < ROUNDS:
+            record.left_out(tr("second near-light round"), tr("the press is that shallow"))
+        scale, picture = (maps.half, half) if effort == "balanced" else (maps.quarter, quarter)
+        corner, shape = region.at(4 // scale.factor)
+        start = np.asarray(cv2.resize(start, shape[::-1], interpolation=cv2.INTER_LINEAR))
+        if effort != "balanced":
+            record.left_out(tr("near light, half scale"), tr("this effort does without it"))
+        size = shape[0] * shape[1] * SOLVED_BYTES
+        with record.done(tr("near light, last round"), size) as reason:
+            slopes = self._slopes(scale, picture, corner, start)
+            reason.append(tr("from the depth at quarter scale"))
+        with record.done(tr("integration"), 5 * start.nbytes) as reason:
+            solved = self._integrate(scale, picture, corner, start, slopes, TOLERANCE)
+            moved = held_back(start, solved.depth_mm, longest_step_mm(self._full))
+            reason.append(tr("{n} rounds of conjugate gradients").format(n=solved.rounds))
+        with record.done(tr("true positions"), 16 * nodes * SHOWN_BYTES) as reason:
+            self._show(scale, region, slopes, moved, depth, flags, normals)
+            reason.append(tr("and to the whole grid's scale"))
+        return stopped, "held" if picture.let_go is None else "free"
+
+    def _rounds(
+        self, region: Region, picture: _Picture
+    ) -> tuple[Map, tuple[tuple[float, ...], str]]:
+        """Return the depth after the near-light rounds at quarter scale; as `coarse_depth`."""
+        scale, corner = self.maps.quarter, region.corner
+        tolerances = chain(FIRST_TOLERANCES, repeat(FIRST_TOLERANCES[-1]))
+
+        def solve(depth: Map) -> Map:
+            slopes = self._slopes(scale, picture, corner, depth)
+            return self._integrate(scale, picture, corner, depth, slopes, next(tolerances)).depth_mm
+
+        longest = longest_step_mm(self._full)
+        return near_light_rounds(solve, region.shape, longest, ROUNDS, shallow_mm=SHALLOW_MM)
+
+    def _compare(self, raw: NDArray[Any], region: Region) -> tuple[_Picture, _Picture]:
+        """Return press over background at half and at quarter scale."""
+        maps = self.maps
+        corner, shape = region.at(2)
+        small = region.shape
+        ratio, coarse = self._take("ratio", (3, *shape)), self._take("coarse", (3, *small))
+        marks = self._take("saturated", shape, np.uint8)
+        coarse_marks = self._take("coarse saturated", small, np.uint8)
+        limit = np.float32(SATURATED)
+        self._workers.run(
+            shape[0],
+            sample_rows,
+            raw,
+            self._levels(raw.dtype, self._linear),
+            limit,
+            maps.u_px,
+            maps.v_px,
+            self._unmix,
+            maps.gain,
+            maps.half.kind,
+            corner,
+            ratio,
+            marks,
+        )
+        halve(ratio, marks, coarse, coarse_marks)
+        around = coarse_around = self._take("no surroundings", (3, 1, 1))
+        let_go = None
+        (top, left), kind = region.corner, maps.quarter.kind
+        kind = kind[top : top + small[0], left : left + small[1]]
+        if (
+            maps.membrane.bounce is not None
+            or not kind.all()
+            or region.at_border(maps.quarter.shape)
+        ):
+            coarse_around = self._around(coarse)
+            let_go = self._released(coarse_around, kind)
+        if maps.membrane.bounce is not None:
+            around = self._take("around", (3, *shape))
+            for k in range(3):
+                cv2.resize(coarse_around[k], shape[::-1], around[k])
+        large = None
+        if let_go is not None:
+            large = np.repeat(np.repeat(let_go, 2, axis=0), 2, axis=1)
+        return (
+            _Picture(ratio, marks, around, large),
+            _Picture(coarse, coarse_marks, coarse_around, let_go),
+        )
+
+    def _around(self, coarse: Map) -> Map:
+        """Return press over background, averaged over the surroundings; as `neighbourhood`."""
+        reach = self._full.membrane.bounce_reach_mm / self.maps.quarter.pitch_mm
+        factor = max(int(reach / 4.0), 1)
+        rows, columns = coarse.shape[1:]
+        size = (max(columns // factor, 1), max(rows // factor, 1))
+        result = self._take("coarse around", coarse.shape)
+        for k in range(3):
+            known = np.clip(coarse[k], 0.0, 4.0)
+            small = cv2.resize(known, size, interpolation=cv2.INTER_AREA)
+            small = cv2.GaussianBlur(small, (0, 0), reach / factor)
+            cv2.resize(small, (columns, rows), result[k])
+        return result
+
+    def _released(self, around: Map, kind: NDArray[np.uint8]) -> NDArray[np.bool_] | None:
+        """Return where a contact crosses the rim, or None where it does not."""
+        disturbed = np.abs(around - 1.0).max(axis=0) > RIM_CHANGE
+        let_go = crossed_rim(kind > 0, disturbed, self.maps.quarter.pitch_mm)
+        return let_go if let_go.any() else None
+
+    def _slopes(
+        self, scale: LiveScale, picture: _Picture, corner: tuple[int, int], depth: Map
+    ) -> _Solved:
+        """Return slopes along the rays at the present depth; as `solve_near_light`."""
+        membrane, shape = self.maps.membrane, depth.shape
+        solved = _Solved(
+            self._take("slope x", shape),
+            self._take("slope y", shape),
+            self._take("weight", shape),
+            self._take("flags", shape, np.uint8),
+            self._take("normal x", shape),
+            self._take("normal y", shape),
+        )
+        self._workers.run(
+            shape[0],
+            solve_rows,
+            picture.ratio,
+            picture.around,
+            picture.saturated,
+            np.ascontiguousarray(depth),
+            scale.static,
+            scale.kind,
+            corner,
+            scale.origin_mm,
+            scale.pitch_mm,
+            membrane.leds,
+            membrane.dark,
+            membrane.curves,
+            membrane.gloss,
+            membrane.bounce,
+            True,
+            solved.slope_x,
+            solved.slope_y,
+            solved.weight,
+            solved.flags,
+            solved.normal_x,
+            solved.normal_y,
+        )
+        return solved
+
+    def _integrate(
+        self,
+        scale: LiveScale,
+        picture: _Picture,
+        corner: tuple[int, int],
+        depth: Map,
+        slopes: _Solved,
+        tolerance: float,
+    ) -> LiveIntegration:
+        """Integrate slopes from the present depth, the rim let go where a contact crosses it."""
+        weight, hold = slopes.weight, None
+        if picture.let_go is not None:
+            (top, left), (rows, columns) = corner, depth.shape
+            hold = np.where(picture.let_go, np.float32(LET_GO), np.float32(1.0))
+            inside = scale.kind[top : top + rows, left : left + columns] > 0
+            weight = np.where(inside, weight, weight * hold)
+        return integrate_live(
+            slopes.slope_x,
+            slopes.slope_y,
+            weight,
+            pitch_mm=scale.pitch_mm,
+            start_mm=depth if depth.any() else None,
+            hold=hold,
+            tolerance=tolerance,
+            workers=self._workers.count,
+        )
+
+    def _show(
+        self,
+        scale: LiveScale,
+        region: Region,
+        slopes: _Solved,
+        moved: Map,
+        depth: Map,
+        flags: NDArray[np.uint8],
+        normals: Map | None,
+    ) -> None:
+        """Bring a region to true positions, and to the whole grid's scale."""
+        corner, shape = region.at(4 // scale.factor)
+        placed, marks = self._take("placed", shape), self._take("marks", shape, np.uint8)
+        place = self._take("place", (2, *shape))
+        self._workers.run(
+            shape[0],
+            place_rows,
+            moved,
+            scale.static,
+            corner,
+            np.float32(1.0 / scale.pitch_mm),
+            slopes.flags,
+            int(Flag.NOT_OBSERVABLE),
+            placed,
+            marks,
+            place,
+        )
+        top_left, whole = region.at(4)
+        outside = int(Flag.OUTSIDE)
+        self._workers.run(
+            whole[0], show_depth, placed, marks, scale.factor, top_left, outside, depth, flags
+        )
+        if normals is not None:
+            self._workers.run(
+                whole[0],
+                show_normals,
+                slopes.normal_x,
+                slopes.normal_y,
+                place,
+                scale.factor,
+                top_left,
+                normals,
+            )
+
+    def _levels(self, dtype: np.dtype[Any], linear: bool) -> Map:
+        kind = (dtype, linear)
+        if kind not in self._light:
+            response = None if linear else self.calibration.response
+            self._light[kind] = light_levels(response, dtype)
+        return self._light[kind]
+
+    def _take(
+        self, name: str, shape: tuple[int, ...], dtype: type[np.generic] = np.float32
+    ) -> NDArray[Any]:
+        """Return a work buffer; what it held before is of no use."""
+        size = int(np.prod(shape))
+        kept = self._buffers.get(name)
+        if kept is None or kept.size < size:
+            kept = self._buffers[name] = np.empty(size, dtype)
+        return kept[:size].reshape(shape)
+
+
+def flat_normals(shape: tuple[int, ...]) -> Map:
+    """Return normals (rows, columns, 3) of the flat membrane."""
+    normals = np.zeros((*shape, 3), np.float32)
+    normals[..., 2] = -1.0
+    return normals
+
+
+def _whole_numbers(frame: NDArray[Any]) -> NDArray[Any]:
+    """Return a frame as whole numbers; what is not finite in floats counts as saturated."""
+    if frame.dtype.kind != "f":
+        return np.ascontiguousarray(frame)
+    known = np.nan_to_num(frame, nan=1.0, posinf=1.0, neginf=1.0)
+    return np.asarray(np.clip(known, 0.0, 1.0) * 65535.0 + 0.5, np.uint16)

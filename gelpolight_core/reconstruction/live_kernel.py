@@ -1,0 +1,448 @@
+"""The compiled part of the planned near-light solve: blocks of nodes, many at a time.
+
+The same mathematics as `near_light_kernel`, without branches and in single precision, so that the
+processor solves eight or sixteen nodes at once. Every block is copied into one small array: handed
+twenty arrays, the compiler could not know that none overlaps another.
+"""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+
+import numba
+import numpy as np
+
+from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.near_light_kernel import (
+    DARK_SHARE,
+    DARK_SIGMAS,
+    LEAST_ALONG_RAY,
+    MODEL_ERROR,
+    ONE_DARK_WEIGHT,
+    STEEPEST_NZ,
+    UNSOLVED_WEIGHT,
+)
+
+_B = 64
+_IN = 23
+_single = np.float32
+_0, _1, _2, _HALF = _single(0.0), _single(1.0), _single(2.0), _single(0.5)
+_PI = _single(pi)
+_LEAST_COSINE, _LEAST_VIEW = _single(1e-3), _single(1e-2)
+_STEEPEST = _single(STEEPEST_NZ)
+_LEVEL = _single(sqrt(1.0 - STEEPEST_NZ**2))
+_LEAST_ALONG = _single(LEAST_ALONG_RAY)
+_ONE_DARK, _UNSOLVED = _single(ONE_DARK_WEIGHT), _single(UNSOLVED_WEIGHT)
+_MODEL2 = _single(MODEL_ERROR**2)
+_SIGMAS, _SHARE = _single(DARK_SIGMAS), _single(DARK_SHARE)
+_LONGEST = _single(0.3)
+_DAMP, _TINY = _single(1e-6), _single(1e-12)
+_MOST = _single(1e4)
+_F_OUTSIDE, _F_SATURATED = _single(Flag.OUTSIDE), _single(Flag.SATURATED)
+_F_DARK, _F_HIDDEN = _single(Flag.DARK), _single(Flag.NOT_OBSERVABLE)
+
+_part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
+_whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+
+
+@_part
+def _most(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a if a > b else b
+
+
+@_part
+def _least(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a if a < b else b
+
+
+@_part
+def _curve(c, p):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the diffuse share's polynomial and its derivative."""
+    v = p[7]
+    s = v
+    v = v * c + p[6]
+    s = s * c + v
+    v = v * c + p[5]
+    s = s * c + v
+    v = v * c + p[4]
+    s = s * c + v
+    v = v * c + p[3]
+    s = s * c + v
+    v = v * c + p[2]
+    s = s * c + v
+    v = v * c + p[1]
+    s = s * c + v
+    return v * c + p[0], s
+
+
+@_part
+def _response(l, n, v, p, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled # noqa: E741
+    """Return the brightness under one light, and its gradient by the (free) normal."""
+    facing = l[0] * n[0] + l[1] * n[1] + l[2] * n[2]
+    c = _most(facing, _LEAST_COSINE)
+    f, by_c = _curve(_least(c, _1), p)
+    if gloss is None:
+        on = _1 if facing > _0 else _0
+        return f * on, by_c * l[0] * on, by_c * l[1] * on, by_c * l[2] * on
+    share, a2 = gloss
+    hx, hy, hz = l[0] + v[0], l[1] + v[1], l[2] + v[2]
+    short = _1 / sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx * short, hy * short, hz * short
+    t = _most(hx * n[0] + hy * n[1] + hz * n[2], _0)
+    s = _most(v[0] * n[0] + v[1] * n[1] + v[2] * n[2], _LEAST_VIEW)
+    b2 = _1 - a2
+    width = _1 / (_1 - t * t * b2)
+    rc = sqrt(a2 + b2 * c * c)
+    rs = sqrt(a2 + b2 * s * s)
+    lit = _1 / (c + rc)
+    shown = _1 / (s + rs)
+    # D(t) * 2c / (c + rc) * 2s / (s + rs) / (4 s)
+    lobe = share * a2 / _PI * width * width * lit * shown
+    g = lobe * c
+    on = _1 if facing > _0 else _0
+    by_c = (by_c + lobe * (_1 - c * lit * (_1 + b2 * c / rc))) * on
+    by_t = g * _single(4.0) * b2 * t * width * on
+    by_s = -g * shown * (_1 + b2 * s / rs) * on
+    return (
+        (f + g) * on,
+        by_c * l[0] + by_t * hx + by_s * v[0],
+        by_c * l[1] + by_t * hy + by_s * v[1],
+        by_c * l[2] + by_t * hz + by_s * v[2],
+    )
+
+
+@_part
+def _limited(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the normal at unit length and not steeper than can be seen."""
+    size = _1 / sqrt(nx * nx + ny * ny + nz * nz + _TINY)
+    nx, ny, nz = nx * size, ny * size, nz * size
+    stretch = _LEVEL / sqrt(nx * nx + ny * ny + _TINY)
+    steep = nz > -_STEEPEST
+    return (
+        nx * stretch if steep else nx,
+        ny * stretch if steep else ny,
+        -_STEEPEST if steep else nz,
+    )
+
+
+@_part
+def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a light's direction at the present depth, and r^3 / z of its near-light gain."""
+    ax, ay, az = led[0] - x, led[1] - y, led[2] + d
+    r2 = ax * ax + ay * ay + az * az
+    short = _1 / sqrt(r2)
+    return (ax * short, ay * short, az * short), r2 * r2 * short / az
+
+
+@_part
+def _told(ratio, around, sigma, sat, scale, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a channel's direct light, and what it says: 1, or 0 where it is dark or saturated."""
+    direct = ratio if bounce is None else ratio - bounce * around * _HALF * (_1 + nz)
+    direct = direct * scale
+    low = _most(dark, _least(_SIGMAS * sigma, _SHARE) * scale)
+    lit = _1 if direct >= low else _0
+    if not shadows:
+        lit = _1
+    return direct, lit, _0 if sat > _0 else lit
+
+
+@_part
+def _cross(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@_part
+def _inner(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@_part
+def _chosen(first, second, a, b, c):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a where `first`, else b where `second`, else c."""
+    x = a[0] if first else (b[0] if second else c[0])
+    y = a[1] if first else (b[1] if second else c[1])
+    z = a[2] if first else (b[2] if second else c[2])
+    return x, y, z
+
+
+@_part
+def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a first normal from equivalent cosines: three lights, or two and |n| = 1."""
+    p, q, r = _cross(l1, l2), _cross(l2, l0), _cross(l0, l1)
+    short = _1 / _inner(l0, p)
+    ax = (e0 * p[0] + e1 * q[0] + e2 * r[0]) * short
+    ay = (e0 * p[1] + e1 * q[1] + e2 * r[1]) * short
+    az = (e0 * p[2] + e1 * q[2] + e2 * r[2]) * short
+    is0, is1 = w0 == _0, w1 == _0
+    a, b, c = (
+        _chosen(is0, is1, l1, l2, l0),
+        _chosen(is0, is1, l2, l0, l1),
+        _chosen(is0, is1, l0, l1, l2),
+    )
+    ea = e1 if is0 else (e2 if is1 else e0)
+    eb = e2 if is0 else (e0 if is1 else e1)
+    bright = lit0 if is0 else (lit1 if is1 else lit2)
+    ex, ey, ez = _chosen(is0, is1, p, q, r)
+    between = _inner(a, b)
+    det = _1 / (_1 - between * between)
+    ka, kb = (ea - between * eb) * det, (eb - between * ea) * det
+    bx, by, bz = ka * a[0] + kb * b[0], ka * a[1] + kb * b[1], ka * a[2] + kb * b[2]
+    left = (_1 - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
+    step = sqrt(_most(left, _single(1e-4)))
+    # Away from a dark light, towards a saturated one.
+    side = ex * c[0] + ey * c[1] + ez * c[2]
+    towards = side if bright > _0 else -side
+    step = step if towards > _0 else -step
+    one = w0 + w1 + w2 < _single(2.5)
+    return _limited(
+        bx + step * ex if one else ax,
+        by + step * ey if one else ay,
+        bz + step * ez if one else az,
+    )
+
+
+@_part
+def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight, bend):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a channel's part of the Gauss-Newton equations along two tangents of n.
+
+    The tangents are (-nz, 0, nx) and (0, -nz, ny).
+    """
+    d1 = n[0] * (gz + bend) - n[2] * gx
+    d2 = n[1] * (gz + bend) - n[2] * gy
+    w = weight / ((sigma * sigma + _MODEL2) * scale * scale)
+    e = w * (direct - f)
+    return w * d1 * d1, w * d1 * d2, w * d2 * d2, d1 * e, d2 * e
+
+
+@_part
+def _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the normal after one Gauss-Newton step."""
+    nz = n[2]
+    b0, b1, b2 = _0, _0, _0
+    if bounce is not None:
+        half = bounce * _HALF
+        b0, b1, b2 = (
+            half * w[9 * _B + j] * s0,
+            half * w[10 * _B + j] * s1,
+            half * w[11 * _B + j] * s2,
+        )
+    t0, _, k0 = _told(
+        w[j], w[9 * _B + j], w[6 * _B + j], w[19 * _B + j], s0, dark[0], bounce, nz, shadows
+    )
+    t1, _, k1 = _told(
+        w[_B + j], w[10 * _B + j], w[7 * _B + j], w[20 * _B + j], s1, dark[1], bounce, nz, shadows
+    )
+    t2, _, k2 = _told(
+        w[2 * _B + j],
+        w[11 * _B + j],
+        w[8 * _B + j],
+        w[21 * _B + j],
+        s2,
+        dark[2],
+        bounce,
+        nz,
+        shadows,
+    )
+    f, gx, gy, gz = _response(l0, n, v, curves[0], gloss)
+    a11, a12, a22, ag1, ag2 = _pull(f, gx, gy, gz, n, t0, s0, w[6 * _B + j], k0, b0)
+    f, gx, gy, gz = _response(l1, n, v, curves[1], gloss)
+    b11, b12, b22, bg1, bg2 = _pull(f, gx, gy, gz, n, t1, s1, w[7 * _B + j], k1, b1)
+    f, gx, gy, gz = _response(l2, n, v, curves[2], gloss)
+    c11, c12, c22, cg1, cg2 = _pull(f, gx, gy, gz, n, t2, s2, w[8 * _B + j], k2, b2)
+    m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
+    g1, g2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
+    damp = _DAMP * (m11 + m22) + _TINY
+    m11, m22 = m11 + damp, m22 + damp
+    short = _1 / (m11 * m22 - m12 * m12)
+    m1, m2 = (m22 * g1 - m12 * g2) * short, (m11 * g2 - m12 * g1) * short
+    dx, dy, dz = -n[2] * m1, -n[2] * m2, n[0] * m1 + n[1] * m2
+    move = dx * dx + dy * dy + dz * dz + _TINY
+    held = _least(_LONGEST / sqrt(move), _1)
+    return _limited(n[0] + held * dx, n[1] + held * dy, n[2] + held * dz)
+
+
+@_whole
+def solve_block(w, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Solve the `_B` nodes of a block: planes 0 to 22 of `w` are read, 23 to 28 are written."""
+    for j in range(_B):
+        d, wx, wy = w[12 * _B + j], w[13 * _B + j], w[14 * _B + j]
+        x = x_first + pitch * _single(j) + d * wx
+        short = _1 / sqrt(wx * wx + wy * wy + _1)
+        v = (wx * short, wy * short, -short)
+        l0, near0 = _light(leds[0], x, y + d * wy, d)
+        l1, near1 = _light(leds[1], x, y + d * wy, d)
+        l2, near2 = _light(leds[2], x, y + d * wy, d)
+        s0, s1, s2 = w[3 * _B + j] * near0, w[4 * _B + j] * near1, w[5 * _B + j] * near2
+        flat = (_0, _0, -_1)
+        d0, lit0, k0 = _told(
+            w[j], w[9 * _B + j], w[6 * _B + j], w[19 * _B + j], s0, dark[0], bounce, -_1, shadows
+        )
+        d1, lit1, k1 = _told(
+            w[_B + j],
+            w[10 * _B + j],
+            w[7 * _B + j],
+            w[20 * _B + j],
+            s1,
+            dark[1],
+            bounce,
+            -_1,
+            shadows,
+        )
+        d2, lit2, k2 = _told(
+            w[2 * _B + j],
+            w[11 * _B + j],
+            w[8 * _B + j],
+            w[21 * _B + j],
+            s2,
+            dark[2],
+            bounce,
+            -_1,
+            shadows,
+        )
+        f0 = _response(l0, flat, v, curves[0], gloss)[0]
+        f1 = _response(l1, flat, v, curves[1], gloss)[0]
+        f2 = _response(l2, flat, v, curves[2], gloss)[0]
+        tiny = _DAMP
+        e0 = _least(-l0[2] * _most(d0, _0) / _most(f0, tiny), _1)
+        e1 = _least(-l1[2] * _most(d1, _0) / _most(f1, tiny), _1)
+        e2 = _least(-l2[2] * _most(d2, _0) / _most(f2, tiny), _1)
+        lit0 = w[19 * _B + j]
+        lit1 = w[20 * _B + j]
+        lit2 = w[21 * _B + j]
+        n = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, lit0, lit1, lit2)
+        n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
+        n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
+        # What is dark is judged with the light from around that the normal found receives.
+        _, lit0, k0 = _told(
+            w[j], w[9 * _B + j], w[6 * _B + j], w[19 * _B + j], s0, dark[0], bounce, n[2], shadows
+        )
+        _, lit1, k1 = _told(
+            w[_B + j],
+            w[10 * _B + j],
+            w[7 * _B + j],
+            w[20 * _B + j],
+            s1,
+            dark[1],
+            bounce,
+            n[2],
+            shadows,
+        )
+        _, lit2, k2 = _told(
+            w[2 * _B + j],
+            w[11 * _B + j],
+            w[8 * _B + j],
+            w[21 * _B + j],
+            s2,
+            dark[2],
+            bounce,
+            n[2],
+            shadows,
+        )
+        known = k0 + k1 + k2
+        solved = known > _single(1.5)
+        nx, ny, nz = n[0] if solved else _0, n[1] if solved else _0, n[2] if solved else -_1
+        along = nx * wx + ny * wy - nz
+        hidden = (nz > -_STEEPEST - _DAMP) or (along < _LEAST_ALONG)
+        trust = _1 if known > _single(2.5) else _ONE_DARK
+        trust = _UNSOLVED if hidden or not solved else trust
+        along = _1 / _most(along, _LEAST_ALONG)
+        slope_x = -(nx * (_1 + d * w[15 * _B + j]) + ny * d * w[16 * _B + j]) * along
+        slope_y = -(nx * d * w[17 * _B + j] + ny * (_1 + d * w[18 * _B + j])) * along
+        saturated = w[19 * _B + j] + w[20 * _B + j] + w[21 * _B + j] > _0
+        unlit = lit0 * lit1 * lit2 < _HALF
+        flag = (
+            (_F_HIDDEN if hidden else _0)
+            + (_F_SATURATED if saturated else _0)
+            + (_F_DARK if unlit else _0)
+        )
+        kind = w[22 * _B + j]
+        usable = kind > _single(1.5)
+        w[23 * _B + j] = slope_x if usable else _0
+        w[24 * _B + j] = slope_y if usable else _0
+        w[25 * _B + j] = trust if usable else (_UNSOLVED if kind > _HALF else _1)
+        w[26 * _B + j] = flag if usable else _F_OUTSIDE
+        w[27 * _B + j] = nx if usable else _0
+        w[28 * _B + j] = ny if usable else _0
+
+
+@_part
+def _fetch(w, at, line, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    for j in range(count):
+        w[at + j] = line[begin + j]
+
+
+@_part
+def _store(w, at, line, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    for j in range(count):
+        line[begin + j] = w[at + j]
+
+
+@_part
+def _fetch_bits(w, saturated, begin, kind, place, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    for j in range(count):
+        bits = saturated[begin + j]
+        w[19 * _B + j] = _single(bits & 1)
+        w[20 * _B + j] = _single((bits >> 1) & 1)
+        w[21 * _B + j] = _single((bits >> 2) & 1)
+        w[22 * _B + j] = _single(kind[place + j])
+
+
+@_whole
+def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    first,
+    last,
+    ratio,
+    around,
+    saturated,
+    depth,
+    static,
+    kind,
+    corner,
+    origin_mm,
+    pitch_mm,
+    leds,
+    dark,
+    curves,
+    gloss,
+    bounce,
+    shadows,
+    slope_x,
+    slope_y,
+    weight,
+    flags,
+    normal_x,
+    normal_y,
+):
+    """Solve rows `first` to `last` of a region whose corner in the static maps is `corner`.
+
+    `static` (12, rows, columns): 3 scales, 3 noises, drift x, y, and its four derivatives.
+    """
+    columns = depth.shape[1]
+    w = np.zeros(29 * _B, np.float32)
+    for i in range(first, last):
+        y = _single(origin_mm[1] + pitch_mm * (i + corner[0]))
+        for begin in range(0, columns, _B):
+            count = min(_B, columns - begin)
+            place = corner[1] + begin
+            row = i + corner[0]
+            for k in range(3):
+                _fetch(w, k * _B, ratio[k, i], begin, count)
+                if bounce is not None:
+                    _fetch(w, (9 + k) * _B, around[k, i], begin, count)
+            _fetch(w, 12 * _B, depth[i], begin, count)
+            for k in range(6):
+                _fetch(w, (3 + k) * _B, static[k, row], place, count)
+                _fetch(w, (13 + k) * _B, static[6 + k, row], place, count)
+            _fetch_bits(w, saturated[i], begin, kind[row], place, count)
+            x_first = _single(origin_mm[0] + pitch_mm * place)
+            solve_block(
+                w, y, x_first, _single(pitch_mm), leds, dark, curves, gloss, bounce, shadows
+            )
+            _store(w, 23 * _B, slope_x[i], begin, count)
+            _store(w, 24 * _B, slope_y[i], begin, count)
+            _store(w, 25 * _B, weight[i], begin, count)
+            _store(w, 27 * _B, normal_x[i], begin, count)
+            _store(w, 28 * _B, normal_y[i], begin, count)
+            line = flags[i]
+            for j in range(count):
+                line[begin + j] = np.uint8(w[26 * _B + j])

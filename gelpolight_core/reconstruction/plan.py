@@ -1,0 +1,102 @@
+"""Which steps a frame needs, and why the others were left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+EFFORTS = ("fast", "balanced", "best")
+"""How much work a frame is worth, from least to most."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanStep:
+    """One step of a frame.
+
+    Attributes
+    ----------
+    name : str
+        The step.
+    done : bool
+        Whether it was needed.
+    reason : str
+        Why it was done so, or left out, in a sentence for a person.
+    milliseconds : float or None
+        What it took; None where it was left out or not timed.
+    bytes : int
+        That it must read and write once, whatever the program; 0 where that was not counted.
+    """
+
+    name: str
+    done: bool
+    reason: str
+    milliseconds: float | None = None
+    bytes: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "step": self.name,
+            "done": self.done,
+            "reason": self.reason,
+            "milliseconds": self.milliseconds,
+        }
+
+    @property
+    def sentence(self) -> str:
+        """The step and its reason in one line."""
+        took = "" if self.milliseconds is None else f" ({self.milliseconds:.1f} ms)"
+        return f"{self.name}: {self.reason}{took}"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The steps of one frame in their order.
+
+    Attributes
+    ----------
+    effort : str
+        One of `EFFORTS`.
+    steps : tuple of PlanStep
+        Done and left out.
+    """
+
+    effort: str
+    steps: tuple[PlanStep, ...] = ()
+
+    @property
+    def done(self) -> tuple[str, ...]:
+        """Names of the steps that are done."""
+        return tuple(step.name for step in self.steps if step.done)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the steps that are left out."""
+        return tuple(step.name for step in self.steps if not step.done)
+
+    def as_dicts(self) -> list[dict[str, Any]]:
+        """Return plain values for JSON."""
+        return [step.as_dict() for step in self.steps]
+
+
+@dataclass(slots=True)
+class PlanRecord:
+    """The steps of one frame, noted as they happen."""
+
+    steps: list[PlanStep] = field(default_factory=list)
+
+    @contextmanager
+    def done(self, name: str, size: int) -> Iterator[list[str]]:
+        """Time a step that touches `size` bytes; the caller appends its reason."""
+        reason: list[str] = []
+        begin = perf_counter()
+        yield reason
+        took = 1e3 * (perf_counter() - begin)
+        self.steps.append(PlanStep(name, True, "; ".join(reason), took, size))
+
+    def left_out(self, name: str, reason: str) -> None:
+        """Note a step that was not needed."""
+        self.steps.append(PlanStep(name, False, reason))

@@ -1,0 +1,44 @@
+"""A few threads that share the rows of a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any
+
+# More blocks than threads, so that an uneven picture keeps all of them busy.
+BLOCKS = 4
+
+
+class RowWorkers:
+    """Runs compiled functions over blocks of rows; the result does not depend on their number.
+
+    Parameters
+    ----------
+    count : int
+        Threads.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = max(count, 1)
+        self._pool = ThreadPoolExecutor(self.count - 1) if self.count > 1 else None
+
+    def run(self, rows: int, action: Callable[..., object], *arguments: Any) -> None:
+        """Call ``action(first, last, *arguments)`` so that all rows are done once."""
+        blocks = min(BLOCKS * self.count, rows)
+        if self._pool is None or blocks < 2:
+            action(0, rows, *arguments)
+            return
+        edges = [rows * k // blocks for k in range(blocks + 1)]
+        waiting = iter(list(pairwise(edges)))
+
+        def work() -> None:
+            # A list's iterator hands each block to one thread.
+            for first, last in waiting:
+                action(first, last, *arguments)
+
+        others = [self._pool.submit(work) for _ in range(self.count - 1)]
+        work()
+        for other in others:
+            other.result()
