@@ -51,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
         report,
         simulate,
         stability,
+        work_precision,
     )
 
     parser = _Parser(
@@ -76,6 +77,7 @@ def build_parser() -> argparse.ArgumentParser:
         report,
         benchmark,
         ablation,
+        work_precision,
         stability,
         design,
         board,
