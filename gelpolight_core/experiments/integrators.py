@@ -132,6 +132,10 @@ def _poisson(stencil: int, kind: type[np.floating]) -> Integrate:
 
 
 def _weighted(slope_x: Array, slope_y: Array, pitch_mm: float) -> NDArray[np.floating]:
-    single = [np.ascontiguousarray(s, np.float32) for s in (slope_x, slope_y)]
     weight = np.ones(slope_x.shape, np.float32)
-    return integrate_weighted(*single, weight, pitch_mm=pitch_mm).depth_mm
+    return integrate_weighted(
+        np.ascontiguousarray(slope_x, np.float32),
+        np.ascontiguousarray(slope_y, np.float32),
+        weight,
+        pitch_mm=pitch_mm,
+    ).depth_mm

@@ -23,8 +23,7 @@ from gelpolight_core.reconstruction.plain import plain_depth, plain_slopes
 from gelpolight_core.reconstruction.plan import EFFORTS
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
-from gelpolight_core.reflectance.press import BallPress
-from gelpolight_core.reflectance.stage import contact_mask
+from gelpolight_core.reflectance.press import BallPress, contact_mask
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]

@@ -239,14 +239,13 @@ def normal_error_deg(
         Only nodes within it count.
     """
     pitch = float(truth.x_mm[1] - truth.x_mm[0])
-    down, across = np.gradient(truth.depth_mm, pitch)
+    down, across = (np.asarray(g) for g in np.gradient(truth.depth_mm, pitch))
     x, y = np.meshgrid(grid.x_mm, grid.y_mm)
     column = ((x - truth.x_mm[0]) / pitch).astype(np.float32)
     row = ((y - truth.y_mm[0]) / pitch).astype(np.float32)
-    depth, true_x, true_y = (
-        cv2.remap(m, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-        for m in (truth.depth_mm, across, down)
-    )
+    true = np.stack([truth.depth_mm, across, down], axis=-1)
+    seen = cv2.remap(true, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    depth, true_x, true_y = (np.asarray(seen[..., k], np.float64) for k in range(3))
     counts = (depth > TOUCHED_MM) & (np.hypot(x, y) < radius_mm)
     found_x, found_y = (np.asarray(s, np.float64)[counts] for s in slopes)
     tx, ty = true_x[counts], true_y[counts]
@@ -275,22 +274,23 @@ def _point(run: _Run, sensor: str, megapixels: float, pitch_mm: float) -> Point:
     )
 
 
+def measured(point: Point) -> tuple[float, float]:
+    """Return time (ms) and depth error (um) of a point that is no gap."""
+    assert point.median_ms is not None and point.rms_um is not None
+    return point.median_ms, point.rms_um
+
+
 def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
     """Return the points that no other beats in both time and depth error, fastest first."""
     known = sorted(
         (p for p in points if p.median_ms is not None and p.rms_um is not None),
-        key=lambda p: (p.median_ms, p.rms_um),
+        key=measured,
     )
     front: list[Point] = []
     for point in known:
-        if not front or _rms(point) < _rms(front[-1]):
+        if not front or measured(point)[1] < measured(front[-1])[1]:
             front.append(point)
     return tuple(front)
-
-
-def _rms(point: Point) -> float:
-    assert point.rms_um is not None
-    return point.rms_um
 
 
 def observed_order(points: Sequence[Point]) -> float | None:
@@ -302,7 +302,7 @@ def observed_order(points: Sequence[Point]) -> float | None:
     if len({p.pitch_mm for p in known}) < 2:
         return None
     pitch = np.log([p.pitch_mm for p in known])
-    return float(np.polyfit(pitch, np.log([_rms(p) for p in known]), 1)[0])
+    return float(np.polyfit(pitch, np.log([p.rms_um or 0.0 for p in known]), 1)[0])
 
 
 def session_folder_name(scale: float) -> str:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gelpolight_core.experiments.integrators import IntegratorPoint
-from gelpolight_core.experiments.work_precision import Point, pareto_front
+from gelpolight_core.experiments.work_precision import Point, measured, pareto_front
 from gelpolight_core.report.document import Drawing
 from gelpolight_core.report.drawing import draw
 from gelpolight_core.translation import tr
@@ -34,17 +34,18 @@ def draw_depth_error(points: Sequence[Point]) -> Drawing:
         axes = figure.subplots()
         _curves(axes, points, "rms_um")
         front = pareto_front(points)
+        places = [measured(point) for point in front]
         axes.step(
-            [p.median_ms for p in front],
-            [p.rms_um for p in front],
+            [ms for ms, _ in places],
+            [um for _, um in places],
             where="post",
             color="black",
             lw=0.8,
             label=tr("front"),
         )
-        for point in front:
+        for point, place in zip(front, places, strict=True):
             axes.annotate(
-                point.label, (point.median_ms, point.rms_um), fontsize=5.5, xytext=(3, 3),
+                point.label, place, fontsize=5.5, xytext=(3, 3),
                 textcoords="offset points",
             )  # fmt: skip
         _label(axes, tr("depth, RMS (um)"))
