@@ -55,6 +55,8 @@ def build_parser() -> argparse.ArgumentParser:
         records,
         report,
         simulate,
+        stability,
+        work_precision,
     )
 
     parser = _Parser(
@@ -84,6 +86,8 @@ def build_parser() -> argparse.ArgumentParser:
         report,
         benchmark,
         ablation,
+        work_precision,
+        stability,
         design,
         board,
     ):

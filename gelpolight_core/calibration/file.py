@@ -41,6 +41,7 @@ from gelpolight_core.session.wholeness import MAX_PIXELS
 
 NODES_LIMIT = 10_000
 LEAST_BACKGROUND = -0.2
+MOST_CROSSTALK = 100.0
 # A fixed time stamp: the same calibration gives the same bytes.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
@@ -273,6 +274,8 @@ def _check(calibration: Calibration) -> None:
     for name, (shape, array) in expected.items():
         if array.shape != shape or not np.isfinite(array).all():
             raise ValueError(f"{name} is not possible")
+    if not np.linalg.cond(c.crosstalk) < MOST_CROSSTALK:
+        raise ValueError("the crosstalk cannot be removed")
     rows_columns = c.table.grid.shape
     for name, map_ in maps.items():
         if map_.shape != (*rows_columns, 3) or map_.dtype != np.float32:

@@ -22,6 +22,8 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 FLOAT32_MAX_PIXELS = 32_766
 GRID_PER_PICTURE = 8.0
+# Just before a lens model turns back, a hundredth of a pixel moves a ray by degrees.
+BEFORE_FOLD = 0.9
 # Less than this holds no indentation with undeformed membrane about it.
 LEAST_NODES = 32
 
@@ -123,9 +125,11 @@ def build_resampling_table(
     points = grid.points_mm()
     directions = membrane_to_camera(points, plane, stack)
     pixels = camera.project(directions)
+    steepest = BEFORE_FOLD * camera.fold
     inside = (
         (directions[..., 2] > 0.0)
         & (pixels >= 0.0).all(axis=-1)
+        & (np.hypot(directions[..., 0], directions[..., 1]) < steepest * directions[..., 2])
         & (pixels[..., 0] <= camera.width - 1)
         & (pixels[..., 1] <= camera.height - 1)
     )
@@ -158,8 +162,9 @@ def _visible_grid(
         + [np.stack(np.broadcast_arrays(edge, v), -1) for edge in (0.0, camera.width - 1.0)]
     )
     seen, _ = camera_to_membrane(camera.directions(border), plane, stack)
-    low = np.maximum(np.nanmin(seen, axis=0), -diameter_mm / 2)
-    high = np.minimum(np.nanmax(seen, axis=0), diameter_mm / 2)
+    ahead = seen[np.isfinite(seen).all(axis=-1)]
+    low = np.maximum(ahead.min(axis=0, initial=np.inf), -diameter_mm / 2)
+    high = np.minimum(ahead.max(axis=0, initial=-np.inf), diameter_mm / 2)
     if not (high - low > 2 * pitch_mm).all():
         raise InputError(
             tr("the camera sees nothing of the working circle"),

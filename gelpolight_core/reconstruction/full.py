@@ -17,6 +17,7 @@ from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.reconstruction.denoise import noise_left, quiet_even_parts
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
+from gelpolight_core.reconstruction.near_light_kernel import UNSOLVED_WEIGHT
 from gelpolight_core.reconstruction.picture_noise import picture_noise
 from gelpolight_core.reconstruction.placement import place_on_grid, resample
 from gelpolight_core.reconstruction.poisson import integrate_slopes
@@ -72,6 +73,8 @@ class FullDepth:
         was taken back; ``unsettled`` when damped rounds came to no end.
     noise : DepthNoise or None
         How far it may be off, where that was asked for.
+    unsolved : float
+        Share of the usable nodes that light does not decide: less than two lights, or turned away.
     """
 
     depth_mm: Map
@@ -81,6 +84,7 @@ class FullDepth:
     rim: str
     stopped: str
     noise: DepthNoise | None = None
+    unsolved: float = 0.0
 
 
 def reconstruct_full(
@@ -116,10 +120,19 @@ def reconstruct_full(
     drift = field.drift if terms.true_positions else np.zeros_like(field.drift)
     placed = place_on_grid(moved, drift, field.x_mm, field.y_mm)
     result = _placed(slopes, moved, placed, (*changes, last), (rim, stopped))
+    result = replace(result, unsolved=_unsolved_share(slopes, field))
     if not uncertainty:
         return result
     noise = _noise(rgb, calibration, full, field, depth, slopes, placed, workers)
     return replace(result, noise=noise)
+
+
+def _unsolved_share(slopes: RaySlopes, field: ShadedField) -> float:
+    """Return the share of nodes that light does not decide, from every second one."""
+    thin = np.s_[::2, ::2]
+    usable = field.usable[thin]
+    unsolved = usable & (slopes.weight[thin] <= UNSOLVED_WEIGHT)
+    return float(np.count_nonzero(unsolved)) / max(int(np.count_nonzero(usable)), 1)
 
 
 def coarse_depth(

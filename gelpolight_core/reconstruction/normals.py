@@ -185,6 +185,8 @@ def _solve(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                     flag |= _INVALID
                 if place >= last:
                     cosine[k] = lookup[k, last]
+                    if place > last:
+                        flag |= _EXTRAPOLATED
                 else:
                     n = int(place)
                     cosine[k] = lookup[k, n] + (place - np.float32(n)) * (

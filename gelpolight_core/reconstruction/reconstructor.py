@@ -11,6 +11,15 @@ from numpy.typing import DTypeLike, NDArray
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.acceptance import (
+    RimCheck,
+    accepted,
+    refuse_coplanar_lights,
+    refuse_dark_membrane,
+    rim_check,
+    rim_let_go,
+    unsolved_note,
+)
 from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.live import LiveSolver
@@ -26,6 +35,7 @@ from gelpolight_core.reconstruction.poisson import PoissonSolver
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
 from gelpolight_core.translation import tr
 
+Notes = tuple[str, ...]
 LOOKUP_SIZE = 2048
 
 
@@ -50,7 +60,8 @@ class Reconstructor:
     Raises
     ------
     InputError
-        If the calibration was not made for the model.
+        If the calibration was not made for the model, its lights lie nearly in one plane,
+        or there is light on next to nothing of the membrane.
     ValueError
         If there is no such effort.
 
@@ -78,6 +89,10 @@ class Reconstructor:
                 where=calibration.identity,
                 advice=tr("Calibrate again with --model full, or use --model paper"),
             )
+        used = calibration.full if self.model == "full" else None
+        leds_mm = calibration.led_positions_mm if used is None else used.led_positions_mm
+        refuse_coplanar_lights(calibration, leds_mm)
+        refuse_dark_membrane(calibration)
         self.terms = terms
         self.effort = effort
         self.workers = workers
@@ -92,6 +107,11 @@ class Reconstructor:
         """The paper's integration on the calibration's grid."""
         grid = self.calibration.table.grid
         return PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=self.workers)
+
+    @cached_property
+    def rim(self) -> RimCheck:
+        """What the rim shows while nothing crosses it."""
+        return rim_check(self.calibration)
 
     @cached_property
     def live(self) -> LiveSolver:
@@ -130,9 +150,12 @@ class Reconstructor:
         Raises
         ------
         InputError
-            If the frame is not of the calibration's size, or not in colour.
+            If the frame is not of the calibration's size, not in colour, or holds other numbers
+            than :meth:`depth` takes.
         """
-        self._check(frame, name)
+        return self._slopes(self._accepted(frame, name))
+
+    def _slopes(self, frame: NDArray[Any]) -> SlopeField:
         return solve_slopes(self.linearise(frame), self.maps, workers=self.workers)
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
@@ -165,19 +188,21 @@ class Reconstructor:
         Raises
         ------
         InputError
-            If the frame is not of the calibration's size.
+            If the frame is not of the calibration's size, or holds other numbers than these.
         """
-        self._check(frame, name)
+        frame = self._accepted(frame, name)
+        notes = self._rim_notes(frame)
         if self.model == "full":
             why = self._why_unplanned(uncertainty)
             if why is None:
-                return self._depth_live(frame, name, normals)
-            return self._depth_full(frame, name, normals, uncertainty, why)
-        field = self.slopes(frame, name=name)
+                return self._depth_live(frame, name, normals, notes)
+            return self._depth_full(frame, name, normals, uncertainty, why, notes)
+        field = self._slopes(frame)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
-        heightmap = self._heightmap(np.asarray(depth_mm, np.float32), shown, field.flags, name)
+        depth_mm = np.asarray(depth_mm, np.float32)
+        heightmap = self._heightmap(depth_mm, shown, field.flags, name, notes)
         names = [tr("resampling and normals"), tr("integration")]
         plan = _unplanned(self.effort, names, tr("the paper's model knows one way"), normals, False)
         return replace(heightmap, plan=plan)
@@ -194,11 +219,11 @@ class Reconstructor:
             return tr("the membrane's curve is too bent for the fast solve")
         return None
 
-    def _depth_live(self, frame: NDArray[Any], name: str, normals: bool) -> HeightMap:
+    def _depth_live(self, frame: NDArray[Any], name: str, normals: bool, notes: Notes) -> HeightMap:
         full = self.calibration.full
         assert full is not None
         found = self.live.depth(frame, effort=self.effort, normals=normals)
-        notes = _notes(found.rim, found.stopped)
+        notes += _notes(found.rim, found.stopped)
         heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
         scale = full.scale_sd
         return replace(
@@ -209,7 +234,13 @@ class Reconstructor:
         )
 
     def _depth_full(
-        self, frame: NDArray[Any], name: str, normals: bool, uncertainty: bool, why: str
+        self,
+        frame: NDArray[Any],
+        name: str,
+        normals: bool,
+        uncertainty: bool,
+        why: str,
+        notes: Notes,
     ) -> HeightMap:
         full = self.calibration.full
         assert full is not None
@@ -221,7 +252,7 @@ class Reconstructor:
             workers=self.workers,
             uncertainty=uncertainty,
         )
-        notes = _notes(result.rim, result.stopped)
+        notes += _notes(result.rim, result.stopped, result.unsolved)
         shown = result.normals if normals else None
         heightmap = self._heightmap(result.depth_mm, shown, result.flags, name, notes)
         scale, noise = full.scale_sd, result.noise
@@ -243,7 +274,7 @@ class Reconstructor:
         normals: NDArray[np.float32] | None,
         flags: NDArray[np.uint8],
         name: str,
-        notes: tuple[str, ...] = (),
+        notes: Notes,
     ) -> HeightMap:
         grid = self.calibration.table.grid
         return HeightMap(
@@ -259,7 +290,13 @@ class Reconstructor:
             notes=notes,
         )
 
-    def _check(self, frame: NDArray[Any], name: str) -> None:
+    def _rim_notes(self, frame: NDArray[Any]) -> Notes:
+        rim = self.rim
+        note = rim.note(as_linear(self.linearise(frame[rim.row, rim.column][None]))[0])
+        return (note,) if note else ()
+
+    def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
+        """Return a frame of the right size as numbers that every step takes."""
         camera = self.calibration.camera
         if frame.shape != (camera.height, camera.width, 3):
             shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
@@ -270,19 +307,21 @@ class Reconstructor:
                 where=name or tr("picture"),
                 advice=tr("Use the calibration of this sensor at this picture size"),
             )
+        return accepted(frame, name=name)
 
 
-def _notes(rim: str, stopped: str) -> tuple[str, ...]:
+def _notes(rim: str, stopped: str, unsolved: float = 0.0) -> Notes:
     """Return what is to be said of a reconstruction, in sentences for a person."""
     notes = []
     if rim == "free":
-        notes.append(tr("a contact crosses the rim: the rim was let go there"))
+        notes.append(rim_let_go())
     if stopped == "damped":
         notes.append(tr("the press is deep for its lights: the near-light rounds were damped"))
     if stopped == "unsettled":
         notes.append(tr("the near-light rounds did not settle: damping did not help"))
     if stopped == "grows":
         notes.append(tr("the near-light rounds did not settle: the last was taken back"))
+    notes += [note for note in (unsolved_note(unsolved),) if note]
     return tuple(notes)
 
 

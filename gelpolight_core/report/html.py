@@ -56,17 +56,9 @@ a { color: #1f4fbf; text-decoration: none; }
 
 def report_html(report: Report) -> str:
     """Return the report as one self-contained HTML document; every text in it is escaped."""
-    title = escape(report.title)
-    return "\n".join(
+    return _document(
+        report.title,
         [
-            "<!DOCTYPE html>",
-            '<html lang="en">',
-            '<head><meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{title}</title>",
-            f"<style>{_STYLE}</style></head>",
-            "<body>",
-            f"<h1>{title}</h1>",
             f"<p>{_badge(report.verdict)}</p>",
             _validation(report),
             _facts(report.facts),
@@ -74,6 +66,28 @@ def report_html(report: Report) -> str:
             *(_section(section) for section in report.sections),
             f'<h2 id="sources">{escape(report.sources.title)}</h2>',
             _listing(report.sources, headed=False),
+        ],
+    )
+
+
+def page_html(title: str, intro: str, sections: Iterable[Section]) -> str:
+    """Return sections under a heading as one self-contained HTML document."""
+    lead = f'<p class="intro">{escape(intro)}.</p>' if intro else ""
+    return _document(title, [lead, *(_section(section) for section in sections)])
+
+
+def _document(title: str, parts: Iterable[str]) -> str:
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en">',
+            '<head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f"<title>{escape(title)}</title>",
+            f"<style>{_STYLE}</style></head>",
+            "<body>",
+            f"<h1>{escape(title)}</h1>",
+            *parts,
             "</body></html>\n",
         ]
     )
@@ -123,7 +137,7 @@ def _section(section: Section) -> str:
     return "\n".join(
         [
             f'<h2 id="{escape(section.key)}"><span>{escape(section.title)}</span>'
-            f"{_badge(section.quality.verdict)}</h2>",
+            f"{_badge(section.quality.verdict) if section.quality.figures else ''}</h2>",
             intro,
             _quality(section.quality),
             _facts(section.facts),

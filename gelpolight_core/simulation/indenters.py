@@ -238,6 +238,8 @@ def _cells(middle: float, half: float, pitch: float) -> Array:
 def _round_drape(
     indenter: Ball | Cylinder, radius: Array, decay_mm: float
 ) -> tuple[Array, NDArray[np.bool_]]:
+    if indenter.depth_mm <= 0.0:
+        return np.zeros_like(radius), np.zeros(radius.shape, dtype=np.bool_)
     contact_mm = contact_radius(indenter.profile, indenter.reach_mm, decay_mm)
     contact = radius <= contact_mm
     edge_depth, _ = indenter.profile(contact_mm)

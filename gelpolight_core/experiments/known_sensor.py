@@ -1,0 +1,216 @@
+"""A virtual sensor with the calibration that it would have if every stage were exact.
+
+Nothing is calibrated from pictures: lens, pose, LEDs, crosstalk and light are the design's own, so
+that what a reconstruction gets wrong is the reconstruction's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core import __version__
+from gelpolight_core.calibration.calibration import Calibration, FullModel, Provenance, sensor_stack
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.measurement.score import TrueDepth
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
+from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.table import cosine_table
+from gelpolight_core.session.session import SensorData
+from gelpolight_core.simulation.exposure import exposed
+from gelpolight_core.simulation.indenters import Indenter, press
+from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.virtual_sensor import BareMembrane, PressedMembrane, VirtualSensor
+
+Map = NDArray[np.float32]
+# Of an exact calibration: far below what any camera's noise leaves.
+MISFIT = 0.002
+LEAST_COSINE = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class KnownPress:
+    """A press with its picture and its truth.
+
+    Attributes
+    ----------
+    frame : (height, width, 3) float32
+        Linear light without noise.
+    truth : TrueDepth
+        What was pressed.
+    """
+
+    frame: Map
+    truth: TrueDepth
+
+
+@dataclass(frozen=True, slots=True)
+class KnownSensor:
+    """A virtual sensor and its exact calibration."""
+
+    sensor: VirtualSensor
+    calibration: Calibration
+
+    def pressed(
+        self, indenter: Indenter, *, x_mm: float = 0.0, y_mm: float = 0.0, samples: int = 3
+    ) -> KnownPress:
+        """Return the picture of something pressed into the sensor, and the true depth."""
+        decay_mm = self.sensor.design.membrane.decay_length_mm
+        return self.showing(press(indenter, x_mm=x_mm, y_mm=y_mm, decay_mm=decay_mm), samples)
+
+    def showing(self, surface: PressedSurface, samples: int = 3) -> KnownPress:
+        """Return the picture of a membrane of any shape, and the true depth."""
+        frame = self.sensor.brightness(PressedMembrane(surface), samples=samples)
+        truth = TrueDepth(surface.depth_mm, surface.x_mm, surface.y_mm)
+        return KnownPress(frame.astype(np.float32), truth)
+
+    def noisy(self, frame: Map, *, seed: int = 0) -> NDArray[np.unsignedinteger[Any]]:
+        """Return what the camera makes of a linear picture: noise, and its own whole numbers."""
+        camera = self.sensor.design.camera
+        return exposed(frame.astype(np.float64), camera, np.random.default_rng(seed), averaged=1)
+
+    def bare(self) -> Map:
+        """Return the picture of the membrane that nothing touches."""
+        return self.sensor.brightness(BareMembrane()).astype(np.float32)
+
+
+def matt_design(scale: float = 0.25) -> SensorDesign:
+    """Return the default sensor with an even, Lambertian membrane and no crosstalk.
+
+    Its shading is the formula's own, so that errors are those of the numbers, not of the model.
+    """
+    plain = SensorDesign()
+    still = replace(plain.membrane, specular_weight=0.0, variation=0.0, speck_count=0)
+    photometry = replace(plain.photometry, crosstalk=((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)))
+    return replace(plain, membrane=still, photometry=photometry).scaled(scale)
+
+
+def known_sensor(design: SensorDesign, *, seed: int = 0) -> KnownSensor:
+    """Return the virtual sensor of a design with its exact calibration.
+
+    Raises
+    ------
+    InputError
+        If the design does not hold together, or no calibration can be made for it.
+    """
+    sensor = VirtualSensor(design, seed)
+    return KnownSensor(sensor, exact_calibration(sensor))
+
+
+def exact_calibration(
+    sensor: VirtualSensor,
+    *,
+    camera: Camera | None = None,
+    plane: TopPlane | None = None,
+    stated: SensorData | None = None,
+    leds_mm: NDArray[np.float64] | None = None,
+    crosstalk: NDArray[np.float64] | None = None,
+) -> Calibration:
+    """Return the calibration that a sensor would have if every stage were exact.
+
+    The reflectance table is that of an ideal diffuse membrane; on a glossy one the full model alone
+    is exact.
+
+    Parameters
+    ----------
+    sensor : VirtualSensor
+        To be calibrated.
+    camera, plane, stated, leds_mm, crosstalk : optional
+        In place of the exact ones; background and light are then what the sensor's pictures show
+        by them.
+    """
+    design = sensor.design
+    camera = camera or _camera(design)
+    plane = plane or _plane(design)
+    stated = stated or _stated(design)
+    leds = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in design.leds])
+    leds = leds if leds_mm is None else leds_mm
+    mixing = np.array(design.photometry.crosstalk) if crosstalk is None else crosstalk
+    table = build_resampling_table(
+        camera, plane, sensor_stack(stated, plane), working_diameter_mm=stated.working_diameter_mm
+    )
+    raw = _raw_light(sensor, table)
+    background = np.maximum(unmix(raw, mixing), 0.0).astype(np.float32)
+    shot, read = design.camera.shot_variance, design.camera.read_sd
+    middle = np.median(background[table.valid], axis=0) if table.valid.any() else np.zeros(3)
+    return Calibration(
+        sensor=stated,
+        model="full",
+        camera=camera,
+        plane=plane,
+        led_positions_mm=leds,
+        led_covariance_mm2=np.tile(1e-4 * np.eye(3), (3, 1, 1)),
+        crosstalk=mixing,
+        radiance=(raw / _flat_cosines(leds, table)).astype(np.float32),
+        factors=np.where(raw > 0.0, 1.0, 0.0).astype(np.float32),
+        reflectance=cosine_table(),
+        noise=np.sqrt(shot * middle + read**2),
+        quality={},
+        provenance=Provenance("", "", __version__, design.serial, {}),
+        full=FullModel(
+            led_positions_mm=leds,
+            led_sd_mm=np.full((3, 3), 0.01),
+            membrane=exact_membrane(design),
+            background=background,
+            decay_mm=design.membrane.decay_length_mm,
+            misfit=MISFIT,
+            held_out=(0.0, 0.0),
+            kept="mirror",
+        ),
+    )
+
+
+def exact_membrane(design: SensorDesign) -> Membrane:
+    """Return the shares of a design's membrane as the full model writes them."""
+    made = design.membrane
+    diffuse = (1.0 - made.specular_weight) * made.diffuse_reflectance
+    glossy = made.specular_weight * made.specular_reflectance
+    return Membrane(gloss=glossy / max(diffuse + glossy, 1e-12), roughness=made.roughness)
+
+
+def _raw_light(sensor: VirtualSensor, table: ResamplingTable) -> Map:
+    """Return the raw light of the untouched membrane (rows, columns, 3) on a grid; 0 outside it."""
+    raw = sensor.brightness(BareMembrane()).astype(np.float32)
+    light = table.apply(raw)
+    light[~table.valid] = 0.0
+    return light
+
+
+def _plane(design: SensorDesign) -> TopPlane:
+    x, y, z = design.layers.normal_camera.tolist()
+    return TopPlane((x, y, z), design.layers.top_distance_mm)
+
+
+def _flat_cosines(leds_mm: NDArray[np.float64], table: ResamplingTable) -> NDArray[np.float64]:
+    points = table.grid.points_mm()
+    at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
+    light, _ = light_directions(leds_mm, at_top)
+    return np.maximum(-light[..., 2], LEAST_COSINE)
+
+
+def _camera(design: SensorDesign) -> Camera:
+    made = design.camera
+    k1, k2, p1, p2 = made.distortion
+    return Camera(
+        made.width_px, made.height_px, made.fx, made.fy, made.cx, made.cy, (k1, k2, p1, p2, 0.0)
+    )
+
+
+def _stated(design: SensorDesign) -> SensorData:
+    layers = design.layers
+    return SensorData(
+        design.serial,
+        design.ring.nominal_height_mm,
+        layers.elastomer_thickness_mm,
+        layers.elastomer_refractive_index,
+        layers.window_thickness_mm,
+        layers.window_refractive_index,
+        design.membrane.working_diameter_mm,
+    )

@@ -1,0 +1,39 @@
+"""A page of an experiment: sections with figures and tables, set as the calibration report's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.report.document import Section
+from gelpolight_core.report.html import page_html
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """What an experiment found, for people.
+
+    Attributes
+    ----------
+    title, intro : str
+        Heading, and a sentence or two below it, without the last full stop.
+    sections : tuple of Section
+        In their order.
+    """
+
+    title: str
+    intro: str
+    sections: tuple[Section, ...]
+
+
+def write_page(page: Page, path: Path) -> None:
+    """Write a page as one HTML file that needs nothing else, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    text = page_html(page.title, page.intro, page.sections)
+    write_atomically(path, lambda out: out.write(text.encode()))

@@ -1,0 +1,212 @@
+"""Extreme and stiff cases, each of which must come out right or be refused with its reason.
+
+A case is a function that does one hard thing and says what it saw. What it raises as
+:class:`InputError` is a refusal, and so is a wrong result that says of itself that it is not to be
+trusted; anything else that it raises is a failure of the program, which the report must show and
+therefore outlives.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import tracemalloc
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+Progress = Callable[[str, float], None]
+
+
+class Outcome(StrEnum):
+    """How a case ended."""
+
+    PASSED = "passed"
+    REFUSED = "refused"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a case saw.
+
+    Attributes
+    ----------
+    right : bool
+        Whether all that the case requires holds.
+    said : str
+        One sentence of what happened, without its full stop.
+    finite : bool
+        Whether every number of the result is finite.
+    error_um, bound_um : float or None
+        Root mean square of the depth's error, and the most that counts as right; None where there
+        is no truth.
+    flags : tuple of (name, percent)
+        Share of the nodes with each flag, where there is any.
+    condition : float or None
+        Largest condition number of the light directions.
+    rounds : int or None
+        Near-light rounds, or those of the solver.
+    doubt : str
+        What the result says of itself where it is not to be trusted; empty where it trusts itself.
+    """
+
+    right: bool
+    said: str
+    finite: bool = True
+    error_um: float | None = None
+    bound_um: float | None = None
+    flags: tuple[tuple[str, float], ...] = ()
+    condition: float | None = None
+    rounds: int | None = None
+    doubt: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One hard thing.
+
+    Attributes
+    ----------
+    name, subject : str
+        On the command line, and the group that it belongs to.
+    label : str
+        What is done, for a person.
+    required : str
+        What must come of it.
+    run : callable
+        Does it.
+    quick : bool
+        Whether it takes less than about a second.
+    memory : bool
+        Whether the memory that it needs is of interest.
+    """
+
+    name: str
+    subject: str
+    label: str
+    required: str
+    run: Callable[[], Seen]
+    quick: bool = True
+    memory: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CaseResult:
+    """A case with what came of it.
+
+    Attributes
+    ----------
+    case : Case
+        What was done.
+    outcome : Outcome
+        How it ended.
+    said : str
+        One sentence for a person, without its full stop.
+    seen : Seen or None
+        None where the case was refused or broke off.
+    seconds : float
+        Of the whole case, its rendering included.
+    memory_mb : float or None
+        Most that its arrays took at once; None where it was not looked at.
+    """
+
+    case: Case
+    outcome: Outcome
+    said: str
+    seen: Seen | None
+    seconds: float
+    memory_mb: float | None = None
+
+
+def run_case(case: Case) -> CaseResult:
+    """Run one case; whatever it raises becomes its result, except Ctrl-C."""
+    begin = time.perf_counter()
+    if case.memory:
+        tracemalloc.start()
+    try:
+        outcome, said, seen = _outcome(case)
+        seconds = time.perf_counter() - begin
+        memory = tracemalloc.get_traced_memory()[1] / 1e6 if case.memory else None
+    finally:
+        if case.memory:
+            tracemalloc.stop()
+    return CaseResult(case, outcome, said, seen, seconds, memory)
+
+
+def _outcome(case: Case) -> tuple[Outcome, str, Seen | None]:
+    try:
+        seen = case.run()
+    except InputError as error:
+        return Outcome.REFUSED, str(error).rstrip("."), None
+    except Exception as error:  # a fault of the program is what the report is there to show
+        return Outcome.FAILED, f"{type(error).__name__}: {error}", None
+    if not seen.finite:
+        return Outcome.FAILED, tr("the result is not finite; {said}").format(said=seen.said), seen
+    if seen.right and _within_bound(seen):
+        return Outcome.PASSED, seen.said, seen
+    if seen.doubt:
+        return Outcome.REFUSED, f"{seen.said}; {seen.doubt}", seen
+    return Outcome.FAILED, seen.said, seen
+
+
+def _within_bound(seen: Seen) -> bool:
+    if seen.error_um is None:
+        return True
+    # An error that is not a number is within no bound.
+    return seen.error_um <= (math.inf if seen.bound_um is None else seen.bound_um)
+
+
+def run_cases(
+    cases: Sequence[Case],
+    *,
+    progress: Progress | None = None,
+    done: Callable[[CaseResult], None] | None = None,
+) -> tuple[CaseResult, ...]:
+    """Run cases one after the other.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        From :func:`~gelpolight_core.experiments.stability_cases.all_cases`.
+    progress : callable, optional
+        Told what is being done and the share done, 0..1.
+    done : callable, optional
+        Given every result as it comes.
+    """
+    results = []
+    for number, case in enumerate(cases):
+        if progress is not None:
+            progress(case.name, number / len(cases))
+        result = run_case(case)
+        results.append(result)
+        if done is not None:
+            done(result)
+    if progress is not None:
+        progress("", 1.0)
+    return tuple(results)
+
+
+def chosen_cases(cases: Sequence[Case], names: str | None) -> tuple[Case, ...]:
+    """Return the cases of that name or subject, separated by commas; all where none is named.
+
+    Raises
+    ------
+    InputError
+        If there is no such case.
+    """
+    if names is None:
+        return tuple(cases)
+    asked = [name.strip() for name in names.split(",")]
+    known = {case.name for case in cases} | {case.subject for case in cases}
+    for name in asked:
+        if name not in known:
+            raise InputError(
+                tr("there is no case {name!r}").format(name=name),
+                where="--only",
+                advice=tr("Use some of {names}").format(names=", ".join(sorted(known))),
+            )
+    return tuple(case for case in cases if case.name in asked or case.subject in asked)

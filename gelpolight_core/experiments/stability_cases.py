@@ -1,0 +1,21 @@
+"""All stability cases, in the order in which a person reads them."""
+
+from __future__ import annotations
+
+from gelpolight_core.experiments.reproducibility import number_cases
+from gelpolight_core.experiments.stability import Case
+from gelpolight_core.experiments.stability_calibrations import calibration_cases
+from gelpolight_core.experiments.stability_grids import grid_cases
+from gelpolight_core.experiments.stability_pictures import picture_cases
+from gelpolight_core.experiments.stability_sensors import sensor_cases
+
+
+def all_cases() -> tuple[Case, ...]:
+    """Return the cases of all subjects."""
+    return (
+        *picture_cases(),
+        *sensor_cases(),
+        *calibration_cases(),
+        *grid_cases(),
+        *number_cases(),
+    )

@@ -1,0 +1,178 @@
+"""What the cases on whole pictures share: a sensor made once, both models, and what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import MODELS, Calibration
+from gelpolight_core.experiments.known_sensor import (
+    KnownPress,
+    KnownSensor,
+    known_sensor,
+    matt_design,
+)
+from gelpolight_core.experiments.stability import Seen
+from gelpolight_core.lights.positions import direction_condition
+from gelpolight_core.measurement.score import TrueDepth
+from gelpolight_core.reconstruction.acceptance import accepted, rim_let_go
+from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
+from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, Flag, HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.simulation.indenters import Ball
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+RIM_MM = 1.0
+SCALE = 0.25
+BALL = Ball(4.0, 1.0)
+BALL_AT_MM = (1.2, -0.8)
+
+
+@lru_cache(maxsize=1)
+def standard_sensor() -> KnownSensor:
+    """Return the sensor of all cases on pictures, at a quarter of the default's size."""
+    return known_sensor(matt_design(SCALE))
+
+
+@lru_cache(maxsize=1)
+def standard_press() -> KnownPress:
+    """Return a ball of 4 mm radius, 1 mm deep, in the standard sensor."""
+    x_mm, y_mm = BALL_AT_MM
+    return standard_sensor().pressed(BALL, x_mm=x_mm, y_mm=y_mm)
+
+
+def maps_of(known: KnownSensor, frame: NDArray[Any]) -> dict[str, HeightMap]:
+    """Return what both models make of a frame."""
+    return {m: Reconstructor(known.calibration, model=m).depth(frame) for m in MODELS}
+
+
+def is_finite(found: HeightMap) -> bool:
+    """Return whether depth and normals are all finite."""
+    normals = found.normals
+    return bool(
+        np.isfinite(found.depth_mm).all() and (normals is None or np.isfinite(normals).all())
+    )
+
+
+def flag_shares(found: HeightMap) -> tuple[tuple[str, float], ...]:
+    """Return the percentage of the seen nodes with each flag, without those that nothing has."""
+    seen = (found.flags & int(Flag.OUTSIDE)) == 0
+    count = max(int(seen.sum()), 1)
+    shares = [
+        (name, 100.0 * float(np.count_nonzero(seen & ((found.flags & bit) != 0))) / count)
+        for name, bit in FLAG_NAMES.items()
+        if bit != int(Flag.OUTSIDE)
+    ]
+    return tuple((name, share) for name, share in shares if share > 0.0)
+
+
+def flagged(found: HeightMap, flag: Flag) -> NDArray[np.bool_]:
+    """Return the nodes with a flag."""
+    return np.asarray((found.flags & int(flag)) != 0)
+
+
+def depth_error(
+    found: HeightMap, truth: TrueDepth, *, radius_mm: float, spare: NDArray[np.bool_] | None = None
+) -> NDArray[np.float64]:
+    """Return found minus true depth, mm, at the map's nodes inside a radius that are not spared."""
+    step = truth.x_mm[1] - truth.x_mm[0]
+    column = np.asarray((found.x_mm - truth.x_mm[0]) / step, np.float32)
+    row = np.asarray((found.y_mm - truth.y_mm[0]) / step, np.float32)
+    true = cv2.remap(
+        truth.depth_mm, *np.meshgrid(column, row), cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
+    )
+    x, y = np.meshgrid(found.x_mm, found.y_mm)
+    counts = np.hypot(x, y) < radius_mm
+    counts &= ~flagged(found, Flag.OUTSIDE)
+    if spare is not None:
+        counts &= ~spare
+    return np.asarray(found.depth_mm[counts] - true[counts], np.float64)
+
+
+def rms_um(error_mm: NDArray[np.float64]) -> float:
+    """Return the root mean square in um."""
+    return float(1e3 * np.sqrt(np.mean(error_mm**2))) if error_mm.size else float("nan")
+
+
+def condition_of(calibration: Calibration) -> float:
+    """Return the largest condition number of the light directions on the seen membrane."""
+    table = calibration.table
+    points = table.grid.points_mm()[table.valid][::97]
+    leds = calibration.led_positions_mm if calibration.full is None else None
+    if calibration.full is not None:
+        leds = calibration.full.led_positions_mm
+    assert leds is not None
+    return direction_condition(leds, points)
+
+
+def rounds_of(calibration: Calibration, frame: NDArray[Any]) -> int:
+    """Return how many near-light rounds the full model took, the last one at full scale."""
+    full = calibration.full
+    assert full is not None
+    return len(reconstruct_full(as_linear(accepted(frame, name="")), calibration, full).changes_mm)
+
+
+def judged(
+    known: KnownSensor,
+    press: KnownPress,
+    bound_um: float,
+    *,
+    frame: NDArray[Any] | None = None,
+    spare: NDArray[np.bool_] | None = None,
+    needs: Sequence[Flag] = (),
+    models: Sequence[str] = MODELS,
+    radius_mm: float | None = None,
+) -> Seen:
+    """Reconstruct by the models and compare with the truth.
+
+    Parameters
+    ----------
+    known, press
+        The sensor, and what is pressed into it.
+    bound_um : float
+        Largest error of the full model that is right (root mean square).
+    frame : array, optional
+        In place of the press's own picture.
+    spare : (rows, columns) bool, optional
+        Nodes that are not compared, because nothing can be known there.
+    needs : sequence of Flag, optional
+        Flags that must be raised somewhere by every model.
+    models : sequence of str, optional
+        ``paper`` has to be finite and flagged, but not right: its lights are frozen.
+    radius_mm : float, optional
+        Of the compared area; by default the working circle less its rim.
+    """
+    picture = press.frame if frame is None else frame
+    calibration = known.calibration
+    radius = radius_mm or 0.5 * calibration.sensor.working_diameter_mm - RIM_MM
+    found = {m: Reconstructor(calibration, model=m).depth(picture) for m in models}
+    best = found["full"] if "full" in found else found[models[0]]
+    error = rms_um(depth_error(best, press.truth, radius_mm=radius, spare=spare))
+    missing = [str(f.name) for f in needs for h in found.values() if not flagged(h, f).any()]
+    said = tr("{e:.1f} um RMS on a press of {h:.2f} mm").format(
+        e=error, h=float(press.truth.depth_mm.max())
+    )
+    if missing:
+        said += "; " + tr("not flagged: {flags}").format(flags=", ".join(missing))
+    return Seen(
+        right=not missing,
+        said=said,
+        finite=all(is_finite(h) for h in found.values()),
+        error_um=error,
+        bound_um=bound_um,
+        flags=flag_shares(best),
+        condition=condition_of(calibration),
+        rounds=rounds_of(calibration, picture) if "full" in found else None,
+        doubt="; ".join(doubts_of(best)),
+    )
+
+
+def doubts_of(found: HeightMap) -> tuple[str, ...]:
+    """Return the notes of a map that say its depth is not to be trusted."""
+    return tuple(note for note in found.notes if note != rim_let_go())

@@ -1,0 +1,131 @@
+"""The stability report as its reader meets it: every quick case is right or refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.command_line.main import MENDABLE, main
+from gelpolight_core.errors import InputError
+from gelpolight_core.experiments.sensitivity import parameters, sensitivities
+from gelpolight_core.experiments.stability import Case, Outcome, Seen, run_case, run_cases
+from gelpolight_core.experiments.stability_cases import all_cases
+from gelpolight_core.experiments.stability_report import result_rows
+from gelpolight_core.experiments.stability_trial import standard_sensor
+
+CASES = all_cases()
+# One of each kind of hard thing; the command runs all of them.
+QUICK = (
+    "pixels_huge",
+    "patch_two_dark",
+    "leds_0.5_mm_apart",
+    "leds_0.5_mm_below",
+    "index_2.5",
+    "distortion_-0.6",
+    "factor_zero",
+    "table_not_monotone",
+    "crosstalk_singular",
+    "plane_backwards",
+    "brighter_than_the_table",
+    "threads_full",
+)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [c for c in CASES if c.name in QUICK or (c.subject == "grids" and c.quick)],
+    ids=lambda case: case.name,
+)
+def test_an_extreme_case_is_right_or_refused(case: Case) -> None:
+    result = run_case(case)
+    assert result.outcome is not Outcome.FAILED, result.said
+    assert result.said
+
+
+def test_names_are_one_each() -> None:
+    assert len({case.name for case in CASES}) == len(CASES)
+    assert set(QUICK) <= {case.name for case in CASES}
+
+
+def _case(run) -> Case:  # type: ignore[no-untyped-def]
+    return Case("x", "subject", "what", "required", run)
+
+
+def test_a_crash_is_a_row_that_failed_and_the_next_case_runs() -> None:
+    def crash() -> Seen:
+        raise ZeroDivisionError("by nothing")
+
+    def refuse() -> Seen:
+        raise InputError("it is bent", where="here", advice="Straighten it")
+
+    results = run_cases([_case(crash), _case(refuse)])
+    assert [r.outcome for r in results] == [Outcome.FAILED, Outcome.REFUSED]
+    assert "by nothing" in results[0].said and "Straighten it" in results[1].said
+
+
+@pytest.mark.parametrize(
+    ("seen", "outcome"),
+    [
+        (Seen(True, "", error_um=1.0, bound_um=2.0), Outcome.PASSED),
+        (Seen(True, "", error_um=3.0, bound_um=2.0), Outcome.FAILED),
+        (Seen(True, "", error_um=3.0, bound_um=2.0, doubt="do not trust it"), Outcome.REFUSED),
+        (Seen(True, "", error_um=float("nan"), bound_um=2.0), Outcome.FAILED),
+        (Seen(True, "", finite=False, doubt="do not trust it"), Outcome.FAILED),
+        (Seen(False, ""), Outcome.FAILED),
+    ],
+)
+def test_a_wrong_result_passes_only_as_refused_by_itself(seen: Seen, outcome: Outcome) -> None:
+    assert run_case(_case(lambda: seen)).outcome is outcome
+
+
+def test_ctrl_c_stops_the_cases() -> None:
+    def stop() -> Seen:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_cases([_case(stop)])
+
+
+def test_numbers_that_are_none_stay_out_of_the_json() -> None:
+    result = run_case(_case(lambda: Seen(True, "", error_um=float("nan"))))
+    assert json.dumps(result_rows([result]), allow_nan=False)
+
+
+def test_the_depth_answers_to_leds_and_light_as_the_shading_says() -> None:
+    """Nearer light falls off faster: LEDs taken as lower make the same picture a deeper press."""
+    chosen = [p for p in parameters() if p.name in ("leds_z", "factors")]
+    found = {s.parameter.name: s for s in sensitivities(standard_sensor(), chosen=chosen)}
+    assert np.sign(found["leds_z"].low_percent) == -np.sign(found["leds_z"].high_percent)
+    assert found["factors"].swing_percent > 10.0 * found["leds_z"].swing_percent
+
+
+def test_the_report_holds_every_case_that_was_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["stability", "-o", str(out), "--only", "grid_127x131,kind_int8,slopes_1e4"]) == 0
+    captured = capsys.readouterr()
+    assert "2 right, 1 refused" in captured.out
+    assert "%" in captured.err  # progress
+    rows = json.loads((out / "stability.json").read_text())["cases"]
+    assert {row["case"]: row["verdict"] for row in rows} == {
+        "kind_int8": "refused",
+        "grid_127x131": "passed",
+        "slopes_1e4": "passed",
+    }
+    with (out / "stability.csv").open() as stream:
+        assert [row["case"] for row in csv.DictReader(stream)] == [row["case"] for row in rows]
+    page = (out / "stability.html").read_text()
+    assert page.count("data:image/png") == 1 and "int8" in page
+
+
+def test_an_unknown_case_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["stability", "-o", str(tmp_path / "out"), "--only", "nothing"]) == MENDABLE
+    assert "nothing" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
