@@ -312,6 +312,10 @@ def solve_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, 
         n = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, lit0, lit1, lit2)
         n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
         n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
+        if gloss is not None:
+            # A lobe bends the brightness: from the start, two steps more to settle.
+            n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
+            n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
         # What is dark is judged with the light from around that the normal found receives.
         _, lit0, k0 = _told(
             w[j], w[9 * _B + j], w[6 * _B + j], w[13 * _B + j], s0, dark[0], bounce, n[2], shadows

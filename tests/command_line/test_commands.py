@@ -175,7 +175,7 @@ def test_a_plan_is_explained(
     assert main([*explained, "--effort", "balanced"]) == 0
     shown = capsys.readouterr().out
     assert press.name in shown
-    assert "looking for a contact" in shown
+    assert "integration" in shown
     assert "left out" in shown
 
 
