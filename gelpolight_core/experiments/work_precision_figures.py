@@ -44,10 +44,7 @@ def draw_depth_error(points: Sequence[Point]) -> Drawing:
             label=tr("front"),
         )
         for point, place in zip(front, places, strict=True):
-            axes.annotate(
-                point.label, place, fontsize=5.5, xytext=(3, 3),
-                textcoords="offset points",
-            )  # fmt: skip
+            _name(axes, point.label, place)
         _label(axes, tr("depth, RMS (um)"))
 
     caption = tr(
@@ -71,7 +68,7 @@ def draw_other_errors(points: Sequence[Point]) -> Drawing:
             _curves(axes, points, key, names=False)
             if paper is not None:
                 axes.plot(PAPER_MS, paper, "*", color="black", markersize=10)
-                axes.annotate(tr("the paper"), (PAPER_MS, paper), fontsize=6.5)
+                _name(axes, tr("the paper"), (PAPER_MS, paper))
             _label(axes, label, legend=False)
 
     caption = tr(
@@ -98,8 +95,9 @@ def draw_integrators(points: Sequence[IntegratorPoint]) -> Drawing:
                 label=mine[0].label,
             )
             for point in mine:
-                axes.annotate(str(point.side), (point.median_ms, point.rms_um), fontsize=5)
-        _label(axes, tr("depth of a smooth bump of 1 mm, RMS (um)"))
+                _name(axes, str(point.side), (point.median_ms, point.rms_um))
+        _label(axes, tr("depth of a smooth bump of 1 mm, RMS (um)"), legend=False)
+        axes.legend(loc="lower left", fontsize=6)
 
     caption = tr("Integration alone, of exact slopes; the numbers are nodes along each side")
     return draw(caption, 85.0, paint)
@@ -127,6 +125,13 @@ def _curves(axes: Axes, points: Sequence[Point], key: str, *, names: bool = True
             elinewidth=0.5,
             label=known[0].label if names else None,
         )
+
+
+def _name(axes: Axes, text: str, place: tuple[float, float]) -> None:
+    """Write a name beside a point; it may leave the axes, which must not make room for it."""
+    axes.annotate(
+        text, place, fontsize=5.5, xytext=(3, 3), textcoords="offset points"
+    ).set_in_layout(False)
 
 
 def _group(point: Point) -> str:
