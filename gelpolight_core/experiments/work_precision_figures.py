@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gelpolight_core.experiments.integrators import IntegratorPoint
+from gelpolight_core.experiments.log_axes import number_logarithmically
 from gelpolight_core.experiments.work_precision import Point, measured, pareto_front
 from gelpolight_core.report.document import Drawing
 from gelpolight_core.report.drawing import draw
@@ -97,7 +98,7 @@ def draw_integrators(points: Sequence[IntegratorPoint]) -> Drawing:
             for point in mine:
                 _name(axes, str(point.side), (point.median_ms, point.rms_um))
         _label(axes, tr("depth of a smooth bump of 1 mm, RMS (um)"), legend=False)
-        axes.legend(loc="lower left", fontsize=6)
+        axes.legend(loc="upper right", fontsize=6)
 
     caption = tr("Integration alone, of exact slopes; the numbers are nodes along each side")
     return draw(caption, 85.0, paint)
@@ -142,6 +143,8 @@ def _group(point: Point) -> str:
 def _label(axes: Axes, error: str, *, legend: bool = True) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
+    number_logarithmically(axes.xaxis)
+    number_logarithmically(axes.yaxis)
     axes.grid(which="both", color="0.92", lw=0.5)
     axes.set_xlabel(tr("time of a frame (ms)"))
     axes.set_ylabel(error)
