@@ -53,6 +53,11 @@ class Parameter:
     source: str
     change: Change
 
+    @property
+    def stated(self) -> str:
+        """The standard uncertainty with its unit."""
+        return f"{self.sd:g} {self.unit}".rstrip()
+
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
@@ -102,14 +107,14 @@ def parameters() -> tuple[Parameter, ...]:
         *leds,
         Parameter("leds_z", tr("all LEDs, z"), "mm", 0.2, tr("housing"), _leds_z),
         Parameter("thickness", tr("elastomer thickness"), "mm", 0.1, tr("gauge"), _thickness),
-        Parameter("index", tr("elastomer index"), "0.01", 0.5, sheet, _index),
+        Parameter("index", tr("elastomer index"), "", 0.005, sheet, _index),
         Parameter("distance", tr("top surface, distance"), "mm", 0.02, pose, _distance),
         Parameter("tilt_x", tr("top surface, tilt about y"), "deg", 0.06, pose, partial(_tilt, 0)),
         Parameter("tilt_y", tr("top surface, tilt about x"), "deg", 0.06, pose, partial(_tilt, 1)),
         Parameter("focal", tr("focal length"), "%", 0.1, lens, _focal),
         Parameter("centre_x", tr("principal point, x"), "% f", 0.05, lens, partial(_centre, "cx")),
         Parameter("centre_y", tr("principal point, y"), "% f", 0.05, lens, partial(_centre, "cy")),
-        Parameter("k1", tr("distortion k1"), "0.01", 0.2, lens, _distortion),
+        Parameter("k1", tr("distortion k1"), "", 0.002, lens, _distortion),
         Parameter(
             "exponent", tr("reflectance, exponent of the cosine"), "%", 1.0, tr("balls"), _exponent
         ),
@@ -194,7 +199,7 @@ def _thickness(known: KnownSensor, by: float) -> Calibration:
 
 def _index(known: KnownSensor, by: float) -> Calibration:
     stated = known.calibration.sensor
-    index = stated.elastomer_refractive_index + 0.01 * by
+    index = stated.elastomer_refractive_index + by
     return exact_calibration(known.sensor, stated=replace(stated, elastomer_refractive_index=index))
 
 
@@ -228,7 +233,7 @@ def _centre(name: str, known: KnownSensor, by: float) -> Calibration:
 def _distortion(known: KnownSensor, by: float) -> Calibration:
     camera = known.calibration.camera
     k1, *others = camera.distortion
-    bent = (k1 + 0.01 * by, others[0], others[1], others[2], others[3])
+    bent = (k1 + by, others[0], others[1], others[2], others[3])
     return exact_calibration(known.sensor, camera=replace(camera, distortion=bent))
 
 

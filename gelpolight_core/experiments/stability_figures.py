@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from gelpolight_core.experiments.log_axes import number_logarithmically
 from gelpolight_core.experiments.sensitivity import Sensitivity
 from gelpolight_core.experiments.stability import CaseResult, Outcome
 from gelpolight_core.report.document import Drawing
@@ -16,6 +17,7 @@ from gelpolight_core.translation import tr
 COLOURS = {Outcome.PASSED: "#1b6e3a", Outcome.REFUSED: "#8a5200", Outcome.FAILED: "#b3211d"}
 MARKERS = {Outcome.PASSED: "o", Outcome.REFUSED: "D", Outcome.FAILED: "X"}
 LEAST_UM = 1e-4
+TORNADO_TICKS = (-10.0, -1.0, -0.1, 0.0, 0.1, 1.0, 10.0)
 ROW_MM = 4.6
 FEWEST_MM = 26.0
 LOW, HIGH = "#0072b2", "#d55e00"
@@ -38,6 +40,7 @@ def draw_outcomes(results: Sequence[CaseResult]) -> Drawing:
         axes.set_yticks(range(len(shown)), [r.case.name for r in shown], fontsize=6)
         axes.set_ylim(len(shown) - 0.4, -0.6)
         axes.set_xscale("log")
+        number_logarithmically(axes.xaxis)
         axes.grid(axis="x", color="0.9")
         axes.set_xlabel(tr("error of the depth, RMS (um)"))
 
@@ -54,16 +57,22 @@ def draw_tornado(found: Sequence[Sensitivity]) -> Drawing:
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
         places = np.arange(len(found))
-        axes.barh(places, [s.low_percent for s in found], color=LOW, label=tr("too low"))
+        axes.barh(places, [s.low_percent for s in found], color=LOW, label=tr("parameter too low"))
         axes.barh(
-            places, [s.high_percent for s in found], color=HIGH, height=0.5, label=tr("too high")
+            places,
+            [s.high_percent for s in found],
+            color=HIGH,
+            height=0.5,
+            label=tr("parameter too high"),
         )
-        labels = [f"{s.parameter.label} ({s.parameter.sd:g} {s.parameter.unit})" for s in found]
+        labels = [f"{s.parameter.label} ({s.parameter.stated})" for s in found]
         axes.set_yticks(places, labels, fontsize=6.5)
         axes.invert_yaxis()
         axes.axvline(0.0, color="0.3", lw=0.7)
         axes.grid(axis="x", color="0.9")
         axes.set_xscale("symlog", linthresh=0.1)
+        axes.set_xticks(TORNADO_TICKS, [f"{tick:g}" for tick in TORNADO_TICKS])
+        axes.set_xticks([], minor=True)
         axes.set_xlabel(tr("change of a cylinder's height (%)"))
         axes.legend(loc="lower right")
 

@@ -107,7 +107,7 @@ def sensitivity_table(found: Sequence[Sensitivity]) -> str:
         f"{tr('RMS um'):>9}{tr('% per unit'):>12}"
     )
     lines = [
-        f"{s.parameter.label:<38}{f'{s.parameter.sd:g} {s.parameter.unit}':>14}"
+        f"{s.parameter.label:<38}{s.parameter.stated:>14}"
         f"{s.low_percent:+9.2f}{s.high_percent:+9.2f}{s.rms_um:9.1f}{s.unit_percent:+12.2f}"
         for s in found
     ]
@@ -224,7 +224,7 @@ def _sensitivity_listing(found: Sequence[Sensitivity]) -> Listing:
     rows = tuple(
         (
             s.parameter.label,
-            f"{s.parameter.sd:g} {s.parameter.unit}",
+            s.parameter.stated,
             s.parameter.source,
             f"{s.low_percent:+.2f}",
             f"{s.high_percent:+.2f}",

@@ -42,6 +42,7 @@ LEAST_REPEATS = 15
 WARM_UP = 2
 CALIBRATING = 0.4
 TOUCHED_MM = 0.02
+WORTH = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,14 +282,17 @@ def measured(point: Point) -> tuple[float, float]:
 
 
 def pareto_front(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the points that no other beats in both time and depth error, fastest first."""
+    """Return the points that nothing beats in both time and depth error, fastest first.
+
+    A slower point has to be better by `WORTH`: smaller differences are the noise's.
+    """
     known = sorted(
         (p for p in points if p.median_ms is not None and p.rms_um is not None),
         key=measured,
     )
     front: list[Point] = []
     for point in known:
-        if not front or measured(point)[1] < measured(front[-1])[1]:
+        if not front or measured(point)[1] < (1.0 - WORTH) * measured(front[-1])[1]:
             front.append(point)
     return tuple(front)
 

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gelpolight_core.experiments.integrators import IntegratorPoint
+from gelpolight_core.experiments.log_axes import number_logarithmically
 from gelpolight_core.experiments.work_precision import Point, measured, pareto_front
 from gelpolight_core.report.document import Drawing
 from gelpolight_core.report.drawing import draw
@@ -44,10 +45,7 @@ def draw_depth_error(points: Sequence[Point]) -> Drawing:
             label=tr("front"),
         )
         for point, place in zip(front, places, strict=True):
-            axes.annotate(
-                point.label, place, fontsize=5.5, xytext=(3, 3),
-                textcoords="offset points",
-            )  # fmt: skip
+            _name(axes, point.label, place)
         _label(axes, tr("depth, RMS (um)"))
 
     caption = tr(
@@ -71,7 +69,7 @@ def draw_other_errors(points: Sequence[Point]) -> Drawing:
             _curves(axes, points, key, names=False)
             if paper is not None:
                 axes.plot(PAPER_MS, paper, "*", color="black", markersize=10)
-                axes.annotate(tr("the paper"), (PAPER_MS, paper), fontsize=6.5)
+                _name(axes, tr("the paper"), (PAPER_MS, paper))
             _label(axes, label, legend=False)
 
     caption = tr(
@@ -98,8 +96,9 @@ def draw_integrators(points: Sequence[IntegratorPoint]) -> Drawing:
                 label=mine[0].label,
             )
             for point in mine:
-                axes.annotate(str(point.side), (point.median_ms, point.rms_um), fontsize=5)
-        _label(axes, tr("depth of a smooth bump of 1 mm, RMS (um)"))
+                _name(axes, str(point.side), (point.median_ms, point.rms_um))
+        _label(axes, tr("depth of a smooth bump of 1 mm, RMS (um)"), legend=False)
+        axes.legend(loc="upper right", fontsize=6)
 
     caption = tr("Integration alone, of exact slopes; the numbers are nodes along each side")
     return draw(caption, 85.0, paint)
@@ -129,6 +128,13 @@ def _curves(axes: Axes, points: Sequence[Point], key: str, *, names: bool = True
         )
 
 
+def _name(axes: Axes, text: str, place: tuple[float, float]) -> None:
+    """Write a name beside a point; it may leave the axes, which must not make room for it."""
+    axes.annotate(
+        text, place, fontsize=5.5, xytext=(3, 3), textcoords="offset points"
+    ).set_in_layout(False)
+
+
 def _group(point: Point) -> str:
     """Return what a curve joins: the sizes of the virtual sensor, or one session."""
     return point.sensor.split("-sensor-")[0]
@@ -137,6 +143,8 @@ def _group(point: Point) -> str:
 def _label(axes: Axes, error: str, *, legend: bool = True) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
+    number_logarithmically(axes.xaxis)
+    number_logarithmically(axes.yaxis)
     axes.grid(which="both", color="0.92", lw=0.5)
     axes.set_xlabel(tr("time of a frame (ms)"))
     axes.set_ylabel(error)
