@@ -73,25 +73,29 @@ def evaluation_document(
 
 def _judged(evaluation: Evaluation, direction: str, limits: dict[str, float]) -> tuple[Figure, ...]:
     name = {"planar": tr("planar"), "depth": tr("depth")}[direction]
+    mean = evaluation.overall(direction).mean_absolute_percent
+    if not math.isfinite(mean) and not evaluation.failed:
+        return ()  # no press was made yet that says something of this direction
     found = [
         judge(
             f"{direction}_mean",
             tr("Mean absolute error, {direction}").format(direction=name),
-            evaluation.overall(direction).mean_absolute_percent,
+            mean,
             "%",
             fail=limits[direction],
             advice=tr("Calibrate again, or look at the presses that are worst"),
         )
     ]
     for group in evaluation.groups:
-        overall = group.shape == ALL and group.dimension_mm is None and group.statistic.count
-        if group.direction == direction and overall and group.regions != ALL:
+        overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
+        mean = group.statistic.mean_absolute_percent
+        if group.direction == direction and overall and math.isfinite(mean):
             label = tr("Mean absolute error, {direction}, {regions}")
             found.append(
                 judge(
                     f"{direction}_{group.regions.replace(' ', '_')}",
                     label.format(direction=name, regions=tr(group.regions)),
-                    group.statistic.mean_absolute_percent,
+                    mean,
                     "%",
                 )
             )

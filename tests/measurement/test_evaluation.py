@@ -273,6 +273,14 @@ def test_each_direction_counts_its_own_series_of_a_protocol() -> None:
     assert [label.get_text() for label in panels[1].get_xticklabels()] == ["0.5", "1"]
 
 
+def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet() -> None:
+    rows = [press("cylinder", 4.0, 1.0, region="same"), press("cylinder", 4.0, 1.0, region="r1")]
+    found = [measurement("cylinder", 4.04, 1.0)] * 2
+    evaluation = evaluate(rows, found, crossing=Crossing(size_mm=5.0, height_mm=1.0))
+    document = evaluation_document(evaluation)
+    assert document.verdict is Verdict.PASS
+
+
 def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -> None:
     rows = [press("cuboid", 5.0, 1.0, region="same", repeat=str(k)) for k in range(3)]
     rows += [press("cuboid", 5.0, 1.0, region=f"r{k}") for k in range(3)]
