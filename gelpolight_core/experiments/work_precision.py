@@ -129,8 +129,37 @@ def measure_session(
         If the session cannot be calibrated, or a press has no picture or no truth.
     """
     tell = progress or (lambda _what, _share: None)
-    scene, linear = _calibrated(session, tell)
-    shown = _presses(linear, presses)
+    scene, linear = calibrated_scene(session, tell)
+    return measure_scene(
+        scene, linear, methods, repeats=repeats, presses=presses, progress=progress
+    )
+
+
+def measure_scene(
+    scene: Scene,
+    session: Session,
+    methods: Sequence[Method],
+    *,
+    repeats: int = LEAST_REPEATS,
+    presses: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> tuple[Point, ...]:
+    """Measure every method on the presses of a session that is calibrated.
+
+    Parameters
+    ----------
+    scene : Scene
+        The session's calibrations.
+    session, methods, repeats, presses, progress
+        As for :func:`measure_session`; what bends the camera's numbers is known to the session.
+
+    Raises
+    ------
+    InputError
+        If a press has no picture or no truth.
+    """
+    tell = progress or (lambda _what, _share: None)
+    shown = _presses(session, presses)
     runs = [_ready(method, scene) for method in methods]
     grid = scene.full.table.grid
     radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
@@ -150,7 +179,8 @@ def measure_session(
     return tuple(_point(run, name, size, grid.pitch_mm) for run in runs)
 
 
-def _calibrated(session: Session, tell: Progress) -> tuple[Scene, Session]:
+def calibrated_scene(session: Session, tell: Progress) -> tuple[Scene, Session]:
+    """Return a session's calibrations, and the session with what undoes the camera's response."""
     results, stages = StageResults(), stages_of("paper")
     for number, stage in enumerate(stages):
         tell(stage.value, CALIBRATING * number / (len(stages) + 2))
