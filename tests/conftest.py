@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import pickle
 import shutil
+import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
@@ -15,6 +18,8 @@ if TYPE_CHECKING:
     from gelpolight_core.calibration.calibration import Calibration
     from gelpolight_core.calibration.pipeline import CalibrationRun
     from gelpolight_core.calibration.project import CalibrationProject
+
+    MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 
 # The same examples on every machine, so that a verdict can be repeated; look further, now and then,
 # with --hypothesis-profile=explore.
@@ -34,23 +39,56 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def virtual_session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
+    """Return a function that makes something in a folder once for all processes of a test run.
+
+    It is given a name and what makes it; every process gets the pickled result.
+    """
+    alone = "PYTEST_XDIST_WORKER" not in os.environ
+    base = tmp_path_factory.getbasetemp()
+    shared = base if alone else base.parent
+
+    def once(name: str, make: Callable[[Path], Any]) -> Any:
+        folder, made = shared / f"once-{name}", shared / f"once-{name}.pickle"
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            until = time.monotonic() + 600.0
+            while not made.exists():
+                if time.monotonic() > until:
+                    pytest.fail(f"another process did not finish {name}")
+                time.sleep(0.2)
+        else:
+            partial = made.with_suffix(".partial")
+            partial.write_bytes(pickle.dumps(make(folder)))
+            partial.rename(made)
+        return pickle.loads(made.read_bytes())
+
+    return once
+
+
+@pytest.fixture(scope="session")
+def virtual_session(made_once: MadeOnce) -> Path:
     """Return a session folder of the virtual sensor with its truth, at half the picture's size."""
     from gelpolight_core.design.sensor_design import SensorDesign
     from gelpolight_core.simulation.session import simulate_session
 
-    folder = tmp_path_factory.mktemp("virtual-sensor") / "session"
-    simulate_session(SensorDesign(), folder, scale=0.5)
-    return folder
+    def make(folder: Path) -> Path:
+        simulate_session(SensorDesign(), folder / "session", scale=0.5)
+        return folder / "session"
+
+    return made_once("virtual-session", make)
 
 
 @pytest.fixture(scope="session")
-def virtual_run(virtual_session: Path) -> CalibrationRun:
+def virtual_run(virtual_session: Path, made_once: MadeOnce) -> CalibrationRun:
     """Return the full model's run on the virtual session; not to be changed."""
     from gelpolight_core.calibration.pipeline import calibrate_session
     from gelpolight_core.session.session import read_session
 
-    return calibrate_session(read_session(virtual_session), model="full")
+    return made_once(
+        "virtual-run", lambda _: calibrate_session(read_session(virtual_session), model="full")
+    )
 
 
 @pytest.fixture(scope="session")
@@ -60,23 +98,27 @@ def virtual_calibration(virtual_run: CalibrationRun) -> Calibration:
 
 
 @pytest.fixture(scope="session")
-def small_session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def small_session(made_once: MadeOnce) -> Path:
     """Return the virtual sensor's session at a quarter of its size: what it costs is counted."""
     from gelpolight_core.design.sensor_design import SensorDesign
     from gelpolight_core.simulation.session import simulate_session
 
-    folder = tmp_path_factory.mktemp("small-sensor") / "session"
-    simulate_session(SensorDesign(), folder, scale=0.25)
-    return folder
+    def make(folder: Path) -> Path:
+        simulate_session(SensorDesign(), folder / "session", scale=0.25)
+        return folder / "session"
+
+    return made_once("small-session", make)
 
 
 @pytest.fixture(scope="session")
-def small_calibration(small_session: Path) -> Calibration:
+def small_calibration(small_session: Path, made_once: MadeOnce) -> Calibration:
     """Return what the command line makes of the small session; not to be changed."""
     from gelpolight_core.calibration.pipeline import calibrate_session
     from gelpolight_core.session.session import read_session
 
-    return calibrate_session(read_session(small_session)).calibration
+    return made_once(
+        "small-calibration", lambda _: calibrate_session(read_session(small_session)).calibration
+    )
 
 
 @pytest.fixture(scope="session")

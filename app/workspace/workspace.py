@@ -21,7 +21,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import platformdirs
 
@@ -31,10 +31,10 @@ from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
-from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
-from gelpolight_core.records.records import NAME as RECORDS
-from gelpolight_core.records.records import Records
 from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from gelpolight_core.records.records import Records
 
 ENDING = ".gplcal"
 STATE = "workspace.json"
@@ -82,7 +82,9 @@ class Workspace:
         InputError
             If it cannot be opened or made.
         """
-        path = self.folder / RECORDS
+        from gelpolight_core.records.records import NAME, Records  # the window is up before NumPy
+
+        path = self.folder / NAME
         if self._records is None or self._records.path != path:
             self.close()
             make_folder(self.folder)
@@ -114,10 +116,12 @@ class Workspace:
 
     def recording_path(self, serial: str) -> Path:
         """Return a place for a new recording, named after the time; its folder is made."""
+        from gelpolight_core.recording.recording import ENDING
+
         folder = self.recordings_folder(serial)
         make_folder(folder)
         stamp = datetime.now().astimezone().strftime("%Y-%m-%d_%H-%M-%S")
-        return _free(folder / f"{stamp}{RECORDING_ENDING}")
+        return _free(folder / f"{stamp}{ENDING}")
 
     def protocols_folder(self, serial: str) -> Path:
         """Return where the runs of the evaluation protocol on a sensor are kept."""

@@ -200,7 +200,7 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
     project: CalibrationProject,
 ) -> None:
     path = project.session.folder / "session.toml"
-    path.write_text(path.read_text().replace("[balls]", '[balls]\n"ball_00.png" = 4.5'))
+    path.write_text(path.read_text().replace("led_height_mm = 13.7", "led_height_mm = 13.9"))
     written = path.read_bytes()
     assert project.changed_outside() == (path,)
     with pytest.raises(InputError, match=r"session\.toml.*Reload"):
@@ -208,9 +208,9 @@ def test_what_somebody_else_wrote_into_the_session_is_not_written_over(
     assert path.read_bytes() == written
     project.exclude(Stage.BALLS, "ball_02.png")  # the other file is as it was
     project.reload()
-    assert project.session.ball_radii_mm["ball_00.png"] == 4.5
+    assert project.session.sensor.led_height_mm == 13.9
     project.set_ball_radius("ball_01.png", 3.5)
-    assert read_session(path.parent).ball_radii_mm["ball_00.png"] == 4.5
+    assert read_session(path.parent).sensor.led_height_mm == 13.9
 
 
 def test_a_session_that_somebody_broke_can_be_kept_as_it_was_read(

@@ -85,7 +85,7 @@ def test_another_board_size_is_refused_and_the_real_one_named(
     with pytest.raises(InputError, match=r"9 x 6 inner corners, not") as refusal:
         find_board(tilted_board, BoardSpec(stated, 3.0))
     assert refusal.value.where == "view.png"
-    assert "inner_corners" in refusal.value.advice
+    assert "inner corners" in refusal.value.advice
 
 
 def test_a_board_may_be_stated_lengthwise_or_crosswise(tilted_board: Picture) -> None:

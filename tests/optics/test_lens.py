@@ -146,7 +146,7 @@ def test_a_session_of_another_board_says_which(views: list[Picture]) -> None:
     with pytest.raises(InputError, match="9 x 6 inner corners, not 8 x 6") as refusal:
         calibrate_lens(views[:4], smaller)
     assert str(refusal.value).count("9 x 6") == 1
-    assert "inner_corners" in refusal.value.advice
+    assert "inner corners" in refusal.value.advice
 
 
 def test_parallel_views_are_refused_for_want_of_a_focal_length() -> None:

@@ -59,8 +59,8 @@ def test_a_working_circle_out_of_view_is_refused() -> None:
 def test_a_working_circle_of_a_few_pixels_is_refused_where_it_is_stated() -> None:
     with pytest.raises(InputError, match="working circle") as refusal:
         build_resampling_table(CAMERA, PLANE, STACK, working_diameter_mm=1.0)
-    assert "session.toml" in refusal.value.where
-    assert "working_diameter_mm" in refusal.value.advice
+    assert "stated" in refusal.value.where
+    assert "working diameter" in refusal.value.advice
 
 
 def test_a_grid_that_would_not_fit_in_memory_is_refused() -> None:

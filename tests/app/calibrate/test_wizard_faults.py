@@ -209,22 +209,6 @@ def test_a_file_broken_by_hand_is_named_on_the_page_when_the_session_is_opened(
     assert name in problem.text()
 
 
-@pytest.mark.parametrize("name", ["session.toml", "decisions.toml"])
-def test_a_file_broken_while_the_session_is_open_is_put_right_by_the_next_correction(
-    technician: Technician, computed_project: Made, name: str
-) -> None:
-    project = computed_project()
-    technician.begin(project, "balls")
-    (project.session.folder / name).write_text("[[[ broken")
-    ball = project.session.found("balls")[0].name
-    technician.wizard.controller.exclude(Stage.BALLS, ball, True)
-    technician.wizard.controller.set_ball_radius(ball, 2.75)
-    technician.rest()
-    kept = read_session(project.session.folder)
-    assert kept.ball_radii_mm[ball] == 2.75
-    assert f"balls/{ball}" in kept.decisions.excluded
-
-
 def test_a_picture_removed_by_hand_while_open_is_no_fault_of_the_program(
     technician: Technician, computed_project: Made
 ) -> None:
