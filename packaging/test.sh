@@ -22,8 +22,9 @@ check "code style" .venv/bin/python -m ruff check .
 check "formatting" .venv/bin/python -m ruff format --check .
 check "types of the core" .venv/bin/python -m mypy --strict
 check "import contracts" .venv/bin/lint-imports
+# Two processes share the cores, so that neither needs threads of its own for small matrices.
 # Files stay whole, so that what their tests share is made once.
-check "tests" .venv/bin/python -m pytest --numprocesses 2 --dist loadfile "$@"
+check "tests" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile "$@"
 
 echo
 if [ -n "$failed" ]; then

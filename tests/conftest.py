@@ -122,17 +122,20 @@ def small_calibration(small_session: Path, made_once: MadeOnce) -> Calibration:
 
 
 @pytest.fixture(scope="session")
-def small_project(
-    small_session: Path, tmp_path_factory: pytest.TempPathFactory
-) -> CalibrationProject:
+def small_project(small_session: Path, made_once: MadeOnce) -> CalibrationProject:
     """Return a project on the small session, computed stage by stage; not to be changed."""
     from gelpolight_core.calibration.project import CalibrationProject
 
-    folder = tmp_path_factory.mktemp("project") / "session"
-    shutil.copytree(small_session, folder)
+    def make(folder: Path) -> Any:
+        shutil.copytree(small_session, folder / "session")
+        project = CalibrationProject(folder / "session")
+        while project.stale():
+            project.compute(project.stale()[0])
+        return folder / "session", project._results, dict(project._outcomes)
+
+    folder, results, outcomes = made_once("small-project", make)
     project = CalibrationProject(folder)
-    while project.stale():
-        project.compute(project.stale()[0])
+    project._results, project._outcomes = results, outcomes
     return project
 
 

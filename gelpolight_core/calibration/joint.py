@@ -24,6 +24,7 @@ from gelpolight_core.calibration.joint_problem import (
     COMMON,
     CORRELATION,
     CURVE_SIZE,
+    DECAY,
     Problem,
     diffuse_curves,
 )
@@ -204,7 +205,7 @@ def _solve(
         free[balls.stop :] = False
     problem = Problem(pixels, start, free)
     scale = np.full(start.size, 0.1)
-    scale[14] = 0.05
+    scale[DECAY] = 0.05
     scale[balls] = np.tile([0.02, 0.02, 0.05], len(pixels))
 
     def whole(part: Array) -> Array:

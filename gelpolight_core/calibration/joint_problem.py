@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from gelpolight_core.reflectance.draped_ball import draped_ball
 from gelpolight_core.reflectance.membrane import CURVE_NODES, LEAST_COSINE, Membrane, bounce_weight
 
 Array = NDArray[np.float64]
+Surface = tuple[Array, Array, NDArray[np.bool_]]
 DARK_COSINE = 0.08
 # Pixels of one ball err together (lens, centre, membrane), so that each counts for less than one.
 CORRELATION = 4.0
@@ -23,7 +24,7 @@ LED_LATERAL_SD_MM = 0.05
 LED_HEIGHT_SD_MM = 0.2
 PRIOR_STRENGTH = 3.0
 # LEDs (9), exponent, gloss, roughness, cap's and drape's bounce, decay length.
-COMMON = 15
+COMMON, DECAY = 15, 14
 # The one-dimensional membrane: cos times the exponential of a spline through these cosines, which
 # is 0 at the last. Below the first, where balls hardly reach, it goes on as Lambert's law does.
 CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
@@ -82,19 +83,26 @@ class Problem:
         """Where the balls' parameters end."""
         return COMMON + 3 * len(self.presses)
 
-    def residuals(self, x: Array) -> list[Array]:
-        """Return the weighted residuals of each press, (3 N,)."""
-        return [self._press(x, i)[0].ravel() for i in range(len(self.presses))]
+    def residuals(self, x: Array, surfaces: Sequence[Surface] | None = None) -> list[Array]:
+        """Return the weighted residuals of each press, (3 N,); on known surfaces where given."""
+        seen = self._surfaces(x) if surfaces is None else surfaces
+        return [self._press(x, i, surface)[0].ravel() for i, surface in enumerate(seen)]
 
-    def _press(self, x: Array, index: int) -> tuple[Array, Array, Array, Array]:
+    def _surfaces(self, x: Array) -> list[Surface]:
+        """Return what is seen of each ball: points and normals (N, 3), and where it touches."""
+        seen = []
+        for pixels, ball in zip(
+            self.presses, x[COMMON : self.balls_end].reshape(-1, 3), strict=True
+        ):
+            pose = BallPose((float(ball[0]), float(ball[1])), pixels.radius_mm, float(ball[2]))
+            seen.append(draped_ball(pixels.points_mm, pixels.drift, pose, decay_mm=float(x[DECAY])))
+        return seen
+
+    def _press(self, x: Array, index: int, seen: Surface) -> tuple[Array, Array, Array, Array]:
         """Return residuals, those that the direct light alone makes, and its cosines, (N, 3)."""
         pixels = self.presses[index]
         leds = x[:9].reshape(3, 3)
-        at = COMMON + 3 * index
-        pose = BallPose((float(x[at]), float(x[at + 1])), pixels.radius_mm, float(x[at + 2]))
-        surface, normals, on_ball = draped_ball(
-            pixels.points_mm, pixels.drift, pose, decay_mm=float(x[14])
-        )
+        surface, normals, on_ball = seen
         flat = np.concatenate([pixels.points_mm, np.zeros((len(surface), 1))], axis=1)
         light, distance = light_directions(leds, surface)
         flat_light, flat_distance = light_directions(leds, flat)
@@ -138,32 +146,50 @@ class Problem:
         return np.concatenate([*self.residuals(x), self.priors(x)])
 
     def jacobian(self, x: Array) -> Array:
-        """Finite differences; a ball's own parameters are moved for all balls at once."""
-        base = self.residuals(x)
+        """Finite differences, as few as can be told apart.
+
+        A light brightens its own channel only, and a ball's parameters its own press, so that one
+        coordinate of all lights, or of all balls, is moved at once.
+        """
+        surfaces = self._surfaces(x)
+        base = self.residuals(x, surfaces)
         ends = np.cumsum([r.size for r in base])
         starts = ends - [r.size for r in base]
         prior = self.priors(x)
         result = np.zeros((ends[-1] + prior.size, x.size))
+
+        def slopes(
+            columns: slice | list[int], surfaces: Sequence[Surface] | None
+        ) -> Iterator[tuple[int, slice, Array]]:
+            """Yield each press, its rows, and its slopes where all `columns` are moved."""
+            moved = x.copy()
+            moved[columns] += _STEP
+            for i, r in enumerate(self.residuals(moved, surfaces)):
+                yield i, slice(starts[i], ends[i]), (r - base[i]) / _STEP
+
+        for axis in range(3):
+            if self.free[axis:9:3].any():
+                for _, rows, slope in slopes(slice(axis, 9, 3), surfaces):
+                    for k in np.flatnonzero(self.free[axis:9:3]):
+                        result[rows, 3 * k + axis][k::3] = slope[k::3]
+            for i, rows, slope in slopes(slice(COMMON + axis, self.balls_end, 3), None):
+                result[rows, COMMON + 3 * i + axis] = slope
+        for alone in (9 + np.flatnonzero(self.free[9:COMMON])).tolist():
+            for _, rows, slope in slopes([alone], None if alone == DECAY else surfaces):
+                result[rows, alone] = slope
         for j in np.flatnonzero(self.free[:COMMON]):
             moved = x.copy()
             moved[j] += _STEP
-            for i, r in enumerate(self.residuals(moved)):
-                result[starts[i] : ends[i], j] = (r - base[i]) / _STEP
             result[ends[-1] :, j] = (self.priors(moved) - prior) / _STEP
-        for axis in range(3):
-            moved = x.copy()
-            moved[COMMON + axis : self.balls_end : 3] += _STEP
-            for i, r in enumerate(self.residuals(moved)):
-                result[starts[i] : ends[i], COMMON + 3 * i + axis] = (r - base[i]) / _STEP
         if self.free[self.balls_end :].any():
             for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
-                result[start:end, self.balls_end :] = self._curve_slopes(x, i)
+                result[start:end, self.balls_end :] = self._curve_slopes(x, i, surfaces[i])
             result[-CURVE_SIZE:, self.balls_end :] = np.eye(CURVE_SIZE) / CURVE_SD
         return result
 
-    def _curve_slopes(self, x: Array, index: int) -> Array:
+    def _curve_slopes(self, x: Array, index: int, seen: Surface) -> Array:
         """Return the slopes of one press's residuals along the curves' heights, in closed form."""
-        _, direct, cosine, flat_cosine = self._press(x, index)
+        _, direct, cosine, flat_cosine = self._press(x, index, seen)
         rise = (curve_terms(cosine) - curve_terms(flat_cosine)) * direct[..., None]
         slopes = np.zeros((*direct.shape, 3, rise.shape[-1]))
         for k in range(3):

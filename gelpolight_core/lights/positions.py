@@ -172,7 +172,7 @@ def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, 
         To each LED.
     """
     towards = led_positions_mm - np.asarray(points_mm)[..., None, :]
-    distances = np.linalg.norm(towards, axis=-1)
+    distances = np.sqrt(np.einsum("...c,...c->...", towards, towards))
     return towards / distances[..., None], distances
 
 

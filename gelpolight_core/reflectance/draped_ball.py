@@ -53,10 +53,11 @@ def draped_ball(
 
     depth = np.full(len(points_mm), 0.5 * pose.depth_mm)
     for _ in range(ROUNDS):  # each round shrinks the error by slope times drift, about a tenth
-        depth = profile(np.linalg.norm(points_mm + depth[:, None] * drift - centre, axis=1))
+        away = points_mm + depth[:, None] * drift - centre
+        depth = profile(np.hypot(away[:, 0], away[:, 1]))
     place = points_mm + depth[:, None] * drift
     away = place - centre
-    r = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+    r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     outside, inside = np.maximum(r, contact), np.minimum(r, contact)
     drape = -ring / decay_mm * k1e(outside / decay_mm) / scale
     drape *= np.exp((contact - outside) / decay_mm)

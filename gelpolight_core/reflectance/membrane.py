@@ -90,7 +90,7 @@ def _glossy_lobe(
 ) -> Array:
     """Return the GGX lobe times the light's cosine, (N, 3)."""
     half = light + view[:, None, :]
-    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    half /= np.sqrt(np.einsum("nkc,nkc->nk", half, half))[..., None]
     tilt = np.clip(np.einsum("nkc,nc->nk", half, normals), 0.0, 1.0)
     seen = np.clip(np.einsum("nc,nc->n", view, normals), LEAST_VIEW, 1.0)[:, None]
     a2 = roughness * roughness

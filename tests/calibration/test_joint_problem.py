@@ -1,0 +1,55 @@
+"""Slopes of the joint refinement's residuals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelpolight_core.calibration.ball_pixels import BallPixels
+from gelpolight_core.calibration.joint_problem import COMMON, CURVE_SIZE, Problem
+
+STEP = 1e-4
+
+
+def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
+    """Return two presses of random pixels, and parameters to look at them with."""
+    random = np.random.default_rng(5)
+    presses = []
+    for centre in ((-2.0, 1.0), (3.0, -1.5)):
+        points = random.uniform(-2.5, 2.5, (40, 2)) + centre
+        view = np.concatenate([random.uniform(-0.2, 0.2, (40, 2)), np.full((40, 1), -1.0)], axis=1)
+        presses.append(
+            BallPixels(
+                points,
+                random.uniform(-0.2, 0.2, (40, 2)),
+                view / np.linalg.norm(view, axis=1, keepdims=True),
+                random.uniform(0.5, 1.5, (40, 3)),
+                random.uniform(0.9, 1.1, (40, 3)),
+                random.uniform(20.0, 60.0, (40, 3)),
+                4.0,
+            )
+        )
+    lights = [[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]]
+    membrane = [1.05, 0.2, 0.4, 0.1, 0.2, 0.7]
+    balls = [-2.05, 1.1, 0.9, 3.1, -1.45, 1.2]
+    x = np.concatenate([np.ravel(lights), membrane, balls, np.full(CURVE_SIZE * curves, 0.03)])
+    return Problem(presses, x + 0.01, np.ones(x.size, bool)), x
+
+
+@pytest.mark.parametrize("curves", [False, True])
+def test_slopes_are_those_of_moving_every_parameter_alone(curves: bool) -> None:
+    found, x = problem(curves=curves)
+    alone = np.stack([(found.all(x + d) - found.all(x)) / STEP for d in STEP * np.eye(x.size)], 1)
+    slopes = found.jacobian(x)
+    size = np.abs(alone).max(axis=0)
+    # Curves' slopes are in closed form, the others by the same steps.
+    assert np.abs(slopes - alone)[:, : COMMON + 6].max() < 1e-9 * size.max()
+    assert (np.abs(slopes - alone).max(axis=0) <= 2e-3 * size).all()
+
+
+def test_what_is_held_has_no_slopes() -> None:
+    found, x = problem(curves=False)
+    found.free[[1, 4, 10]] = False
+    slopes = found.jacobian(x)
+    assert not slopes[:, ~found.free].any()
+    assert slopes[:, found.free].any(axis=0).all()
