@@ -31,7 +31,7 @@ from app.inspect.page import InspectPage
 from app.inspect.products import Shown
 from app.shell import theme
 from app.shell.context import AppContext
-from app.sources.bench import Bench
+from app.sources.bench import PRESSED, Bench
 from app.sources.listing import picture_folders, recordings, virtual_sensor
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -100,7 +100,7 @@ class Measurement:
         self._lateness = Lateness()
         self._move = QTimer()
         if context.source.bench is not None and not options.still:
-            self._move.timeout.connect(dragger(context.source.bench))
+            self._move.timeout.connect(dragger(context.source.bench, PRESSED))
             self._move.start(DRAG_MS)
         live = Reconstructor(calibration, model=options.model, effort=options.effort)
         self.page.library.loaded.emit(live, live)

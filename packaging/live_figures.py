@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,11 +36,11 @@ from app.sources.virtual import VirtualSource
 
 DRAG_MS = 33
 ROUND_S = 8.0  # half of it the object is dragged, then it lies still
+ITEMS = ("ball", "cuboid", "checkerboard", "cylinder", "nut", "mirror", "coin")
 
 
-def dragger(bench: Bench) -> Callable[[], None]:
+def dragger(bench: Bench, items: Sequence[str] = ITEMS) -> Callable[[], None]:
     """Return what moves the object in a circle, and now and then lays another one."""
-    items = ("ball", "cuboid", "checkerboard", "cylinder", "nut", "mirror", "coin")
     began = time.monotonic()
     laid = -1
     camera = bench.design.camera

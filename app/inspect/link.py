@@ -20,7 +20,7 @@ from app.sources.stream import Stream
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
-TICK_MS = 16
+TICK_MS = 8
 STATUS_MS = 500
 RATE_WINDOW_S = 2.0
 

@@ -190,18 +190,18 @@ class LiveSolver:
         if maps.membrane.bounce is None:
             record.left_out(tr("light from the surroundings"), tr("this membrane gives none"))
         with record.done(tr("near light, quarter scale"), ROUNDS * nodes * SOLVED_BYTES) as reason:
-            start, (changes, stopped) = self._rounds(region, quarter)
+            start, normals_at, (changes, stopped) = self._rounds(region, quarter)
             reason.append(tr("rounds: {n}; {d:.2f} mm deep").format(n=len(changes), d=start.max()))
         if len(changes) < ROUNDS:
             record.left_out(tr("second near-light round"), tr("the press is that shallow"))
         scale, picture = (maps.half, half) if effort == "balanced" else (maps.quarter, quarter)
         corner, shape = region.at(4 // scale.factor)
-        start = np.asarray(cv2.resize(start, shape[::-1], interpolation=cv2.INTER_LINEAR))
+        start, *first = (_enlarged(values, shape) for values in (start, *normals_at))
         if effort != "balanced":
             record.left_out(tr("near light, half scale"), tr("this effort does without it"))
         size = shape[0] * shape[1] * SOLVED_BYTES
         with record.done(tr("near light, last round"), size) as reason:
-            slopes = self._slopes(scale, picture, corner, start, normals is not None)
+            slopes = self._slopes(scale, picture, corner, start, (first[0], first[1]))
             reason.append(tr("from the depth at quarter scale"))
         with record.done(tr("integration"), 5 * start.nbytes) as reason:
             solved = self._integrate(scale, picture, corner, start, slopes, TOLERANCE)
@@ -216,17 +216,24 @@ class LiveSolver:
 
     def _rounds(
         self, region: Region, picture: PressPicture
-    ) -> tuple[Map, tuple[tuple[float, ...], str]]:
-        """Return the depth after the near-light rounds at quarter scale; as `coarse_depth`."""
+    ) -> tuple[Map, tuple[Map, Map], tuple[tuple[float, ...], str]]:
+        """Return depth and normals after the rounds at quarter scale; as `coarse_depth`."""
         scale, corner = self.maps.quarter, region.corner
         tolerances = chain(FIRST_TOLERANCES, repeat(FIRST_TOLERANCES[-1]))
+        normals: tuple[Map, Map] | None = None
 
         def solve(depth: Map) -> Map:
-            slopes = self._slopes(scale, picture, corner, depth)
+            nonlocal normals
+            slopes = self._slopes(scale, picture, corner, depth, normals)
+            normals = slopes.normal_x, slopes.normal_y
             return self._integrate(scale, picture, corner, depth, slopes, next(tolerances)).depth_mm
 
         longest = longest_step_mm(self._full)
-        return near_light_rounds(solve, region.shape, longest, ROUNDS, shallow_mm=SHALLOW_MM)
+        depth, changes = near_light_rounds(
+            solve, region.shape, longest, ROUNDS, shallow_mm=SHALLOW_MM
+        )
+        assert normals is not None
+        return depth, normals, changes
 
     def _slopes(
         self,
@@ -234,17 +241,21 @@ class LiveSolver:
         picture: PressPicture,
         corner: tuple[int, int],
         depth: Map,
-        normals: bool = False,
+        start: tuple[Map, Map] | None,
     ) -> _Solved:
-        """Return slopes along the rays at the present depth; as `solve_near_light`."""
+        """Return slopes along the rays at the present depth; as `solve_near_light`.
+
+        Normals (x and y) to start from, where there are any, are overwritten.
+        """
         membrane, shape = self.maps.membrane, depth.shape
+        normal_x, normal_y = start or (self._take("normal x", shape), self._take("normal y", shape))
         solved = _Solved(
             self._take("slope x", shape),
             self._take("slope y", shape),
             self._take("weight", shape),
             self._take("flags", shape, np.uint8),
-            self._take("normal x", shape),
-            self._take("normal y", shape),
+            normal_x,
+            normal_y,
         )
         self._workers.run(
             shape[0],
@@ -264,7 +275,7 @@ class LiveSolver:
             membrane.gloss,
             membrane.bounce,
             True,
-            normals,
+            start is not None,
             solved.slope_x,
             solved.slope_y,
             solved.weight,
@@ -344,6 +355,11 @@ class LiveSolver:
                 top_left,
                 normals,
             )
+
+
+def _enlarged(values: Map, shape: tuple[int, int]) -> Map:
+    """Return a map at a finer scale."""
+    return np.asarray(cv2.resize(values, shape[::-1], interpolation=cv2.INTER_LINEAR))
 
 
 def flat_normals(shape: tuple[int, ...]) -> Map:

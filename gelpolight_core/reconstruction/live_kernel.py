@@ -24,6 +24,13 @@ from gelpolight_core.reconstruction.near_light_kernel import (
 )
 
 _B = 64
+# Planes of a block's array: what is read, what is worked with, and what is written.
+_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _SATURATED, _KIND = 0, 3, 6, 9, 12, 13, 16
+_SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE = 17, 20, 23, 32, 35
+_TRUST, _FLAG, _MOVED, _PLANES = 37, 38, 39, 40
+# Steps are done until the longest of a block is shorter than so much.
+MOST_STEPS = 4
+SETTLED = 3e-3
 _single = np.float32
 _0, _1, _2, _HALF = _single(0.0), _single(1.0), _single(2.0), _single(0.5)
 _PI = _single(pi)
@@ -36,7 +43,7 @@ _MODEL2 = _single(MODEL_ERROR**2)
 _SIGMAS, _SHARE = _single(DARK_SIGMAS), _single(DARK_SHARE)
 _LONGEST = _single(0.3)
 _DAMP, _TINY = _single(1e-6), _single(1e-12)
-_MOST = _single(1e4)
+_SETTLED = _single(SETTLED**2)
 _F_OUTSIDE, _F_SATURATED = _single(Flag.OUTSIDE), _single(Flag.SATURATED)
 _F_DARK, _F_HIDDEN = _single(Flag.DARK), _single(Flag.NOT_OBSERVABLE)
 
@@ -214,57 +221,41 @@ def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight, bend):  # type: ignore
 
 
 @_part
-def _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return the normal after one Gauss-Newton step."""
-    nz = n[2]
-    b0, b1, b2 = _0, _0, _0
-    if bounce is not None:
-        half = bounce * _HALF
-        b0, b1, b2 = (
-            half * w[9 * _B + j] * s0,
-            half * w[10 * _B + j] * s1,
-            half * w[11 * _B + j] * s2,
-        )
-    t0, _, k0 = _told(
-        w[j], w[9 * _B + j], w[6 * _B + j], w[13 * _B + j], s0, dark[0], bounce, nz, shadows
+def _triple(w, first, j):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return w[first * _B + j], w[(first + 1) * _B + j], w[(first + 2) * _B + j]
+
+
+@_part
+def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    w[first * _B + j] = values[0]
+    w[(first + 1) * _B + j] = values[1]
+    w[(first + 2) * _B + j] = values[2]
+
+
+@_part
+def _channels(w, j, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return direct light, whether it is lit, and what it says, of a node's three channels."""
+    r0, r1, r2 = _triple(w, _RATIO, j)
+    a0, a1, a2 = _triple(w, _AROUND, j)
+    g0, g1, g2 = _triple(w, _NOISE, j)
+    b0, b1, b2 = _triple(w, _SATURATED, j)
+    s0, s1, s2 = _triple(w, _SCALED, j)
+    return (
+        _told(r0, a0, g0, b0, s0, dark[0], bounce, nz, shadows),
+        _told(r1, a1, g1, b1, s1, dark[1], bounce, nz, shadows),
+        _told(r2, a2, g2, b2, s2, dark[2], bounce, nz, shadows),
     )
-    t1, _, k1 = _told(
-        w[_B + j], w[10 * _B + j], w[7 * _B + j], w[14 * _B + j], s1, dark[1], bounce, nz, shadows
-    )
-    t2, _, k2 = _told(
-        w[2 * _B + j],
-        w[11 * _B + j],
-        w[8 * _B + j],
-        w[15 * _B + j],
-        s2,
-        dark[2],
-        bounce,
-        nz,
-        shadows,
-    )
-    f, gx, gy, gz = _response(l0, n, v, curves[0], gloss)
-    a11, a12, a22, ag1, ag2 = _pull(f, gx, gy, gz, n, t0, s0, w[6 * _B + j], k0, b0)
-    f, gx, gy, gz = _response(l1, n, v, curves[1], gloss)
-    b11, b12, b22, bg1, bg2 = _pull(f, gx, gy, gz, n, t1, s1, w[7 * _B + j], k1, b1)
-    f, gx, gy, gz = _response(l2, n, v, curves[2], gloss)
-    c11, c12, c22, cg1, cg2 = _pull(f, gx, gy, gz, n, t2, s2, w[8 * _B + j], k2, b2)
-    m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
-    g1, g2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
-    damp = _DAMP * (m11 + m22) + _TINY
-    m11, m22 = m11 + damp, m22 + damp
-    short = _1 / (m11 * m22 - m12 * m12)
-    m1, m2 = (m22 * g1 - m12 * g2) * short, (m11 * g2 - m12 * g1) * short
-    dx, dy, dz = -n[2] * m1, -n[2] * m2, n[0] * m1 + n[1] * m2
-    move = dx * dx + dy * dy + dz * dz + _TINY
-    held = _least(_LONGEST / sqrt(move), _1)
-    return _limited(n[0] + held * dx, n[1] + held * dy, n[2] + held * dz)
 
 
 @_whole
-def solve_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Solve the `_B` nodes of a block: planes 0 to 16 of `w` are read, 17 to 22 are written."""
+def _begin_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows, warm):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Find lights, view and a first normal of a block's nodes.
+
+    Begun `warm`, the normals that stand there are gone on with where all three lights tell of them.
+    """
+    flat = (_0, _0, -_1)
     for j in range(_B):
-        d, at = w[12 * _B + j], _single(j)
+        d, at = w[_DEPTH * _B + j], _single(j)
         wx, wy = drift[0] + at * drift[1], drift[2] + at * drift[3]
         x = x_first + pitch * at + d * wx
         short = _1 / sqrt(wx * wx + wy * wy + _1)
@@ -272,76 +263,76 @@ def solve_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, 
         l0, near0 = _light(leds[0], x, y + d * wy, d)
         l1, near1 = _light(leds[1], x, y + d * wy, d)
         l2, near2 = _light(leds[2], x, y + d * wy, d)
-        s0, s1, s2 = w[3 * _B + j] * near0, w[4 * _B + j] * near1, w[5 * _B + j] * near2
-        flat = (_0, _0, -_1)
-        d0, lit0, k0 = _told(
-            w[j], w[9 * _B + j], w[6 * _B + j], w[13 * _B + j], s0, dark[0], bounce, -_1, shadows
-        )
-        d1, lit1, k1 = _told(
-            w[_B + j],
-            w[10 * _B + j],
-            w[7 * _B + j],
-            w[14 * _B + j],
-            s1,
-            dark[1],
-            bounce,
-            -_1,
-            shadows,
-        )
-        d2, lit2, k2 = _told(
-            w[2 * _B + j],
-            w[11 * _B + j],
-            w[8 * _B + j],
-            w[15 * _B + j],
-            s2,
-            dark[2],
-            bounce,
-            -_1,
-            shadows,
-        )
+        s0, s1, s2 = _triple(w, _SCALE, j)
+        _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
+        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, bounce, -_1, shadows)
         f0 = _response(l0, flat, v, curves[0], gloss)[0]
         f1 = _response(l1, flat, v, curves[1], gloss)[0]
         f2 = _response(l2, flat, v, curves[2], gloss)[0]
-        tiny = _DAMP
-        e0 = _least(-l0[2] * _most(d0, _0) / _most(f0, tiny), _1)
-        e1 = _least(-l1[2] * _most(d1, _0) / _most(f1, tiny), _1)
-        e2 = _least(-l2[2] * _most(d2, _0) / _most(f2, tiny), _1)
-        lit0 = w[13 * _B + j]
-        lit1 = w[14 * _B + j]
-        lit2 = w[15 * _B + j]
-        n = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, lit0, lit1, lit2)
-        n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
-        n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
-        if gloss is not None:
-            # A lobe bends the brightness: from the start, two steps more to settle.
-            n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
-            n = _step(n, v, l0, l1, l2, s0, s1, s2, w, j, dark, curves, gloss, bounce, shadows)
+        e0 = _least(-l0[2] * _most(d0, _0) / _most(f0, _DAMP), _1)
+        e1 = _least(-l1[2] * _most(d1, _0) / _most(f1, _DAMP), _1)
+        e2 = _least(-l2[2] * _most(d2, _0) / _most(f2, _DAMP), _1)
+        b0, b1, b2 = _triple(w, _SATURATED, j)
+        nx, ny, nz = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, b0, b1, b2)
+        px, py = w[_NORMAL * _B + j], w[(_NORMAL + 1) * _B + j]
+        on = warm * (k0 + k1 + k2) > _single(2.5)
+        pz = -sqrt(_most(_1 - px * px - py * py, _TINY))
+        _put(w, _NORMAL, j, (px if on else nx, py if on else ny, pz if on else nz))
+        _put(w, _LIGHT, j, l0)
+        _put(w, _LIGHT + 3, j, l1)
+        _put(w, _LIGHT + 6, j, l2)
+        _put(w, _VIEW, j, v)
+
+
+@_whole
+def _step_block(w, dark, curves, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Do one Gauss-Newton step at a block's nodes; return the square of the longest."""
+    for j in range(_B):
+        n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
+        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, bounce, n[2], shadows)
+        s0, s1, s2 = _triple(w, _SCALED, j)
+        g0, g1, g2 = _triple(w, _NOISE, j)
+        b0, b1, b2 = _0, _0, _0
+        if bounce is not None:
+            half = bounce * _HALF
+            a0, a1, a2 = _triple(w, _AROUND, j)
+            b0, b1, b2 = half * a0 * s0, half * a1 * s1, half * a2 * s2
+        f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], gloss)
+        a11, a12, a22, ag1, ag2 = _pull(f, gx, gy, gz, n, t0, s0, g0, k0, b0)
+        f, gx, gy, gz = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], gloss)
+        b11, b12, b22, bg1, bg2 = _pull(f, gx, gy, gz, n, t1, s1, g1, k1, b1)
+        f, gx, gy, gz = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], gloss)
+        c11, c12, c22, cg1, cg2 = _pull(f, gx, gy, gz, n, t2, s2, g2, k2, b2)
+        m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
+        h1, h2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
+        damp = _DAMP * (m11 + m22) + _TINY
+        m11, m22 = m11 + damp, m22 + damp
+        short = _1 / (m11 * m22 - m12 * m12)
+        m1, m2 = (m22 * h1 - m12 * h2) * short, (m11 * h2 - m12 * h1) * short
+        dx, dy, dz = -n[2] * m1, -n[2] * m2, n[0] * m1 + n[1] * m2
+        move = dx * dx + dy * dy + dz * dz + _TINY
+        held = _least(_LONGEST / sqrt(move), _1)
+        nx, ny, nz = _limited(n[0] + held * dx, n[1] + held * dy, n[2] + held * dz)
+        # What moved in earnest: a normal at the steepest that can be seen is pulled for ever.
+        move = (nx - n[0]) * (nx - n[0]) + (ny - n[1]) * (ny - n[1])
+        solved = (w[_KIND * _B + j] > _single(1.5)) & (k0 + k1 + k2 > _single(1.5))
+        w[_MOVED * _B + j] = move if solved else _0
+        _put(w, _NORMAL, j, (nx, ny, nz))
+    longest = _0
+    for j in range(_B):
+        longest = _most(longest, w[_MOVED * _B + j])
+    return longest
+
+
+@_whole
+def _end_block(w, drift, dark, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Turn a block's normals into slopes along the rays, their weights and their flags."""
+    for j in range(_B):
+        d, at = w[_DEPTH * _B + j], _single(j)
+        wx, wy = drift[0] + at * drift[1], drift[2] + at * drift[3]
+        n = _triple(w, _NORMAL, j)
         # What is dark is judged with the light from around that the normal found receives.
-        _, lit0, k0 = _told(
-            w[j], w[9 * _B + j], w[6 * _B + j], w[13 * _B + j], s0, dark[0], bounce, n[2], shadows
-        )
-        _, lit1, k1 = _told(
-            w[_B + j],
-            w[10 * _B + j],
-            w[7 * _B + j],
-            w[14 * _B + j],
-            s1,
-            dark[1],
-            bounce,
-            n[2],
-            shadows,
-        )
-        _, lit2, k2 = _told(
-            w[2 * _B + j],
-            w[11 * _B + j],
-            w[8 * _B + j],
-            w[15 * _B + j],
-            s2,
-            dark[2],
-            bounce,
-            n[2],
-            shadows,
-        )
+        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, bounce, n[2], shadows)
         known = k0 + k1 + k2
         solved = known > _single(1.5)
         nx, ny, nz = n[0] if solved else _0, n[1] if solved else _0, n[2] if solved else -_1
@@ -358,21 +349,21 @@ def solve_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, 
             -(nx * d * (drift[8] + at * drift[9]) + ny * (_1 + d * (drift[10] + at * drift[11])))
             * along
         )
-        saturated = w[13 * _B + j] + w[14 * _B + j] + w[15 * _B + j] > _0
+        b0, b1, b2 = _triple(w, _SATURATED, j)
         unlit = lit0 * lit1 * lit2 < _HALF
         flag = (
             (_F_HIDDEN if hidden else _0)
-            + (_F_SATURATED if saturated else _0)
+            + (_F_SATURATED if b0 + b1 + b2 > _0 else _0)
             + (_F_DARK if unlit else _0)
         )
-        kind = w[16 * _B + j]
+        kind = w[_KIND * _B + j]
         usable = kind > _single(1.5)
-        w[17 * _B + j] = slope_x if usable else _0
-        w[18 * _B + j] = slope_y if usable else _0
-        w[19 * _B + j] = trust if usable else (_UNSOLVED if kind > _HALF else _1)
-        w[20 * _B + j] = flag if usable else _F_OUTSIDE
-        w[21 * _B + j] = nx if usable else _0
-        w[22 * _B + j] = ny if usable else _0
+        w[_SLOPE * _B + j] = slope_x if usable else _0
+        w[(_SLOPE + 1) * _B + j] = slope_y if usable else _0
+        w[_TRUST * _B + j] = trust if usable else (_UNSOLVED if kind > _HALF else _1)
+        w[_FLAG * _B + j] = flag if usable else _F_OUTSIDE
+        w[_NORMAL * _B + j] = nx if usable else _0
+        w[(_NORMAL + 1) * _B + j] = ny if usable else _0
 
 
 @_part
@@ -418,7 +409,7 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     gloss,
     bounce,
     shadows,
-    normals,
+    warm,
     slope_x,
     slope_y,
     weight,
@@ -428,11 +419,13 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 ):
     """Solve rows `first` to `last` of a region whose corner in the static maps is `corner`.
 
-    Normals are written where they are wanted.
+    A `warm` start goes on from the normals that stand in `normal_x` and `normal_y`.
     `static` (12, rows, columns): 3 scales, 3 noises, drift x, y, and its four derivatives.
     """
     columns = depth.shape[1]
-    w = np.zeros(23 * _B, np.float32)
+    w = np.zeros(_PLANES * _B, np.float32)
+    begun = _1 if warm else _0
+    pitch = _single(pitch_mm)
     for i in range(first, last):
         y = _single(origin_mm[1] + pitch_mm * (i + corner[0]))
         for begin in range(0, columns, _B):
@@ -442,35 +435,49 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             # Plain indices: a view of a row is counted, and threads would wait for the counter.
             for k in range(3):
                 for j in range(count):
-                    w[k * _B + j] = ratio[k, i, begin + j]
+                    w[(_RATIO + k) * _B + j] = ratio[k, i, begin + j]
                 if bounce is not None:
                     for j in range(count):
-                        w[(9 + k) * _B + j] = around[k, i, begin + j]
+                        w[(_AROUND + k) * _B + j] = around[k, i, begin + j]
             for j in range(count):
-                w[12 * _B + j] = depth[i, begin + j]
-            for k in range(6):
+                w[_DEPTH * _B + j] = depth[i, begin + j]
+            for k in range(3):
                 for j in range(count):
-                    w[(3 + k) * _B + j] = static[k, row, place + j]
+                    w[(_SCALE + k) * _B + j] = static[k, row, place + j]
+                for j in range(count):
+                    w[(_NOISE + k) * _B + j] = static[3 + k, row, place + j]
             for j in range(count):
                 bits = saturated[i, begin + j]
-                w[13 * _B + j] = _single(bits & 1)
-                w[14 * _B + j] = _single((bits >> 1) & 1)
-                w[15 * _B + j] = _single((bits >> 2) & 1)
-                w[16 * _B + j] = _single(kind[row, place + j])
+                w[_SATURATED * _B + j] = _single(bits & 1)
+                w[(_SATURATED + 1) * _B + j] = _single((bits >> 1) & 1)
+                w[(_SATURATED + 2) * _B + j] = _single((bits >> 2) & 1)
+                w[_KIND * _B + j] = _single(kind[row, place + j])
+            if warm:
+                for j in range(count):
+                    w[_NORMAL * _B + j] = normal_x[i, begin + j]
+                for j in range(count):
+                    w[(_NORMAL + 1) * _B + j] = normal_y[i, begin + j]
+            # What is left of a block that went before must not decide how many steps are done.
+            for j in range(count, _B):
+                w[_KIND * _B + j] = _0
             x_first = _single(origin_mm[0] + pitch_mm * place)
             drift = _ramps(static, row, place, count)
-            pitch = _single(pitch_mm)
-            solve_block(w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows)
+            _begin_block(
+                w, drift, y, x_first, pitch, leds, dark, curves, gloss, bounce, shadows, begun
+            )
+            for _ in range(MOST_STEPS):
+                if _step_block(w, dark, curves, gloss, bounce, shadows) < _SETTLED:
+                    break
+            _end_block(w, drift, dark, bounce, shadows)
             for j in range(count):
-                slope_x[i, begin + j] = w[17 * _B + j]
+                slope_x[i, begin + j] = w[_SLOPE * _B + j]
             for j in range(count):
-                slope_y[i, begin + j] = w[18 * _B + j]
+                slope_y[i, begin + j] = w[(_SLOPE + 1) * _B + j]
             for j in range(count):
-                weight[i, begin + j] = w[19 * _B + j]
-            if normals:
-                for j in range(count):
-                    normal_x[i, begin + j] = w[21 * _B + j]
-                for j in range(count):
-                    normal_y[i, begin + j] = w[22 * _B + j]
+                weight[i, begin + j] = w[_TRUST * _B + j]
             for j in range(count):
-                flags[i, begin + j] = np.uint8(w[20 * _B + j])
+                normal_x[i, begin + j] = w[_NORMAL * _B + j]
+            for j in range(count):
+                normal_y[i, begin + j] = w[(_NORMAL + 1) * _B + j]
+            for j in range(count):
+                flags[i, begin + j] = np.uint8(w[_FLAG * _B + j])

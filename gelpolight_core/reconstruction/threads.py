@@ -41,4 +41,6 @@ class RowWorkers:
         others = [self._pool.submit(work) for _ in range(self.count - 1)]
         work()
         for other in others:
-            other.result()
+            # One that has not begun by now finds nothing left to do, and need not be waited for.
+            if not other.cancel():
+                other.result()

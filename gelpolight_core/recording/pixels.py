@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
-
 import numba
 import numpy as np
 from isal import isal_zlib
@@ -48,10 +46,10 @@ def unpack_strip(data: bytes, rgb: Rgb) -> bool:
     rgb : (rows, columns, 3) uint8 or uint16
         Written to; contiguous.
     """
-    unpacker = zlib.decompressobj()
+    unpacker = isal_zlib.decompressobj()
     try:
         content = unpacker.decompress(data, rgb.nbytes + 1)
-    except zlib.error:
+    except isal_zlib.error:
         return False
     if len(content) != rgb.nbytes or not unpacker.eof or unpacker.unused_data:
         return False
