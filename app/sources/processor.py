@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from app.sources.mailbox import Mailbox
+from app.sources.priority import PROCESSING, give_way
 from app.sources.source import Frame
 from app.sources.stopping import join
 from gelpolight_core.errors import InputError
@@ -145,6 +146,7 @@ class Processor(Generic[T]):
         return ProcessorFigures(rate, spent[-1], statistics.median(spent))
 
     def _run(self, end: threading.Event) -> None:
+        give_way(PROCESSING)
         while not end.is_set():
             frame = self._inbox.take(_POLL_S)
             if frame is None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.bench import BOARDS, PRESSED, Bench, Scene
+from app.sources.priority import RENDERING, give_way
 from app.sources.stopping import join
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.boards import BoardPose, board_on_top
@@ -104,6 +105,7 @@ class Renderer:
         join(self._thread)
 
     def _run(self) -> None:
+        give_way(RENDERING)
         try:
             makers = _Makers(self._bench)
             done: Scene | None = None
