@@ -5,12 +5,27 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+_whole = njit(cache=True, nogil=True, fastmath={"nsz", "contract", "reassoc"})
 
-@njit(cache=True, nogil=True)
-def _clean(source, target, limit):  # type: ignore[no-untyped-def]
+
+@_whole
+def _sound(source, limit):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return whether all slopes of a line are finite and none is too steep."""
+    sound = source.dtype.type(0)
+    one, none = source.dtype.type(1), source.dtype.type(0)
+    for column in range(source.shape[0]):
+        sound += one if abs(source[column]) <= limit else none
+    return sound == source.shape[0]
+
+
+@_whole
+def _clean(source, target, limit):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Copy a line of slopes, non-finite ones as 0, steep ones clipped; count both."""
-    bad = np.int32(0)
-    clipped = np.int32(0)
+    bad, clipped = 0, 0
+    if _sound(source, limit):
+        for column in range(source.shape[0]):
+            target[column] = source[column]
+        return bad, clipped
     for column in range(source.shape[0]):
         value = source[column]
         finite = value - value == 0
@@ -20,26 +35,17 @@ def _clean(source, target, limit):  # type: ignore[no-untyped-def]
     return bad, clipped
 
 
-@njit(cache=True, nogil=True)
-def _faults(source, limit):  # type: ignore[no-untyped-def]
-    """Count what is not finite and what is too steep in a line of slopes."""
-    bad = np.int32(0)
-    clipped = np.int32(0)
-    for column in range(source.shape[0]):
-        value = source[column]
-        finite = value - value == 0
-        bad += not finite
-        clipped += finite and abs(value) > limit
-    return bad, clipped
-
-
-@njit(cache=True, nogil=True)
-def _add_along_row(slope, start, weights, left, target):  # type: ignore[no-untyped-def]
+@_whole
+def _add_along_row(slope, start, weights, left, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Add the x part of the divergence of one line of slopes to one padded line."""
     columns = slope.shape[0]
     inner = max(columns - 4, 0)
-    for column in range(max(left - 1, 0), min(left + columns + 1, target.shape[0])):
-        if left + 2 <= column < left + 2 + inner:
+    end = min(left + columns + 1, target.shape[0])
+    before = min(left + 2, end)
+    for at in range(end - inner):
+        # The few next to the border, on both sides of the inner ones.
+        column = at if at < before else at + inner
+        if column < left - 1:
             continue
         for tap in range(min(columns, 5)):
             target[column] += weights[column, tap] * slope[start[column] + tap]
@@ -53,8 +59,8 @@ def _add_along_row(slope, start, weights, left, target):  # type: ignore[no-unty
             )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
-def divergence_rows(  # type: ignore[no-untyped-def]
+@_whole
+def divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     first,
     last,
     slope_x,
@@ -78,16 +84,20 @@ def divergence_rows(  # type: ignore[no-untyped-def]
     ring = np.zeros((5, columns), slope_x.dtype)
     line_x = np.empty(columns, slope_x.dtype)
     loaded = -1
+    faults[first:last] = 0
     for line in range(first, last):
         field[line] = 0
-        faults[line] = 0
         if not (top - 1 <= line <= top + rows):
             continue
         begin = start_y[line]
         if loaded < 0:
             loaded = begin
         while loaded < min(begin + 5, rows):
-            _clean(slope_y[loaded], ring[loaded % 5], limit)
+            bad, clipped = _clean(slope_y[loaded], ring[loaded % 5], limit)
+            # What is read by two threads is counted by one.
+            if first <= loaded + top < last:
+                faults[loaded + top, 0] += bad
+                faults[loaded + top, 1] += clipped
             loaded += 1
         a, b, c, d, e = weight_y[line]
         r0, r1, r2 = ring[begin % 5], ring[(begin + 1) % 5], ring[(begin + 2) % 5]
@@ -97,6 +107,6 @@ def divergence_rows(  # type: ignore[no-untyped-def]
             target[k] = a * r0[k] + b * r1[k] + c * r2[k] + d * r3[k] + e * r4[k]
         if top <= line < top + rows:
             bad, clipped = _clean(slope_x[line - top], line_x, limit)
+            faults[line, 0] += bad
+            faults[line, 1] += clipped
             _add_along_row(line_x, start_x, weight_x, left, field[line])
-            more = _faults(slope_y[line - top], limit)
-            faults[line, 0], faults[line, 1] = bad + more[0], clipped + more[1]

@@ -27,12 +27,13 @@ from gelpolight_core.reconstruction.live_maps import CURVE_ERROR
 from gelpolight_core.reconstruction.normals import (
     ShadingMaps,
     SlopeField,
+    SlopeSolver,
     normals_from_slopes,
-    solve_slopes,
 )
 from gelpolight_core.reconstruction.plan import EFFORTS, Plan, PlanStep
 from gelpolight_core.reconstruction.poisson import PoissonSolver
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.translation import tr
 
 Notes = tuple[str, ...]
@@ -103,6 +104,10 @@ class Reconstructor:
         return shading_maps(self.calibration)
 
     @cached_property
+    def _slope_solver(self) -> SlopeSolver:
+        return SlopeSolver(self.maps, RowWorkers(self.workers))
+
+    @cached_property
     def solver(self) -> PoissonSolver:
         """The paper's integration on the calibration's grid."""
         grid = self.calibration.table.grid
@@ -153,10 +158,7 @@ class Reconstructor:
             If the frame is not of the calibration's size, not in colour, or holds other numbers
             than :meth:`depth` takes.
         """
-        return self._slopes(self._accepted(frame, name))
-
-    def _slopes(self, frame: NDArray[Any]) -> SlopeField:
-        return solve_slopes(self.linearise(frame), self.maps, workers=self.workers)
+        return self._slope_solver.solve(self.linearise(self._accepted(frame, name)))
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
         """Return a frame with the camera's response undone; floats are linear light already."""
@@ -197,7 +199,7 @@ class Reconstructor:
             if why is None:
                 return self._depth_live(frame, name, normals, notes)
             return self._depth_full(frame, name, normals, uncertainty, why, notes)
-        field = self._slopes(frame)
+        field = self._slope_solver.solve(self.linearise(frame), length_error=False)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
