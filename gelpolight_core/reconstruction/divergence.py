@@ -60,6 +60,14 @@ def _add_along_row(slope, start, weights, left, target):  # type: ignore[no-unty
 
 
 @_whole
+def _add_down(r0, r1, r2, r3, r4, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the y part of the divergence of one line, from five lines of slopes."""
+    a, b, c, d, e = weights
+    for k in range(target.shape[0]):
+        target[k] += a * r0[k] + b * r1[k] + c * r2[k] + d * r3[k] + e * r4[k]
+
+
+@_whole
 def divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     first,
     last,
@@ -99,12 +107,15 @@ def divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
                 faults[loaded + top, 0] += bad
                 faults[loaded + top, 1] += clipped
             loaded += 1
-        a, b, c, d, e = weight_y[line]
-        r0, r1, r2 = ring[begin % 5], ring[(begin + 1) % 5], ring[(begin + 2) % 5]
-        r3, r4 = ring[(begin + 3) % 5], ring[(begin + 4) % 5]
-        target = field[line, left : left + columns]
-        for k in range(columns):
-            target[k] = a * r0[k] + b * r1[k] + c * r2[k] + d * r3[k] + e * r4[k]
+        _add_down(
+            ring[begin % 5],
+            ring[(begin + 1) % 5],
+            ring[(begin + 2) % 5],
+            ring[(begin + 3) % 5],
+            ring[(begin + 4) % 5],
+            weight_y[line],
+            field[line][left : left + columns],
+        )
         if top <= line < top + rows:
             bad, clipped = _clean(slope_x[line - top], line_x, limit)
             faults[line, 0] += bad

@@ -130,7 +130,7 @@ class SlopeSolver:
                 self._shape[0],
                 solve_rows,
                 raw.reshape(-1, 3),
-                self._pairs(raw) if raw.dtype == np.uint8 else None,
+                self._pairs(raw) if raw.dtype == np.uint8 and width > 1 else None,
                 (width, height),
                 np.float32(SATURATED) * full_scale,
                 self._static,

@@ -26,6 +26,7 @@ _single, _int = np.float32, np.int32
 _0, _1 = _single(0.0), _single(1.0)
 _LEAST_NZ = _single(1.0 / SLOPE_LIMIT)
 _DARK = _single(DARK_COSINE)
+_OUTSIDE = np.uint8(Flag.OUTSIDE)
 _F_OUTSIDE, _F_SATURATED = _single(Flag.OUTSIDE), _single(Flag.SATURATED)
 _F_DARK, _F_FAR = _single(Flag.DARK), _single(Flag.EXTRAPOLATED)
 _F_HIDDEN, _F_INVALID = _single(Flag.NOT_OBSERVABLE), _single(Flag.INVALID)
@@ -314,3 +315,11 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                 _put(w, _OUT + 3, length_error, i, begin, count)
             for j in range(count):
                 flags[i, begin + j] = np.uint8(_int(w[(_OUT + 2) * _B + j]))
+
+
+@_whole
+def blank_rows(first, last, flags, depth):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Set the depth of rows `first` to `last` to 0 where there is no membrane."""
+    for i in range(first, last):
+        for j in range(depth.shape[1]):
+            depth[i, j] = _0 if flags[i, j] & _OUTSIDE else depth[i, j]

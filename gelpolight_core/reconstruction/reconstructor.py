@@ -21,7 +21,7 @@ from gelpolight_core.reconstruction.acceptance import (
     unsolved_note,
 )
 from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.reconstruction.live import LiveSolver
 from gelpolight_core.reconstruction.live_maps import CURVE_ERROR
 from gelpolight_core.reconstruction.normals import (
@@ -30,6 +30,7 @@ from gelpolight_core.reconstruction.normals import (
     SlopeSolver,
     normals_from_slopes,
 )
+from gelpolight_core.reconstruction.paper_kernel import blank_rows
 from gelpolight_core.reconstruction.plan import EFFORTS, Plan, PlanStep
 from gelpolight_core.reconstruction.poisson import PoissonSolver
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
@@ -104,8 +105,12 @@ class Reconstructor:
         return shading_maps(self.calibration)
 
     @cached_property
+    def _threads(self) -> RowWorkers:
+        return RowWorkers(self.workers)
+
+    @cached_property
     def _slope_solver(self) -> SlopeSolver:
-        return SlopeSolver(self.maps, RowWorkers(self.workers))
+        return SlopeSolver(self.maps, self._threads)
 
     @cached_property
     def solver(self) -> PoissonSolver:
@@ -201,7 +206,7 @@ class Reconstructor:
             return self._depth_full(frame, name, normals, uncertainty, why, notes)
         field = self._slope_solver.solve(self.linearise(frame), length_error=False)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
-        depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
+        self._threads.run(len(depth_mm), blank_rows, field.flags, depth_mm)
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         heightmap = self._heightmap(depth_mm, shown, field.flags, name, notes)
