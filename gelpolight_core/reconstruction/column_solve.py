@@ -7,19 +7,20 @@ transforms along the columns, and any number of rows costs alike.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 BLOCK = 64
-# exp(-2 * 12) is below what single precision can tell apart, for double precision see `settled`.
+# In decay lengths: what is left, exp(-2 * 12) and exp(-2 * 20), is below the rounding.
 _SETTLED = {np.dtype(np.float32): 12.0, np.dtype(np.float64): 20.0}
 
 _whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
 
 
-def settled_rows(
-    waves: np.ndarray[tuple[int], np.dtype[np.float64]], rows: int, dtype: np.dtype[np.generic]
-) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def settled_rows(waves: NDArray[np.float64], rows: int, dtype: np.dtype[Any]) -> NDArray[np.int64]:
     """Return, for each block of waves, after how many rows its elimination no longer changes.
 
     Parameters
@@ -36,7 +37,7 @@ def settled_rows(
     decay = 2.0 * np.arcsinh(0.5 * np.sqrt(lowest))
     reach = np.full(lowest.size, float(rows))
     np.divide(_SETTLED[dtype], decay, out=reach, where=decay > _SETTLED[dtype] / rows)
-    return np.ceil(reach).astype(np.int64)
+    return np.asarray(np.ceil(reach), np.int64)
 
 
 @_whole

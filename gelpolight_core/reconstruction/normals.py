@@ -189,8 +189,9 @@ def _blocks(maps: ShadingMaps) -> tuple[Map, NDArray[np.bool_]]:
     planes[:2, :, :columns] = np.where(usable, np.stack([maps.u_px, maps.v_px]), 0.0)
     planes[2:, :, :columns] = np.where(usable, np.moveaxis(maps.gain, 2, 0), 0.0)
     parted = planes.reshape(STATIC_PLANES, rows, count, BLOCK).transpose(1, 2, 0, 3)
-    lit = (parted[:, :, 2] > 0.0).any(axis=2)
-    return np.ascontiguousarray(parted).reshape(rows, count, STATIC_PLANES * BLOCK), lit
+    lit = np.asarray((parted[:, :, 2] > 0.0).any(axis=2), np.bool_)
+    static = np.ascontiguousarray(parted, np.float32)
+    return static.reshape(rows, count, STATIC_PLANES * BLOCK), lit
 
 
 def _steps(lookup: Map) -> NDArray[np.uint64]:

@@ -109,7 +109,8 @@ class Reconstructor:
         return RowWorkers(self.workers)
 
     @cached_property
-    def _slope_solver(self) -> SlopeSolver:
+    def slope_solver(self) -> SlopeSolver:
+        """The paper's fused pass on the calibration's maps."""
         return SlopeSolver(self.maps, self._threads)
 
     @cached_property
@@ -163,7 +164,7 @@ class Reconstructor:
             If the frame is not of the calibration's size, not in colour, or holds other numbers
             than :meth:`depth` takes.
         """
-        return self._slope_solver.solve(self.linearise(self._accepted(frame, name)))
+        return self.slope_solver.solve(self.linearise(self._accepted(frame, name)))
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
         """Return a frame with the camera's response undone; floats are linear light already."""
@@ -204,7 +205,7 @@ class Reconstructor:
             if why is None:
                 return self._depth_live(frame, name, normals, notes)
             return self._depth_full(frame, name, normals, uncertainty, why, notes)
-        field = self._slope_solver.solve(self.linearise(frame), length_error=False)
+        field = self.slope_solver.solve(self.linearise(frame), length_error=False)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
         self._threads.run(len(depth_mm), blank_rows, field.flags, depth_mm)
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
