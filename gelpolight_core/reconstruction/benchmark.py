@@ -166,13 +166,14 @@ def _planned_steps(plans: list[Plan]) -> list[Timing]:
 def _paper_steps(reconstructor: Reconstructor, frame: NDArray[Any]) -> Steps:
     """Return the paper's model step by step, each with the bytes that it touches."""
     maps, solver = reconstructor.maps, reconstructor.solver
-    field = reconstructor.slopes(frame)
+    slopes = reconstructor.slope_solver
+    field = slopes.solve(frame)
     slope_bytes = field.slope_x.nbytes + field.slope_y.nbytes
     read = frame.nbytes + maps.u_px.nbytes + maps.v_px.nbytes + maps.gain.nbytes
     return {
         "resampling and normals": (
-            lambda: reconstructor.slopes(frame),
-            read + slope_bytes + field.flags.nbytes + field.length_error.nbytes,
+            lambda: slopes.solve(frame, length_error=False),
+            read + slope_bytes + field.flags.nbytes,
         ),
         "integration": (
             lambda: solver.integrate(field.slope_x, field.slope_y),

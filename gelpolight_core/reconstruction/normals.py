@@ -1,34 +1,30 @@
 """Normals of the membrane from one picture: the paper's model (Eq. 10), in one fused pass.
 
-Resampling, division by light and factor, the reflectance table and the 3x3 solve are done pixel
-by pixel, so that each byte of the picture is read once. Lights are frozen at the flat membrane.
+Resampling, division by light and factor, the reflectance table and the 3x3 solve are done block by
+block of nodes, so that each byte of the picture is read once. Lights are frozen at the flat
+membrane.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
+from threading import Lock
 from typing import Any
 
-import numba
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.heightmap import Flag
-from gelpolight_core.reconstruction.poisson import SLOPE_LIMIT
+from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.paper_kernel import (
+    BLOCK,
+    SATURATED,
+    STATIC_PLANES,
+    solve_rows,
+)
+from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
-SATURATED = 0.995
-DARK_COSINE = 0.03
-
-
-_OUTSIDE = int(Flag.OUTSIDE)
-_SATURATED = int(Flag.SATURATED)
-_DARK = int(Flag.DARK)
-_EXTRAPOLATED = int(Flag.EXTRAPOLATED)
-_NOT_OBSERVABLE = int(Flag.NOT_OBSERVABLE)
-_INVALID = int(Flag.INVALID)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +71,8 @@ class SlopeField:
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     length_error : (rows, columns) float32
-        | |n| - 1 | of the solved normal, a check that costs nothing; 0 outside.
+        | |n| - 1 | of the solved normal, a check that costs little; 0 outside. Of no size where
+        nobody asked for it.
     """
 
     slope_x: Map
@@ -84,8 +81,89 @@ class SlopeField:
     length_error: Map
 
 
+class SlopeSolver:
+    """Solves Eq. (10) for pictures of one sensor; what does not change is made ready once.
+
+    It may be called from several threads, which then wait for each other.
+
+    Parameters
+    ----------
+    maps : ShadingMaps
+        The calibration.
+    workers : RowWorkers
+        Threads; each takes blocks of rows, so that the result does not depend on their number.
+    """
+
+    def __init__(self, maps: ShadingMaps, workers: RowWorkers) -> None:
+        self._shape = maps.u_px.shape
+        self._static, self._lit = _blocks(maps)
+        self._table = _steps(maps.lookup)
+        self._scale = maps.lookup_scale
+        self._coverage = tuple((low, high) for low, high in maps.coverage)
+        self._leds = tuple(tuple(led) for led in maps.leds_mm)
+        self._x_first = float(maps.x_mm[0])
+        self._pitch = float(maps.x_mm[-1] - maps.x_mm[0]) / max(maps.x_mm.size - 1, 1)
+        self._y_mm = maps.y_mm
+        self._workers = workers
+        self._take = Buffers().take
+        self._lock = Lock()
+
+    def solve(self, raw: NDArray[Any], *, length_error: bool = True) -> SlopeField:
+        """Return the slopes of the depth.
+
+        Parameters
+        ----------
+        raw : (height, width, 3) uint8, uint16 or float32
+            Raw picture in RGB order; float pictures are 0..1.
+        length_error : bool, optional
+            Whether it is wanted.
+        """
+        height, width = raw.shape[:2]
+        # Compiled code is made anew for an array that must not be written to.
+        raw = np.require(raw, requirements=["C", "W"])
+        full_scale = np.float32(1.0 if raw.dtype.kind == "f" else np.iinfo(raw.dtype).max)
+        slope_x, slope_y = np.empty(self._shape, np.float32), np.empty(self._shape, np.float32)
+        flags = np.empty(self._shape, np.uint8)
+        length = np.empty(self._shape if length_error else (0, 0), np.float32)
+        with self._lock:
+            self._workers.run(
+                self._shape[0],
+                solve_rows,
+                raw.reshape(-1, 3),
+                self._pairs(raw) if raw.dtype == np.uint8 and width > 1 else None,
+                (width, height),
+                np.float32(SATURATED) * full_scale,
+                self._static,
+                self._lit,
+                self._table,
+                tuple(self._scale / full_scale),
+                self._coverage,
+                self._leds,
+                self._x_first,
+                self._pitch,
+                self._y_mm,
+                length_error,
+                slope_x,
+                slope_y,
+                flags,
+                length,
+            )
+        return SlopeField(slope_x, slope_y, flags, length)
+
+    def _pairs(self, raw: NDArray[np.uint8]) -> NDArray[np.uint64]:
+        """Return (pixels,): of each pixel its three bytes and those of its right neighbour.
+
+        The words overlap, as each neighbour has its own.
+        """
+        height, width = raw.shape[:2]
+        words = self._take("words", (height * width + 1,), np.uint32)
+        pixels = words[:-1].view(np.uint8).reshape(height, width, 4)
+        cv2.cvtColor(raw, cv2.COLOR_RGB2RGBA, dst=pixels)
+        return np.ndarray((height * width,), np.uint64, words, strides=(4,))
+
+
 def solve_slopes(raw: NDArray[Any], maps: ShadingMaps, *, workers: int = 1) -> SlopeField:
-    """Solve Eq. (10) for every node and return the slopes of the depth.
+    """Solve one picture; for many of one sensor make a :class:`SlopeSolver`.
 
     Parameters
     ----------
@@ -94,41 +172,34 @@ def solve_slopes(raw: NDArray[Any], maps: ShadingMaps, *, workers: int = 1) -> S
     maps : ShadingMaps
         The calibration.
     workers : int, optional
-        Threads; each takes a block of rows, so that the result does not depend on their number.
+        Threads.
     """
-    shape = maps.u_px.shape
-    slope_x, slope_y, length = (np.zeros(shape, dtype=np.float32) for _ in range(3))
-    flags = np.zeros(shape, dtype=np.uint8)
-    full_scale = np.float32(1.0 if raw.dtype.kind == "f" else np.iinfo(raw.dtype).max)
-    raw = np.ascontiguousarray(raw)
+    return SlopeSolver(maps, RowWorkers(workers)).solve(raw)
 
-    def solve(rows: slice) -> None:
-        _solve(
-            raw,
-            np.float32(1.0) / full_scale,
-            maps.u_px[rows],
-            maps.v_px[rows],
-            maps.gain[rows],
-            maps.lookup,
-            maps.lookup_scale,
-            maps.coverage,
-            maps.leds_mm,
-            maps.x_mm,
-            maps.y_mm[rows],
-            slope_x[rows],
-            slope_y[rows],
-            flags[rows],
-            length[rows],
-        )
 
-    edges = np.linspace(0, shape[0], max(workers, 1) + 1).astype(int)
-    blocks = [slice(int(a), int(b)) for a, b in pairwise(edges)]
-    if len(blocks) == 1:
-        solve(blocks[0])
-    else:
-        with ThreadPoolExecutor(len(blocks)) as pool:
-            list(pool.map(solve, blocks))
-    return SlopeField(slope_x, slope_y, flags, length)
+def _blocks(maps: ShadingMaps) -> tuple[Map, NDArray[np.bool_]]:
+    """Return pixels and gains, block by block, and which blocks have any node of use.
+
+    Nodes of no use have gain 0.
+    """
+    rows, columns = maps.u_px.shape
+    count = -(-columns // BLOCK)
+    usable = (maps.gain > 0.0).all(axis=2) & (maps.u_px >= 0.0) & (maps.v_px >= 0.0)
+    planes = np.zeros((STATIC_PLANES, rows, count * BLOCK), np.float32)
+    planes[:2, :, :columns] = np.where(usable, np.stack([maps.u_px, maps.v_px]), 0.0)
+    planes[2:, :, :columns] = np.where(usable, np.moveaxis(maps.gain, 2, 0), 0.0)
+    parted = planes.reshape(STATIC_PLANES, rows, count, BLOCK).transpose(1, 2, 0, 3)
+    lit = np.asarray((parted[:, :, 2] > 0.0).any(axis=2), np.bool_)
+    static = np.ascontiguousarray(parted, np.float32)
+    return static.reshape(rows, count, STATIC_PLANES * BLOCK), lit
+
+
+def _steps(lookup: Map) -> NDArray[np.uint64]:
+    """Return (3 * size,): of each entry its cosine and the step to the next, half a word each."""
+    both = np.zeros((*lookup.shape, 2), np.float32)
+    both[..., 0] = lookup
+    both[:, :-1, 1] = np.diff(lookup, axis=1)
+    return both.view(np.uint64).ravel()
 
 
 def normals_from_slopes(slope_x: Map, slope_y: Map) -> Map:
@@ -139,93 +210,3 @@ def normals_from_slopes(slope_x: Map, slope_y: Map) -> Map:
     normals[..., 1] = slope_y * scale
     normals[..., 2] = scale
     return normals
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})
-def _solve(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    raw,
-    step,
-    u_px,
-    v_px,
-    gain,
-    lookup,
-    lookup_scale,
-    coverage,
-    leds,
-    x_mm,
-    y_mm,
-    slope_x,
-    slope_y,
-    flags,
-    length,
-):
-    height, width = raw.shape[0], raw.shape[1]
-    last = lookup.shape[1] - 1
-    cosine = np.empty(3, np.float32)
-    for i in range(u_px.shape[0]):
-        for j in range(u_px.shape[1]):
-            u, v = u_px[i, j], v_px[i, j]
-            if gain[i, j, 0] <= 0.0 or not (u >= 0.0 and v >= 0.0):
-                flags[i, j] = _OUTSIDE
-                continue
-            c, r = int(u), int(v)
-            c1, r1 = min(c + 1, width - 1), min(r + 1, height - 1)
-            fu, fv = u - np.float32(c), v - np.float32(r)
-            flag = 0
-            for k in range(3):
-                a, b = np.float32(raw[r, c, k]), np.float32(raw[r, c1, k])
-                d, e = np.float32(raw[r1, c, k]), np.float32(raw[r1, c1, k])
-                top, bottom = a + fu * (b - a), d + fu * (e - d)
-                value = (top + fv * (bottom - top)) * step
-                if max(max(a, b), max(d, e)) * step >= SATURATED:
-                    flag |= _SATURATED
-                place = value * gain[i, j, k] * lookup_scale[k]
-                if not (place >= 0.0):
-                    place = np.float32(0.0)
-                    flag |= _INVALID
-                if place >= last:
-                    cosine[k] = lookup[k, last]
-                    if place > last:
-                        flag |= _EXTRAPOLATED
-                else:
-                    n = int(place)
-                    cosine[k] = lookup[k, n] + (place - np.float32(n)) * (
-                        lookup[k, n + 1] - lookup[k, n]
-                    )
-                if cosine[k] < DARK_COSINE:
-                    flag |= _DARK
-                elif cosine[k] < coverage[k, 0] or cosine[k] > coverage[k, 1]:
-                    flag |= _EXTRAPOLATED
-            nx, ny, nz = _normal(cosine, leds, x_mm[j], y_mm[i])
-            size = np.sqrt(nx * nx + ny * ny + nz * nz)
-            length[i, j] = abs(size - np.float32(1.0))
-            least = size / np.float32(SLOPE_LIMIT)
-            if not (nz < -least):
-                flag |= _NOT_OBSERVABLE
-                nz = -least
-            if size > 0.0:
-                slope_x[i, j] = nx / nz
-                slope_y[i, j] = ny / nz
-            else:
-                flag |= _INVALID
-            flags[i, j] = flag
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def _normal(cosine, leds, x, y):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Solve [l1; l2; l3] n = c by cross products; l_k point from (x, y, 0) to the LEDs."""
-    ax, ay, az = leds[0, 0] - x, leds[0, 1] - y, leds[0, 2]
-    bx, by, bz = leds[1, 0] - x, leds[1, 1] - y, leds[1, 2]
-    cx, cy, cz = leds[2, 0] - x, leds[2, 1] - y, leds[2, 2]
-    ca = cosine[0] * np.sqrt(ax * ax + ay * ay + az * az)
-    cb = cosine[1] * np.sqrt(bx * bx + by * by + bz * bz)
-    cc = cosine[2] * np.sqrt(cx * cx + cy * cy + cz * cz)
-    px, py, pz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    qx, qy, qz = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
-    rx, ry, rz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    inverse = np.float32(1.0) / (ax * px + ay * py + az * pz)
-    return (
-        (ca * px + cb * qx + cc * rx) * inverse,
-        (ca * py + cb * qy + cc * ry) * inverse,
-        (ca * pz + cb * qz + cc * rz) * inverse,
-    )

@@ -21,18 +21,20 @@ from gelpolight_core.reconstruction.acceptance import (
     unsolved_note,
 )
 from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.reconstruction.live import LiveSolver
 from gelpolight_core.reconstruction.live_maps import CURVE_ERROR
 from gelpolight_core.reconstruction.normals import (
     ShadingMaps,
     SlopeField,
+    SlopeSolver,
     normals_from_slopes,
-    solve_slopes,
 )
+from gelpolight_core.reconstruction.paper_kernel import blank_rows
 from gelpolight_core.reconstruction.plan import EFFORTS, Plan, PlanStep
 from gelpolight_core.reconstruction.poisson import PoissonSolver
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.translation import tr
 
 Notes = tuple[str, ...]
@@ -103,6 +105,15 @@ class Reconstructor:
         return shading_maps(self.calibration)
 
     @cached_property
+    def _threads(self) -> RowWorkers:
+        return RowWorkers(self.workers)
+
+    @cached_property
+    def slope_solver(self) -> SlopeSolver:
+        """The paper's fused pass on the calibration's maps."""
+        return SlopeSolver(self.maps, self._threads)
+
+    @cached_property
     def solver(self) -> PoissonSolver:
         """The paper's integration on the calibration's grid."""
         grid = self.calibration.table.grid
@@ -153,10 +164,7 @@ class Reconstructor:
             If the frame is not of the calibration's size, not in colour, or holds other numbers
             than :meth:`depth` takes.
         """
-        return self._slopes(self._accepted(frame, name))
-
-    def _slopes(self, frame: NDArray[Any]) -> SlopeField:
-        return solve_slopes(self.linearise(frame), self.maps, workers=self.workers)
+        return self.slope_solver.solve(self.linearise(self._accepted(frame, name)))
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
         """Return a frame with the camera's response undone; floats are linear light already."""
@@ -197,9 +205,9 @@ class Reconstructor:
             if why is None:
                 return self._depth_live(frame, name, normals, notes)
             return self._depth_full(frame, name, normals, uncertainty, why, notes)
-        field = self._slopes(frame)
+        field = self.slope_solver.solve(self.linearise(frame), length_error=False)
         depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
-        depth_mm[(field.flags & int(Flag.OUTSIDE)) != 0] = 0.0
+        self._threads.run(len(depth_mm), blank_rows, field.flags, depth_mm)
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         heightmap = self._heightmap(depth_mm, shown, field.flags, name, notes)
