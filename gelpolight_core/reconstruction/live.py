@@ -309,7 +309,7 @@ class LiveSolver:
             start_mm=depth if depth.any() else None,
             hold=hold,
             tolerance=tolerance,
-            workers=self._workers.count,
+            workers=self._workers,
         )
 
     def _show(

@@ -9,6 +9,8 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from gelpolight_core.reconstruction.column_solve import settled_rows, solve_columns
+from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reconstruction.weighted import MAX_ROUNDS
 
 Map = NDArray[np.float32]
@@ -46,34 +48,40 @@ def integrate_live(
     start_mm: Map | None,
     hold: Map | None,
     tolerance: float,
-    workers: int,
+    workers: RowWorkers,
 ) -> LiveIntegration:
     """Integrate slopes (rows, columns) as :func:`integrate_weighted` does.
 
     Parameters
     ----------
-    slope_x, slope_y, weight, pitch_mm, start_mm, hold, workers
+    slope_x, slope_y, weight, pitch_mm, start_mm, hold
         As there; `hold` None: depth 0 is held all around.
     tolerance : float
         Of what is left, relative to the depth itself, in the root of the mean squared weighted
         slope: no transform is spent on finding out.
+    workers : RowWorkers
+        Threads.
     """
     shape = weight.shape
     firm = np.full(2 * sum(shape), 2.0, np.float32)
     if hold is not None:
         edges = (hold[0], hold[-1], hold[:, 0], hold[:, -1])
         firm = np.concatenate(edges).astype(np.float32) * np.float32(2.0)
-    waves = tuple(
-        (2.0 - 2.0 * np.cos(np.pi * np.arange(1, n + 1) / n)).astype(np.float32) for n in shape
-    )
-
+    waves = 2.0 - 2.0 * np.cos(np.pi * np.arange(1, shape[1] + 1) / shape[1])
+    settled = settled_rows(waves, shape[0], weight.dtype)
+    blocks = settled.size
     # A small transform is done before a second thread has woken.
-    threads = workers if weight.size > SHARED_NODES else 1
+    threads = workers.count if weight.size > SHARED_NODES else 1
 
     def precondition(field: Map) -> Map:
-        spectrum = scipy.fft.dstn(field, type=2, workers=threads)
-        _divide(spectrum, *waves)
-        return np.asarray(scipy.fft.idstn(spectrum, type=2, workers=threads, overwrite_x=True))
+        spectrum = scipy.fft.dst(field, type=2, axis=1, workers=threads)
+        if threads > 1:
+            workers.run(blocks, solve_columns, spectrum, waves, settled, 1.0)
+        else:
+            solve_columns(0, blocks, spectrum, waves, settled, 1.0)
+        return np.asarray(
+            scipy.fft.idst(spectrum, type=2, axis=1, workers=threads, overwrite_x=True)
+        )
 
     left = np.empty(shape, np.float32)
     _flow(slope_x, slope_y, weight, np.float32(pitch_mm), left)
@@ -98,14 +106,6 @@ def integrate_live(
         _turn(np.float32(fresh / size), better, direction)
         size = fresh
     return LiveIntegration(depth, rounds)
-
-
-@_whole
-def _divide(spectrum, by_row, by_column):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    for i in range(spectrum.shape[0]):
-        line = spectrum[i]
-        for j in range(line.shape[0]):
-            line[j] = line[j] / (by_row[i] + by_column[j])
 
 
 @_whole

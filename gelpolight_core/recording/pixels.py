@@ -49,7 +49,7 @@ def unpack_strip(data: bytes, rgb: Rgb) -> bool:
     unpacker = isal_zlib.decompressobj()
     try:
         content = unpacker.decompress(data, rgb.nbytes + 1)
-    except isal_zlib.error:
+    except isal_zlib.error:  # type: ignore[misc]  # in its stub an instance, in truth a class
         return False
     if len(content) != rgb.nbytes or not unpacker.eof or unpacker.unused_data:
         return False

@@ -191,7 +191,7 @@ def test_the_fast_integration_is_the_plain_one(seed: int, let_go: bool, started:
         start_mm=bump if started else None,
         hold=hold if let_go else None,
         tolerance=1e-5,
-        workers=1,
+        workers=RowWorkers(1),
     )
     assert np.abs(fast.depth_mm - plain.depth_mm).max() < 1e-3 * np.abs(plain.depth_mm).max()
 
@@ -201,7 +201,13 @@ def test_a_solution_to_start_from_needs_no_round() -> None:
     slopes = [random.normal(0.0, 0.1, (ROWS, COLUMNS)).astype(np.float32) for _ in range(2)]
     weight = random.uniform(0.2, 1.0, (ROWS, COLUMNS)).astype(np.float32)
     first = integrate_live(
-        *slopes, weight, pitch_mm=PITCH, start_mm=None, hold=None, tolerance=1e-4, workers=1
+        *slopes,
+        weight,
+        pitch_mm=PITCH,
+        start_mm=None,
+        hold=None,
+        tolerance=1e-4,
+        workers=RowWorkers(1),
     )
     again = integrate_live(
         *slopes,
@@ -210,7 +216,7 @@ def test_a_solution_to_start_from_needs_no_round() -> None:
         start_mm=first.depth_mm,
         hold=None,
         tolerance=1e-3,
-        workers=1,
+        workers=RowWorkers(1),
     )
     assert first.rounds > 1
     assert again.rounds == 0
