@@ -22,6 +22,7 @@ from app.inspect.products import Shown
 from app.inspect.record_control import RecordControl
 from app.inspect.replay_bar import ReplayBar
 from app.inspect.views import Views
+from app.inspect.ways import WayChoice
 from app.inspect.zero import drift_sentence
 from app.shell.actions import make_action
 from app.shell.context import AppContext
@@ -54,6 +55,7 @@ class InspectPage(QWidget):
         self.link = LiveLink(self._show, context=context, parent=self)
         self.box = CalibrationBox()
         self.library = Library(self.jobs, self.box, context=context)
+        self.ways = WayChoice(self.jobs, self, context=context)
         self.banner = Banner()
         self._readout = named(QLabel(), "inspect.readout", tr("What is under the cursor"))
         self._rate = named(QLabel(), "inspect.rate", tr("How fast it is shown"))
@@ -98,6 +100,7 @@ class InspectPage(QWidget):
             ],
         )
         self.views.add_to_bar(self.box)
+        self.views.add_to_bar(self.ways.box)
         self.replay = ReplayBar()
         column.addWidget(self.banner)
         column.addWidget(self.views, 1)
@@ -108,7 +111,8 @@ class InspectPage(QWidget):
         self.views.wanted_changed.connect(self._want)
         self.views.pointed.connect(self._on_pointed)
         self.views.picture_pointed.connect(self._on_picture_pointed)
-        self.library.loaded.connect(self._use)
+        self.library.loaded.connect(self._on_loaded)
+        self.ways.chosen.connect(self._use)
         self.context.source.changed.connect(self._on_source)
         self.link.said.connect(self._on_said)
         self.link.switched.connect(self._on_switched)
@@ -147,6 +151,7 @@ class InspectPage(QWidget):
         self.jobs.close()
         # The reconstructors' threads end with the last reference to them.
         self._loaded = None, None
+        self.ways.close()
         self.link.use(None)
         self.views.finish()
         return True
@@ -200,11 +205,16 @@ class InspectPage(QWidget):
             Job(tr("Looking at the background"), lambda _: drift_sentence(rgb, calibration), tell)
         )
 
-    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+    def _on_loaded(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Look through another calibration, where it belongs to the pictures."""
-        self._loaded = live, best
+        self._loaded = None, None
         self._drift, self._drift_due = "", True
         self.link.use(None)
+        self.ways.take(live, best)
+
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Look through the calibration in the way that is chosen."""
+        self._loaded = live, best
         self._advise()
 
     # The cursor
@@ -229,6 +239,7 @@ class InspectPage(QWidget):
         return None if heightmap is None else heightmap.depth_mm
 
     def _tell(self) -> None:
+        self.ways.follow(self.link.last)
         self._rate.setText("    ".join(filter(None, (self._recorded, self.link.words()))))
         self._rate.setToolTip(self.link.plan_words())
         heightmap = None if self._shown is None else self._shown.heightmap
@@ -282,12 +293,15 @@ class InspectPage(QWidget):
         advice = advise(self._situation())
         self.banner.advise(advice.text, (advice.act, advice.button), role=advice.role)
         live, best = self._loaded if advice.usable else (None, None)
-        if live is self.link.live:
+        before = self.link.live
+        if live is before:
+            return
+        self.link.use(live, best)
+        if live is not None and before is not None and live.calibration is before.calibration:
             return
         self._places = None if live is None else PixelPlaces(live.calibration.table)
         if live is not None:
             self.views.prepare()
-        self.link.use(live, best)
         self.views.forget()
 
     def _on_act(self, name: str) -> None:

@@ -116,6 +116,16 @@ class Settings:
         for field in fields(Limits):
             self._store.setValue(f"limits/{field.name}", getattr(limits, field.name))
 
+    @property
+    def reconstruction(self) -> tuple[str, str]:
+        """Model and effort of the live depth; whether there are such is for who uses them."""
+        model, _, effort = self._text("reconstruction", "full/balanced").partition("/")
+        return model, effort
+
+    @reconstruction.setter
+    def reconstruction(self, way: tuple[str, str]) -> None:
+        self._store.setValue("reconstruction", "/".join(way))
+
     def window_state(self) -> tuple[QByteArray, QByteArray]:
         """Return geometry and state of the main window; empty at first."""
         none = QByteArray()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -129,6 +130,20 @@ class Reconstructor:
         """The planned solve of ``balanced`` and ``fast``."""
         assert self.calibration.full is not None
         return LiveSolver(self.calibration, self.calibration.full, workers=self.workers)
+
+    def at_effort(self, effort: str) -> Reconstructor:
+        """Return one of another effort, which shares what is made ready already.
+
+        Raises
+        ------
+        ValueError
+            If there is no such effort.
+        """
+        if effort not in EFFORTS:
+            raise ValueError(f"effort = {effort!r}, expected one of {EFFORTS}")
+        other = copy.copy(self)
+        other.effort = effort
+        return other
 
     def warm_up(self, dtype: DTypeLike = np.uint8) -> None:
         """Make ready all that the first frame would wait for: maps, compiled parts, buffers.
