@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import StageProgress
+from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.integrators import SIDES, measure_integrators
+from gelpolight_core.experiments.integrators import SIDES, IntegratorPoint, measure_integrators
 from gelpolight_core.experiments.methods import Method, methods
 from gelpolight_core.experiments.work_precision import (
     LEAST_REPEATS,
@@ -26,6 +27,11 @@ from gelpolight_core.experiments.work_precision_report import (
     point_table,
     write_work_precision,
 )
+from gelpolight_core.experiments.work_precision_trial import (
+    FLAT_TOPPED,
+    measure_calibration,
+    measure_virtual,
+)
 from gelpolight_core.export.atomic import make_folder, refuse_unwritable
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.session.session import read_session
@@ -34,7 +40,6 @@ from gelpolight_core.translation import tr
 
 SCALES = (0.25, 0.5, 1.0)
 LEAST_SCALE, MOST_SCALE = 0.2, 4.0
-FLAT_TOPPED = ("cylinder", "cuboid")
 
 
 def add_parser(commands: Any) -> None:
@@ -48,6 +53,12 @@ def add_parser(commands: Any) -> None:
         help=tr("folders with presses and their truth, beside the virtual sensor"),
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
+    parser.add_argument(
+        "--calibration",
+        type=Path,
+        metavar="FILE",
+        help=tr("measure with this calibration as it is; without SESSION, on rendered presses"),
+    )
     parser.add_argument(
         "--scales",
         default=",".join(f"{s:g}" for s in SCALES),
@@ -74,6 +85,8 @@ def run(options: argparse.Namespace) -> int:
     make_folder(options.output)
     refuse_unwritable(options.output / "work-precision.html")
     repeats = max(options.repeats, 1)
+    if options.calibration is not None:
+        return _with_calibration(options, chosen, repeats)
     points: list[Point] = []
     with StageProgress() as tell:
         folders = [_virtual_session(options.output, scale, tell) for scale in scales]
@@ -93,7 +106,28 @@ def run(options: argparse.Namespace) -> int:
         integrators = measure_integrators(sides=sides, repeats=repeats)
     print(point_table(points), end="\n\n")
     print(order_table(points, integrators), end="\n\n")
-    written = write_work_precision(points, integrators, options.output)
+    return _write(points, integrators, options.output)
+
+
+def _with_calibration(options: argparse.Namespace, chosen: Sequence[Method], repeats: int) -> int:
+    """Do the same with one calibration that is there already, as the program's own view does."""
+    calibration = read_calibration(options.calibration)
+    points: list[Point] = []
+    with StageProgress() as tell:
+        for folder in options.sessions:
+            points += measure_calibration(
+                calibration, folder, chosen, repeats=repeats, progress=tell
+            )
+        if not options.sessions:
+            points += measure_virtual(
+                calibration, SensorDesign(), chosen, repeats=repeats, progress=tell
+            )
+    print(point_table(points), end="\n\n")
+    return _write(points, (), options.output)
+
+
+def _write(points: Sequence[Point], integrators: Sequence[IntegratorPoint], folder: Path) -> int:
+    written = write_work_precision(points, integrators, folder)
     print(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
     return 0
 

@@ -18,11 +18,15 @@ from app.live.zebra import eight_bits
 from app.sources.source import Frame
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.misfit import Misfit, solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 LIVE_PX = 560
 CAMERA_PX = 760
 STILL_PX = 2000
+MISFIT_NODES = 128, 400
+"""A side, of a moving and of a standing picture."""
+LEAST_MISFIT = 0.02
 SURROUND = (21, 23, 26)
 STEEPNESS = colour_table("magma"), 0.0, 60.0
 """Colours of the slope, and its degrees at their ends."""
@@ -48,7 +52,8 @@ class Wanted:
     normals : str
         What the view of normals shows: ``normals``, ``slope``, or empty where it is hidden.
     quality : str
-        What the quality view shows: ``flags``, ``uncertainty``, or empty where it is hidden.
+        What the quality view shows: ``flags``, ``uncertainty``, ``misfit``, or empty where it is
+        hidden.
     section : Section or None
         The line that is measured along.
     region : Rectangle or None
@@ -75,6 +80,11 @@ class Wanted:
         views = self.surface or self.height or bool(self.normals) or bool(self.quality)
         return views or self.section is not None or self.region is not None
 
+    @property
+    def needs_normals(self) -> bool:
+        """Whether the reconstruction must say how each place is tilted."""
+        return bool(self.normals) or self.quality == "misfit"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
@@ -93,7 +103,9 @@ class Shown:
     height, normals, quality : (rows, columns, 3) uint8 or None
         Pictures over the extent of the grid.
     quality_top : float
-        Value at the upper end of the quality picture's colours, mm.
+        Value at the upper end of the quality picture's colours: mm, or a share.
+    misfit : Misfit or None
+        How well the depth explains the picture.
     surface : Surface or None
         For the 3D view.
     cut : Cut or None
@@ -110,6 +122,7 @@ class Shown:
     normals: NDArray[np.uint8] | None = None
     quality: NDArray[np.uint8] | None = None
     quality_top: float = 0.0
+    misfit: Misfit | None = None
     surface: Surface | None = None
     cut: Cut | None = None
     depth_ms: float = 0.0
@@ -140,7 +153,8 @@ class Maker:
         if self.live is None or not wanted.needs_depth:
             return Shown(frame, camera=camera)
         heightmap, depth_ms = self._heightmap(frame, wanted)
-        shown = _Pictures(heightmap, wanted)
+        misfit = self._misfit(frame, heightmap, wanted) if wanted.quality == "misfit" else None
+        shown = _Pictures(heightmap, wanted, misfit)
         surface = shown.surface() if wanted.surface else None
         quality, top = shown.quality() if wanted.quality else (None, 0.0)
         return Shown(
@@ -152,6 +166,7 @@ class Maker:
             normals=shown.normals() if wanted.normals else None,
             quality=quality,
             quality_top=top,
+            misfit=misfit,
             surface=surface,
             cut=None if wanted.section is None else cut(heightmap, wanted.section, wanted.region),
             depth_ms=depth_ms,
@@ -166,16 +181,22 @@ class Maker:
         if self._last is not None:
             same, made, heightmap, depth_ms = self._last
             has = (heightmap.normals is not None, heightmap.depth_sd_mm is not None)
-            enough = has[0] >= bool(wanted.normals) and (has[1] or made[1] >= uncertainty)
+            enough = has[0] >= wanted.needs_normals and (has[1] or made[1] >= uncertainty)
             if same is frame and made[0] is reconstructor and enough:
                 return heightmap, depth_ms
         began = time.perf_counter()
         heightmap = reconstructor.depth(
-            frame.rgb, normals=bool(wanted.normals), uncertainty=uncertainty
+            frame.rgb, normals=wanted.needs_normals, uncertainty=uncertainty
         )
         depth_ms = 1e3 * (time.perf_counter() - began)
         self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
         return heightmap, depth_ms
+
+    def _misfit(self, frame: Frame, heightmap: HeightMap, wanted: Wanted) -> Misfit:
+        reconstructor = self.best if wanted.still else self.live
+        assert reconstructor is not None
+        nodes = MISFIT_NODES[wanted.still]
+        return solve_misfit(reconstructor, frame.rgb, heightmap, largest=nodes)
 
 
 def camera_picture(frame: Frame, wanted: Wanted) -> NDArray[np.uint8]:
@@ -187,8 +208,9 @@ def camera_picture(frame: Frame, wanted: Wanted) -> NDArray[np.uint8]:
 class _Pictures:
     """The pictures of one height map, in the size that they are shown in."""
 
-    def __init__(self, heightmap: HeightMap, wanted: Wanted) -> None:
+    def __init__(self, heightmap: HeightMap, wanted: Wanted, misfit: Misfit | None = None) -> None:
         self._map, self._wanted, self._look = heightmap, wanted, wanted.look
+        self._misfit = misfit
         self._px = STILL_PX if wanted.still else LIVE_PX
         self._depth = shading.fitted(heightmap.depth_mm, self._px)
         rows, columns = self._depth.shape
@@ -248,8 +270,16 @@ class _Pictures:
         return shading.outside_filled(rgb, self._outside, SURROUND)
 
     def quality(self) -> tuple[NDArray[np.uint8] | None, float]:
-        """Return the flags over the dimmed relief, or the uncertainty, and its upper end."""
+        """Return the flags over the dimmed relief, or a figure in colours, and its upper end."""
         sd = self._map.depth_sd_mm
+        if self._misfit is not None:
+            values = self._misfit.values
+            known = values[np.isfinite(values)]
+            top = max(float(np.percentile(known, 99.0)) if known.size else 0.0, LEAST_MISFIT)
+            rows, columns = self._depth.shape
+            shown = cv2.resize(np.nan_to_num(values), (columns, rows))
+            rgb = shading.coloured(np.asarray(shown), colour_table("inferno"), 0.0, top)
+            return shading.outside_filled(rgb, self._outside, SURROUND), top
         if self._wanted.quality == "uncertainty":
             if sd is None:
                 return None, 0.0

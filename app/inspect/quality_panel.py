@@ -13,6 +13,7 @@ from app.inspect.place import flag_words
 from app.inspect.products import QUALITY_COLOURS, Shown
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.misfit import Misfit
 from gelpolight_core.translation import tr
 
 # Words are told less often than pictures are shown: they could not be read.
@@ -20,7 +21,7 @@ TELL_EVERY = 10
 
 
 class QualityPanel(QWidget):
-    """Shows flags, or the uncertainty of a standing picture.
+    """Shows flags, how well the depth explains the picture, or a standing one's uncertainty.
 
     Signals
     -------
@@ -38,6 +39,7 @@ class QualityPanel(QWidget):
         self.bar.hide()
         self._what = named(QComboBox(), "inspect.quality.what", tr("What is shown"))
         self._what.addItem(tr("Flags"), "flags")
+        self._what.addItem(tr("Misfit of the picture (| |n| - 1 |)"), "misfit")
         self._what.addItem(tr("Uncertainty (when paused)"), "uncertainty")
         self._what.currentIndexChanged.connect(self._on_chosen)
         self._legend = named(QLabel(), "inspect.quality.legend", tr("What the colours mean"))
@@ -58,13 +60,15 @@ class QualityPanel(QWidget):
 
     @property
     def what(self) -> str:
-        """What is shown: ``flags`` or ``uncertainty``."""
+        """What is shown: ``flags``, ``misfit`` or ``uncertainty``."""
         return str(self._what.currentData())
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
         """Show the quality of a frame."""
         if shown.heightmap is None:
             return
+        if self.what == "misfit" and shown.misfit is None:
+            return  # of a frame that was made before it was asked for
         if shown.quality is None:
             sentence = tr("Pause to see the uncertainty.")
             if still:
@@ -79,14 +83,30 @@ class QualityPanel(QWidget):
                 tr("Standard deviation of repeats of this picture; one in a hundred is above.")
             )
             return
+        if shown.misfit is not None:
+            self.bar.show_range("inferno", 0.0, 100.0 * shown.quality_top, "%")
         self._count += 1
         if still or self._count % TELL_EVERY == 1:
-            self._legend.setText(legend(shown.heightmap.flags))
+            misfit = shown.misfit
+            text = legend(shown.heightmap.flags) if misfit is None else misfit_text(misfit)
+            self._legend.setText(text)
 
     def _on_chosen(self) -> None:
-        self.bar.setVisible(self.what == "uncertainty")
+        self.bar.setVisible(self.what != "flags")
         self._count = 0
         self.chosen.emit()
+
+
+def misfit_text(misfit: Misfit) -> str:
+    """Return what the misfit is, and how large in the middle of all nodes."""
+    if misfit.model == "paper":
+        text = tr("| |n| - 1 |: length of the solved normal less 1; median {m:.1f} %.")
+    else:
+        text = tr(
+            "Brightness seen less explained by the depth, of the flat membrane's; median {m:.1f} %."
+        )
+    known = misfit.values[np.isfinite(misfit.values)]
+    return text.format(m=100.0 * float(np.median(known)) if known.size else 0.0)
 
 
 def legend(flags: np.ndarray) -> str:

@@ -8,6 +8,7 @@ import logging
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QToolButton, QVBoxLayout, QWidget
 
+from app.inspect.draped import DrapedLine
 from app.inspect.map_view import MapView
 from app.inspect.surface import Surface
 from app.shell.jobs import Job, Jobs
@@ -61,6 +62,7 @@ class SurfacePanel(QWidget):
         self._asked = False
         self._last: Surface | None = None
         self._exaggeration = 1.0
+        self._lines: tuple[DrapedLine, ...] = ()
         self._stack = QStackedWidget()
         self._words = QLabel(tr("No depth yet."))
         self._words.setWordWrap(True)
@@ -139,6 +141,12 @@ class SurfacePanel(QWidget):
             if view is not None:
                 view.show_cursor(x_mm, y_mm)
 
+    def show_lines(self, lines: tuple[DrapedLine, ...]) -> None:
+        """Lay lines on the surface in the place of those that are there."""
+        self._lines = lines
+        if self.view is not None:
+            self.view.show_lines(lines)
+
     def finish(self) -> None:
         """Give the graphics memory back."""
         if self.view is not None:
@@ -151,6 +159,7 @@ class SurfacePanel(QWidget):
             self._fall_back(str(error))
         else:
             self.view.set_exaggeration(self._exaggeration)
+            self.view.show_lines(self._lines)
             self.view.pointed.connect(self.pointed)
             self._stack.addWidget(self.view)
         self._words.setText(tr("No depth yet."))

@@ -20,6 +20,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from app.inspect.camera3d import PRESETS, Camera
+from app.inspect.draped import DrapedLine, draw_line
 from app.inspect.scale_bar import draw_bar, length_text, round_length_mm
 from app.inspect.scene3d import Scene
 from app.inspect.surface import LIVE_NODES, Surface
@@ -76,6 +77,7 @@ class SurfaceView(QWidget):
         self._scene = Scene()
         self._surface: Surface | None = None
         self._cursor: tuple[float, float] | None = None
+        self._lines: tuple[DrapedLine, ...] = ()
         self._picture: QImage | None = None
         self._stale = True
         self._fitted = True
@@ -123,6 +125,12 @@ class SurfaceView(QWidget):
         cursor = (x_mm, y_mm) if there else None
         if cursor != self._cursor:
             self._cursor = cursor
+            self.update()
+
+    def show_lines(self, lines: tuple[DrapedLine, ...]) -> None:
+        """Lay lines on the surface in the place of those that are there."""
+        if lines != self._lines:
+            self._lines = lines
             self.update()
 
     def picture(self, width: int, height: int) -> QImage:
@@ -180,6 +188,9 @@ class SurfaceView(QWidget):
         assert self._picture is not None
         painter.drawImage(self.rect(), self._picture)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for line in self._lines:
+            size = (self.width(), self.height())
+            draw_line(painter, line, self._surface, self.camera, size, self.exaggeration)
         self._draw_cursor(painter)
         self._draw_scale(painter)
         painter.end()

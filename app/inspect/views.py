@@ -14,13 +14,14 @@ from PySide6.QtWidgets import (
 )
 
 from app.inspect.cuts import Section
+from app.inspect.draped import DrapedLine
 from app.inspect.height_panel import HeightPanel
 from app.inspect.look import Look
 from app.inspect.look_panel import LookPanel
 from app.inspect.normals_panel import NormalsPanel
 from app.inspect.products import Shown, Wanted
 from app.inspect.quality_panel import QualityPanel
-from app.inspect.section_line import RegionBox, SectionLine
+from app.inspect.section_line import INK, REGION_INK, RegionBox, SectionLine
 from app.inspect.section_panel import SectionPanel
 from app.inspect.surface_panel import SurfacePanel, preset_names
 from app.live.overlay import Marker, Overlay
@@ -161,6 +162,7 @@ class Views(QMainWindow):
         self.quality.chosen.connect(self.wanted_changed)
         self.normals.chosen.connect(self.wanted_changed)
         for part in (self.line, self.region):
+            part.moved.connect(self._lay_lines)
             part.moved.connect(self.wanted_changed)
         self.section.changed.connect(self._on_section)
         for name, (text, keys) in preset_names().items():
@@ -287,7 +289,18 @@ class Views(QMainWindow):
         self.line.show(self._visible["section"] and self._has_depth)
         self.line.set_width(self.section.width_mm)
         self.region.show(self._measures_region() and self._has_depth)
+        self._lay_lines()
         self.wanted_changed.emit()
+
+    def _lay_lines(self) -> None:
+        """Show on the surface where it is measured."""
+        lines = []
+        if self._visible["section"]:
+            lines.append(DrapedLine(self.line.ends_mm, INK))
+        if self._measures_region():
+            corners = self.region.rectangle.outline_mm
+            lines.append(DrapedLine(tuple((float(x), float(y)) for x, y in corners), REGION_INK))
+        self.surface.show_lines(tuple(lines))
 
     def _on_look(self) -> None:
         look: Look = self.look.look

@@ -73,6 +73,7 @@ class MainWindow(QMainWindow):
         self._made: dict[str, QWidget] = {}
         self._asked_for = ""
         self._log_window: LogWindow | None = None
+        self._precision: QDialog | None = None
         self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
         self.setCentralWidget(self._stack)
         self._loading = LoadingView()
@@ -277,6 +278,15 @@ class MainWindow(QMainWindow):
         """Show what this program is made of."""
         _show(AboutDialog(self))
 
+    def show_precision(self) -> None:
+        """Show what accuracy costs on this machine."""
+        from app.inspect.precision_dialog import PrecisionDialog  # heavy: it knows every method
+
+        if self._precision is None:
+            self._precision = PrecisionDialog(context=self.context, parent=self)
+        self._precision.show()
+        self._precision.raise_()
+
     def open_board(self, square_mm: int) -> None:
         """Show a checkerboard to print, in what the desktop shows PDF with."""
         path = BOARDS / f"checkerboard-9x6-{square_mm}mm.pdf"
@@ -322,6 +332,8 @@ class MainWindow(QMainWindow):
             page.close()
         if self._log_window is not None:
             self._log_window.close()
+        if self._precision is not None:
+            self._precision.close()
         super().closeEvent(event)
 
 

@@ -27,6 +27,7 @@ class Menus:
         self.themes = self._build_themes()
         self._build_file()
         self._build_view()
+        self._build_tools()
         self._build_help()
 
     def _build_file(self) -> None:
@@ -78,6 +79,18 @@ class Menus:
         menu.addAction(
             make_action(
                 window, "view.log", tr("&Log"), window.show_log, keys=("Ctrl+L",), icon_name="log"
+            )
+        )
+
+    def _build_tools(self) -> None:
+        window = self._window
+        menu = window.menuBar().addMenu(tr("&Tools"))
+        menu.addAction(
+            make_action(
+                window,
+                "tools.precision",
+                tr("&Error against run time…"),
+                window.show_precision,
             )
         )
 

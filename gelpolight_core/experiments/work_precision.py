@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import assemble, stages_of
 from gelpolight_core.calibration.refinement import bare_calibration, refine_with
@@ -164,6 +165,7 @@ def measure_scene(
     grid = scene.full.table.grid
     radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
     for run in runs:
+        tell(run.method.label, CALIBRATING)
         _score_all(run, shown, grid, radius_mm)
     for round_ in range(WARM_UP + repeats):
         share = CALIBRATING + (1.0 - CALIBRATING) * round_ / (WARM_UP + repeats)
@@ -177,6 +179,11 @@ def measure_scene(
     size = camera.width * camera.height / 1e6
     name = session.folder.resolve().name
     return tuple(_point(run, name, size, grid.pitch_mm) for run in runs)
+
+
+def scene_of(calibration: Calibration) -> Scene:
+    """Return a calibration as a scene; methods that need the stages' results are gaps in it."""
+    return Scene(StageResults(), calibration, calibration)
 
 
 def calibrated_scene(session: Session, tell: Progress) -> tuple[Scene, Session]:

@@ -88,6 +88,7 @@ def simulate_session(
     *,
     seed: int = 0,
     scale: float = 1.0,
+    presses_only: bool = False,
     progress: Progress | None = None,
 ) -> None:
     """Write a session folder of the virtual sensor with ``truth.json`` and ``truth/*.npz``.
@@ -106,6 +107,8 @@ def simulate_session(
         Of the membrane's pattern, the board's poses and the noise.
     scale : float, optional
         Size of the pictures; the geometry in mm stays.
+    presses_only : bool, optional
+        Whether only the presses are wanted, for a sensor that is calibrated already.
     progress : callable, optional
         Called with the file just written and the share done, 0..1; what it raises stops the work.
 
@@ -126,7 +129,7 @@ def simulate_session(
     for stage in folders:
         make_folder(out / stage)
     try:
-        _write_session(out, sensor, progress)
+        _write_session(out, sensor, presses_only, progress)
     except BaseException:
         # A part of a session is of no use, and would stand in the way of the next try.
         for stage in folders:
@@ -138,9 +141,11 @@ def simulate_session(
         raise
 
 
-def _write_session(out: Path, sensor: VirtualSensor, progress: Progress | None) -> None:
+def _write_session(
+    out: Path, sensor: VirtualSensor, presses_only: bool, progress: Progress | None
+) -> None:
     _write_texts(out, sensor)
-    shots = tuple(_shots(sensor))
+    shots = tuple(s for s in _shots(sensor) if s.keeps_truth or not presses_only)
     with ThreadPoolExecutor(_THREADS) as pool:
         jobs = [(shot, pool.submit(_take, sensor, shot, out)) for shot in shots]
         try:

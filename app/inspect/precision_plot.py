@@ -1,0 +1,134 @@
+"""Error against run time as a diagram: both logarithmic, the three efforts marked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.shell import theme
+from app.widgets.naming import named
+from app.widgets.plots import without_menus
+from gelpolight_core.experiments.work_precision import Point, pareto_front
+from gelpolight_core.translation import tr
+
+# The paper states these of its own sensor and machine.
+PAPER_MS, PAPER_PERCENT = 100.0, {"height_percent": 8.0, "size_percent": 5.0}
+# (light, dark) and a shape for each family of methods.
+LOOKS = {
+    "paper": ("#0b5cad", "#74b5f7", "o"),
+    "effort": ("#1a7f37", "#57d27a", "t"),
+    "threads": ("#6b7785", "#9aa7b4", "d"),
+    "precision": ("#8a3ffc", "#c9a6ff", "p"),
+    "term": ("#6b7785", "#9aa7b4", "x"),
+}
+LEAST = 1e-3
+
+
+def errors() -> dict[str, str]:
+    """Return which errors can be drawn, and what people read on the axis."""
+    return {
+        "rms_um": tr("depth, RMS (um)"),
+        "height_percent": tr("height of the plateau (%)"),
+        "size_percent": tr("size at half height (%)"),
+        "normal_deg": tr("normals, RMS (deg)"),
+    }
+
+
+class PrecisionPlot(QWidget):
+    """One marker for each method; what nothing beats is joined by a line."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "precision.plot", tr("Error against the time of a frame"))
+        self._plot = without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False)))
+        self._plot.hideButtons()
+        self._plot.setLogMode(x=True, y=True)
+        self._plot.showGrid(x=True, y=True, alpha=0.25)
+        self._plot.setLabel("bottom", tr("time of a frame (ms)"))
+        for side in ("bottom", "left"):
+            self._plot.getAxis(side).enableAutoSIPrefix(False)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self._plot)
+        self._points: tuple[Point, ...] = ()
+        self._error = "rms_um"
+        self._draw()
+
+    def show_points(self, points: Sequence[Point], error: str) -> None:
+        """Draw one of the errors of all points that are no gaps."""
+        self._points, self._error = tuple(points), error
+        self._draw()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_error"):
+            self._draw()
+
+    def _draw(self) -> None:
+        plot, dark = self._plot, theme.is_dark()
+        ink = theme.colour("text")
+        plot.setBackground(theme.colour("base"))
+        for side in ("bottom", "left"):
+            plot.getAxis(side).setPen(theme.colour("line"))
+            plot.getAxis(side).setTextPen(ink)
+        plot.setLabel("left", errors()[self._error])
+        plot.clear()
+        shown = [p for p in self._points if _place(p, self._error) is not None]
+        front = [p for p in pareto_front(self._points) if p in shown]
+        if self._error == "rms_um" and front:
+            line = pg.mkPen(ink, width=1, style=Qt.PenStyle.DashLine)
+            plot.plot(*zip(*(_place(p, self._error) for p in front), strict=True), pen=line)
+        for point in shown:
+            light, bright, symbol = LOOKS.get(point.family, LOOKS["term"])
+            size = 15 if point.family in ("effort", "paper") else 9
+            self._mark(
+                _place(point, self._error), point.label, bright if dark else light, symbol, size
+            )
+        if shown and self._error in PAPER_PERCENT:
+            place = PAPER_MS, PAPER_PERCENT[self._error]
+            self._mark(place, tr("the paper, of its own sensor"), ink.name(), "star", 15)
+        plot.autoRange(padding=0.18)
+        for side, values in zip(("bottom", "left"), plot.viewRange(), strict=True):
+            plot.getAxis(side).setTicks([_ticks(*values)])
+
+    def _mark(
+        self, place: tuple[float, float] | None, text: str, colour: str, symbol: str, size: int
+    ) -> None:
+        assert place is not None
+        self._plot.plot(
+            [place[0]],
+            [place[1]],
+            pen=None,
+            symbol=symbol,
+            symbolSize=size,
+            symbolBrush=colour,
+            symbolPen=pg.mkPen(theme.colour("base"), width=1),
+        )
+        words = pg.TextItem(text, color=colour, anchor=(0.5, 1.4))
+        self._plot.addItem(words, ignoreBounds=True)
+        # Text is placed in the plot's own, logarithmic, coordinates.
+        words.setPos(_logarithm(place))
+
+
+def _place(point: Point, error: str) -> tuple[float, float] | None:
+    """Return (ms, error), or None for a gap."""
+    value = getattr(point, error)
+    if point.median_ms is None or value is None:
+        return None
+    return point.median_ms, max(value, LEAST)
+
+
+def _ticks(low: float, high: float) -> list[tuple[float, str]]:
+    """Return 1, 2 and 5 times the powers of ten between two logarithms, with their words."""
+    powers = range(math.floor(low), math.ceil(high) + 1)
+    values = [factor * 10.0**power for power in powers for factor in (1, 2, 5)]
+    inside = [value for value in values if low <= math.log10(value) <= high]
+    return [(math.log10(value), f"{value:g}") for value in inside]
+
+
+def _logarithm(place: tuple[float, float]) -> QPointF:
+    return QPointF(math.log10(place[0]), math.log10(place[1]))

@@ -1,0 +1,153 @@
+"""How well a solved surface explains the picture that it was solved from.
+
+Three brightnesses decide two slopes: one is over, and says whether the model holds. The paper's
+model solves for a normal of any length (Eq. 10), and its length less 1 is what is over. The full
+model's normals have length 1; there it is the picture that the surface would give beside the one
+that was taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.ball_pixels import neighbourhood, view_directions
+from gelpolight_core.calibration.calibration import Calibration, FullModel
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.reconstruction.full import LEAST_BASE, SATURATED, as_linear
+from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reflectance.membrane import bounce_weight
+
+Map = NDArray[np.float32]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """What is left over at each node, on a thinned grid.
+
+    Attributes
+    ----------
+    model : str
+        ``paper``: | |n| - 1 |; ``full``: root mean square over the channels of the brightness seen
+        less the brightness explained, in units of the flat membrane's.
+    values : (rows, columns) float32
+        NaN where nothing is known.
+    """
+
+    model: str
+    values: Map
+
+
+def solve_misfit(
+    reconstructor: Reconstructor, frame: NDArray[Any], heightmap: HeightMap, *, largest: int = 200
+) -> Misfit:
+    """Return how well a height map explains its picture.
+
+    Parameters
+    ----------
+    reconstructor : Reconstructor
+        Which the height map came from.
+    frame : (height, width, 3)
+        The raw picture, as given to :meth:`Reconstructor.depth`.
+    heightmap : HeightMap
+        With normals, where the model is the full one.
+    largest : int, optional
+        No more nodes than this a side.
+
+    Raises
+    ------
+    ValueError
+        If normals are needed and missing.
+    """
+    rows, columns = heightmap.depth_mm.shape
+    step = max(-(-max(rows, columns) // largest), 1)
+    thin = np.s_[step // 2 :: step, step // 2 :: step]
+    inside = heightmap.flags[thin] & Flag.OUTSIDE.value == 0
+    full = reconstructor.calibration.full
+    if heightmap.model != "full" or full is None:
+        left = reconstructor.slopes(frame).length_error[thin]
+    elif heightmap.normals is None:
+        raise ValueError("the full model's misfit needs the normals")
+    else:
+        # A node of the thinned grid stands for its neighbours: so does its brightness.
+        linear = as_linear(reconstructor.linearise(frame))
+        seen = np.asarray(cv2.blur(linear, (step, step)), np.float32)
+        left = _picture_misfit(seen, reconstructor.calibration, full, heightmap, thin, inside)
+    return Misfit(heightmap.model, np.where(inside, left, np.nan).astype(np.float32))
+
+
+def _picture_misfit(
+    rgb: Map,
+    calibration: Calibration,
+    full: FullModel,
+    heightmap: HeightMap,
+    thin: tuple[slice, slice],
+    inside: NDArray[np.bool_],
+) -> Map:
+    """Return the full model's misfit at the nodes `thin`; 0 where no channel is of use."""
+    assert heightmap.normals is not None
+    table, depth = calibration.table, heightmap.depth_mm[thin].astype(np.float64)
+    drift = table.drift[thin].astype(np.float64)
+    x, y = (g[thin].astype(np.float64) for g in np.meshgrid(heightmap.x_mm, heightmap.y_mm))
+    # The surface is seen where its ray crosses the flat membrane.
+    index = [
+        (part - offset * depth - first) / heightmap.pitch_mm
+        for part, offset, first in (
+            (x, drift[..., 0], float(heightmap.x_mm[0])),
+            (y, drift[..., 1], float(heightmap.y_mm[0])),
+        )
+    ]
+    column, row = (np.asarray(part, np.float32) for part in index)
+    u, v = (cv2.remap(m, column, row, cv2.INTER_LINEAR) for m in (table.u_px, table.v_px))
+    raw = np.asarray(cv2.remap(rgb, u, v, cv2.INTER_LINEAR), np.float32)
+    base = np.asarray(cv2.remap(full.background, column, row, cv2.INTER_LINEAR), np.float32)
+    light = unmix(raw, calibration.crosstalk)
+    ratio = np.asarray(light / np.maximum(base, LEAST_BASE), np.float32)
+    of_use = (raw < SATURATED) & (base > LEAST_BASE) & inside[..., None]
+    pitch = heightmap.pitch_mm * (thin[0].step or 1)
+    around = neighbourhood(ratio, inside, pitch, full.membrane.bounce_reach_mm)
+    normals = heightmap.normals[thin].astype(np.float64)
+    explained = _explained(full, np.stack([x, y], axis=-1), depth, normals, drift)
+    bounced = full.membrane.bounce * around * bounce_weight(normals)[..., None]
+    left = np.where(of_use, ratio - explained - bounced, 0.0)
+    count = np.maximum(of_use.sum(axis=-1), 1)
+    return np.asarray(np.sqrt((left**2).sum(axis=-1) / count), np.float32)
+
+
+def _explained(
+    full: FullModel, places_mm: Array, depth_mm: Array, normals: Array, drift: Array
+) -> Array:
+    """Return the direct brightness (..., 3) over the flat membrane's (PHYSICS, shading).
+
+    Parameters
+    ----------
+    full : FullModel
+        Lights and membrane.
+    places_mm : (..., 2)
+        Where the surface is.
+    depth_mm : (...)
+        How deep.
+    normals : (..., 3)
+        Its unit normals.
+    drift : (..., 2)
+        Sideways move of the ray per mm of depth.
+    """
+    shape = depth_mm.shape
+    there = np.concatenate([places_mm, -depth_mm[..., None]], axis=-1).reshape(-1, 1, 3)
+    flat = np.concatenate([places_mm - drift * depth_mm[..., None], 0.0 * depth_mm[..., None]], -1)
+    to_led = full.led_positions_mm - there
+    from_flat = full.led_positions_mm - flat.reshape(-1, 1, 3)
+    far, far_flat = (np.linalg.norm(a, axis=-1) for a in (to_led, from_flat))
+    light, light_flat = to_led / far[..., None], from_flat / far_flat[..., None]
+    gain = light[..., 2] / light_flat[..., 2] * (far_flat / far) ** 2
+    view = view_directions(drift.reshape(-1, 2))
+    level = np.broadcast_to([0.0, 0.0, -1.0], view.shape)
+    bright = full.membrane.response(light, normals.reshape(-1, 3), view)
+    bright_flat = np.maximum(full.membrane.response(light_flat, level, view), 1e-9)
+    return np.asarray((gain * bright / bright_flat).reshape(*shape, 3))

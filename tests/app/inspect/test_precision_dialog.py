@@ -1,0 +1,99 @@
+"""Error against run time, as the program shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.inspect import precision_dialog
+from app.inspect.precision_dialog import PrecisionDialog
+from app.shell.context import AppContext
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.experiments.work_precision import Point
+from gelpolight_core.experiments.work_precision_trial import (
+    USUAL,
+    chosen_methods,
+    measure_calibration,
+)
+
+POINT = Point("A", "paper", "paper's model", "paper", 1.2, 0.02, 10.0, 12.0, 30.0, 6.0, 2.0, 2.6)
+POINTS = (
+    POINT,
+    replace(POINT, method="full_fast", label="full model, fast", family="effort", rms_um=9.0),
+    replace(POINT, method="full_best", family="effort", median_ms=900.0, p95_ms=950.0, rms_um=4.0),
+    replace(POINT, method="bare", median_ms=None, p95_ms=None, rms_um=None, gap="refused"),
+)
+
+
+@pytest.fixture
+def dialog(
+    context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> Iterator[PrecisionDialog]:
+    path = context.workspace.calibration_path("virtual-1", "small")
+    write_calibration(small_calibration, path)
+    context.workspace.use(path)
+    made = PrecisionDialog(context=context)
+    made.show()
+    yield made
+    made.close()
+    made.deleteLater()
+
+
+def test_the_calibration_in_use_is_measured_on_rendered_presses(
+    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    asked = []
+
+    def measure(calibration: Calibration, *arguments: object, **options: object) -> object:
+        asked.append(calibration.identity)
+        return POINTS
+
+    monkeypatch.setattr(precision_dialog, "measure_virtual", measure)
+    assert dialog.start.isEnabled()
+    assert "virtual" in dialog.presses.text()
+    dialog.start.click()
+    qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
+    assert asked and asked[0] in dialog.calibrations.currentText()
+    assert dialog.table.rowCount() == len(POINTS)
+    assert "refused" in dialog.words.text()
+    for row in range(dialog.error.count()):
+        dialog.error.setCurrentIndex(row)
+    assert not dialog.grab().isNull()
+
+
+def test_its_report_is_the_command_lines(
+    dialog: PrecisionDialog, tmp_path: Path, qtbot: QtBot
+) -> None:
+    dialog.show_points(POINTS)
+    dialog.write_report(tmp_path)
+    qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=20_000)
+    assert "full model, fast" in (tmp_path / "work-precision.html").read_text("utf-8")
+    assert (tmp_path / "work-precision.csv").is_file()
+
+
+def test_presses_of_another_sensor_are_refused_in_a_sentence(
+    dialog: PrecisionDialog, tmp_path: Path, small_session: Path, qtbot: QtBot
+) -> None:
+    text = (small_session / "session.toml").read_text("utf-8")
+    (tmp_path / "session.toml").write_text(text.replace('"virtual-1"', '"other"'), "utf-8")
+    dialog.use_folder(tmp_path)
+    dialog.start.click()
+    qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=20_000)
+    assert "other" in dialog.words.text() and "virtual-1" in dialog.words.text()
+    assert dialog.start.isEnabled()
+
+
+def test_a_calibration_is_measured_by_the_ways_that_people_choose_between(
+    small_calibration: Calibration, small_session: Path
+) -> None:
+    methods = [m for m in chosen_methods(False) if m.name in ("paper", "full_balanced")]
+    points = measure_calibration(small_calibration, small_session, methods, repeats=1)
+    assert [p.method for p in points] == ["paper", "full_balanced"]
+    assert all(p.median_ms and p.rms_um for p in points)
+    assert {m.name for m in chosen_methods(False)} == set(USUAL)
+    assert len(chosen_methods(True)) > len(USUAL)
