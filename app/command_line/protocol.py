@@ -28,6 +28,7 @@ from gelpolight_core.measurement.protocol import (
 )
 from gelpolight_core.measurement.protocol_file import FILE_NAME
 from gelpolight_core.measurement.protocol_run import ProtocolRun, begin_run, open_run
+from gelpolight_core.measurement.run_lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
@@ -85,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
     design = read_design(options.design) if options.design else SensorDesign()
     wanted = _wanted(options)
     make_folder(options.output)
-    with StageProgress() as tell:
+    with RunLock(options.output), StageProgress() as tell:
         calibration = options.calibration or calibrate_virtual_sensor(
             design, options.output, progress=tell
         )

@@ -14,6 +14,7 @@ from gelpolight_core.measurement.profile import (
     step_height,
     take_profile,
     width_at,
+    width_ends,
 )
 from gelpolight_core.measurement.roughness import roughness
 from gelpolight_core.reconstruction.heightmap import HeightMap
@@ -33,6 +34,8 @@ class Section:
         Over which depth is averaged across the line.
     first, second : (from, to)
         Ranges as shares of the line's length.
+    level_mm : float or None
+        Depth at which the width is measured; None: half way.
     """
 
     start_mm: Point = (-6.0, 0.0)
@@ -40,6 +43,7 @@ class Section:
     width_mm: float = 0.2
     first: Point = (0.02, 0.14)
     second: Point = (0.44, 0.56)
+    level_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,16 +58,19 @@ class Cut:
         Of the profile, then of the rectangle.
     sentences : tuple of str
         Why something could not be measured.
+    width_ends : (left, right, level) or None
+        Where the width lies: two places along the line, and their depth; mm.
     """
 
     profile: Profile | None = None
     figures: tuple[Measured, ...] = ()
     sentences: tuple[str, ...] = ()
+    width_ends: tuple[float, float, float] | None = None
 
 
 def cut(heightmap: HeightMap, section: Section | None, region: Rectangle | None) -> Cut:
     """Measure along a line and in a rectangle; None: not wanted."""
-    profile, figures, sentences = None, [], []
+    profile, ends, figures, sentences = None, None, [], []
     if section is not None:
         try:
             profile = take_profile(
@@ -77,7 +84,7 @@ def cut(heightmap: HeightMap, section: Section | None, region: Rectangle | None)
         second = (length * section.second[0], length * section.second[1])
         for measure in (
             lambda: step_height(profile, first_mm=first, second_mm=second),
-            lambda: width_at(profile),
+            lambda: width_at(profile, section.level_mm),
             lambda: slope(profile, *first),
             lambda: slope(profile, *second),
             lambda: angle_between(profile, first, second),
@@ -86,9 +93,11 @@ def cut(heightmap: HeightMap, section: Section | None, region: Rectangle | None)
                 figures.append(measure())
             except InputError as error:
                 sentences.append(error.found)
+        if any(figure.name == "width" for figure in figures):
+            ends = width_ends(profile, section.level_mm)
     if region is not None:
         try:
             figures.extend(roughness(heightmap, region).figures)
         except InputError as error:
             sentences.append(error.found)
-    return Cut(profile, tuple(figures), tuple(dict.fromkeys(sentences)))
+    return Cut(profile, tuple(figures), tuple(dict.fromkeys(sentences)), ends)

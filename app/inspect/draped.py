@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,7 @@ def draw_line(
     seen = [QPointF(float(x), float(y)) for x, y in camera.project(points, size)]
     changes = np.flatnonzero(np.diff(behind)) + 1
     edges = [0, *changes.tolist(), len(seen)]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges):
         part = QPolygonF(seen[max(first - 1, 0) : last])
         pens = [QPen(HALO, 3.6), QPen(QColor(line.colour), 1.8)]
         if behind[first]:

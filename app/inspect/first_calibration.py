@@ -7,12 +7,34 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
+from app.shell.context import AppContext
+from app.shell.jobs import Job, Jobs
 from app.workspace.workspace import Workspace
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.translation import tr
 
 # Measured: the pictures take about a third of the time.
 PICTURES_SHARE = 0.35
+
+
+def begin_first_calibration(jobs: Jobs, *, context: AppContext) -> None:
+    """Calibrate the virtual sensor beside the window, where it is the camera."""
+    bench, workspace = context.source.bench, context.workspace
+    if bench is None or jobs.busy:
+        return
+
+    def done(_path: Path) -> None:
+        context.toasts.show(tr("The virtual sensor is calibrated."), "pass")
+        context.requests.calibrations_changed.emit()
+
+    jobs.submit(
+        Job(
+            tr("Calibrating the virtual sensor"),
+            lambda tell: calibrate_virtual_sensor(bench.design, workspace, tell),
+            done,
+        )
+    )
 
 
 def calibrate_virtual_sensor(

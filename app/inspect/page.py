@@ -12,15 +12,16 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.inspect.actions import Deeds
-from app.inspect.advice import Known, Situation, advise
+from app.inspect.advice import Situation, advise
 from app.inspect.banner import Banner
-from app.inspect.first_calibration import calibrate_virtual_sensor
+from app.inspect.first_calibration import begin_first_calibration
 from app.inspect.library import CalibrationBox, Library
 from app.inspect.link import LiveLink
 from app.inspect.place import PixelPlaces, read_at
 from app.inspect.products import Shown
 from app.inspect.record_control import RecordControl
 from app.inspect.replay_bar import ReplayBar
+from app.inspect.situation import situation_of
 from app.inspect.views import Views
 from app.inspect.ways import WayChoice
 from app.inspect.zero import drift_sentence
@@ -272,21 +273,10 @@ class InspectPage(QWidget):
         self._advise()
 
     def _situation(self) -> Situation:
-        info, (live, _) = self.context.source.info, self._loaded
-        used = None
-        if live is not None:
-            camera = live.calibration.camera
-            used = Known(live.calibration.sensor.serial, (camera.width, camera.height))
-        summaries = (entry.summary for entry in self.library.entries)
-        return Situation(
-            kind="" if info is None else info.kind,
-            serial=self.link.serial,
-            size=self._size,
-            used=used,
-            library=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
-            trouble=self._trouble,
-            drift=self._drift,
-        )
+        return situation_of(
+            self.link, self.library, self._loaded[0], context=self.context,
+            size=self._size, trouble=self._trouble, drift=self._drift,
+        )  # fmt: skip
 
     def _advise(self) -> None:
         """Say what to do next, and look through the calibration only where it fits."""
@@ -321,18 +311,4 @@ class InspectPage(QWidget):
 
     def calibrate_now(self) -> None:
         """Calibrate the virtual sensor, so that there is something to see."""
-        bench, workspace = self.context.source.bench, self.context.workspace
-        if bench is None or self.jobs.busy:
-            return
-
-        def done(_path: Path) -> None:
-            self.context.toasts.show(tr("The virtual sensor is calibrated."), "pass")
-            self.context.requests.calibrations_changed.emit()
-
-        self.jobs.submit(
-            Job(
-                tr("Calibrating the virtual sensor"),
-                lambda tell: calibrate_virtual_sensor(bench.design, workspace, tell),
-                done,
-            )
-        )
+        begin_first_calibration(self.jobs, context=self.context)

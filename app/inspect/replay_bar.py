@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt, QTimer
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -23,11 +23,24 @@ SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 class ReplayBar(QWidget):
-    """Plays a recording as the person likes; hidden where there is none."""
+    """Plays a recording as the person likes; hidden where there is none.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    page : str
+        First part of its object name.
+
+    Signals
+    -------
+    moved()
+        The person went to another frame, or lets it play.
+    """
+
+    moved = Signal()
+
+    def __init__(self, page: str = "inspect") -> None:
         super().__init__()
-        named(self, "inspect.replay", tr("Replay"))
+        named(self, f"{page}.replay", tr("Replay"))
         self._source: RecordingSource | None = None
         row = QHBoxLayout(self)
         row.setContentsMargins(8, 2, 8, 2)
@@ -40,7 +53,7 @@ class ReplayBar(QWidget):
                 self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name,
                 tip=f"{text} ({keys})",
             )  # fmt: skip
-            button = named(QToolButton(), f"inspect.replay.{name}", text)
+            button = named(QToolButton(), f"{page}.replay.{name}", text)
             button.setDefaultAction(action)
             button.setAutoRaise(True)
             row.addWidget(button)
@@ -48,15 +61,15 @@ class ReplayBar(QWidget):
                 action.setCheckable(True)
                 self._play = action
         self._slider = named(
-            QSlider(Qt.Orientation.Horizontal), "inspect.replay.seek", tr("Place in the recording")
+            QSlider(Qt.Orientation.Horizontal), f"{page}.replay.seek", tr("Place in the recording")
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
-        self._words = named(QLabel(), "inspect.replay.words", tr("Where the recording is"))
+        self._words = named(QLabel(), f"{page}.replay.words", tr("Where the recording is"))
         row.addWidget(self._words)
-        self._loop = named(QCheckBox(tr("Loop")), "inspect.replay.loop", tr("Begin again"))
+        self._loop = named(QCheckBox(tr("Loop")), f"{page}.replay.loop", tr("Begin again"))
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
-        self._speed = named(QComboBox(), "inspect.replay.speed", tr("Speed"))
+        self._speed = named(QComboBox(), f"{page}.replay.speed", tr("Speed"))
         for speed in SPEEDS:
             self._speed.addItem(tr("{s:g} x").format(s=speed), speed)
         self._speed.activated.connect(self._set_speed)
@@ -93,17 +106,22 @@ class ReplayBar(QWidget):
 
     def _toggle(self) -> None:
         if self._source is not None:
-            (self._source.pause if self._source.playback().playing else self._source.play)()
+            playing = self._source.playback().playing
+            (self._source.pause if playing else self._source.play)()
             self._poll()
+            if not playing:
+                self.moved.emit()
 
     def _step(self, count: int) -> None:
         if self._source is not None:
             self._source.step(count)
             self._poll()
+            self.moved.emit()
 
     def _seek(self, index: int) -> None:
         if self._source is not None:
             self._source.seek(index)
+            self.moved.emit()
 
     def _set_speed(self, index: int) -> None:
         if self._source is not None:

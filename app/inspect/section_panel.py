@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -19,25 +18,22 @@ from PySide6.QtWidgets import (
 )
 
 from app.inspect.cuts import Cut, Section
-from app.shell import theme
+from app.inspect.profile_plot import ProfilePlot
 from app.widgets.naming import named
-from app.widgets.plots import without_menus
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.translation import tr
 
-CURVE = "#d6249f"
 FIRST, SECOND = QColor(11, 92, 173, 60), QColor(23, 138, 70, 60)
 DEG = "deg"
-LEAST_SPAN_MM = 0.05
 
 
 class SectionPanel(QWidget):
-    """Shows the profile with two ranges to be compared.
+    """Shows the profile with two ranges to be compared, and the level of the width.
 
     Signals
     -------
     changed()
-        A range, the width, or whether the rectangle is measured has changed.
+        A range, the width, the level, or whether the rectangle is measured has changed.
     save_wanted()
         The profile shall be written to a file.
     """
@@ -65,38 +61,35 @@ class SectionPanel(QWidget):
             tr("Sa, Sq and Sz in a rectangle on the height map"),
         )  # fmt: skip
         self._region.toggled.connect(self.changed)
+        self._make_level()
         save = named(
-            QPushButton(tr("Save profile…")), "inspect.section.save", tr("Save the profile"),
+            QPushButton(tr("Save…")), "inspect.section.save", tr("Save the profile"),
             tr("As a table (CSV)"),
         )  # fmt: skip
         save.clicked.connect(self.save_wanted)
         self._figures = named(QLabel(), "inspect.section.figures", tr("Measured"))
         self._figures.setWordWrap(True)
         self._figures.setMinimumWidth(180)
+        last = QHBoxLayout()
+        last.addWidget(self._region, 1)
+        last.addWidget(save)
         side = QVBoxLayout()
-        for widget in (self._width, self._region, self._figures):
-            side.addWidget(widget)
+        side.addWidget(self._width)
+        side.addWidget(self._level)
+        side.addLayout(last)
+        side.addWidget(self._figures)
         side.addStretch(1)
-        side.addWidget(save)
         row = QHBoxLayout(self)
         row.setContentsMargins(2, 2, 6, 4)
         row.addWidget(self._plot, 1)
         row.addLayout(side)
 
     def _make_plot(self) -> None:
-        self._plot = without_menus(
-            pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False), background=None)
+        self._plot = ProfilePlot("inspect.section.plot")
+        self._plot.setToolTip(
+            tr("Drag the two bands to compare them, and the dashed line to measure the width there")
         )
-        named(self._plot, "inspect.section.plot", tr("Depth along the line"))
-        self._plot.setMinimumHeight(90)
-        self._plot.setLabel("bottom", tr("along the line (mm)"))
-        self._plot.setLabel("left", tr("depth (mm)"))
-        for side in ("bottom", "left"):
-            self._plot.getAxis(side).enableAutoSIPrefix(False)
-        self._plot.showGrid(x=True, y=True, alpha=0.2)
-        self._plot.hideButtons()
-        self._plot.setMouseEnabled(x=False, y=False)
-        self._curve = self._plot.plot(pen=pg.mkPen(CURVE, width=2))
+        self._plot.allow_level()
         self._ranges = []
         for brush, share in ((FIRST, Section().first), (SECOND, Section().second)):
             region = pg.LinearRegionItem(
@@ -105,12 +98,31 @@ class SectionPanel(QWidget):
             region.sigRegionChanged.connect(self.changed)
             self._plot.addItem(region)
             self._ranges.append(region)
-        self._take_theme()
+
+    def _make_level(self) -> None:
+        self._level = named(
+            QDoubleSpinBox(), "inspect.section.level", tr("Depth at which the width is measured"),
+            tr("Depth at which the width is measured; 0: half way up"),
+        )  # fmt: skip
+        self._level.setRange(0.0, 5.0)
+        self._level.setDecimals(3)
+        self._level.setSingleStep(0.01)
+        self._level.setSpecialValueText(tr("width half way up"))
+        self._level.setPrefix(tr("width at "))
+        self._level.setSuffix(tr(" mm"))
+        self._level.valueChanged.connect(self.changed)
+        self._plot.level_dragged.connect(self._level.setValue)
 
     @property
     def width_mm(self) -> float:
         """Over which depth is averaged."""
         return float(self._width.value())
+
+    @property
+    def level_mm(self) -> float | None:
+        """Depth at which the width is measured; None: half way."""
+        value = float(self._level.value())
+        return value if value > 0.0 else None
 
     @property
     def has_region(self) -> bool:
@@ -130,13 +142,10 @@ class SectionPanel(QWidget):
     def show_cut(self, cut: Cut) -> None:
         """Show what was measured of a frame."""
         self.cut = cut
-        if cut.profile is None:
-            self._curve.setData([], [])
-        else:
-            along, depth = cut.profile.along_mm, cut.profile.depth_mm
-            self._follow_length(float(along[-1]))
-            self._curve.setData(along, depth)
-            self._fit(depth)
+        if cut.profile is not None:
+            self._follow_length(float(cut.profile.along_mm[-1]))
+        self._plot.show_profile(cut.profile)
+        self._plot.show_width(cut.width_ends)
         self._figures.setText("<br>".join([*figure_lines(cut.figures), *cut.sentences]))
 
     def _follow_length(self, length: float) -> None:
@@ -150,28 +159,7 @@ class SectionPanel(QWidget):
             item.setRegion([low * length, high * length])
             item.setBounds([0.0, length])
             item.blockSignals(False)
-        self._plot.setXRange(0.0, length, padding=0.02)
-
-    def _fit(self, depth: np.ndarray) -> None:
-        """Follow the depth's range, in steps that do not tremble with the noise."""
-        low, high = float(np.nanmin(depth)), float(np.nanmax(depth))
-        span = max(high - low, LEAST_SPAN_MM)
-        (shown_low, shown_high) = self._plot.getViewBox().viewRange()[1]
-        fits = shown_low <= low and shown_high >= high and shown_high - shown_low < 1.6 * span
-        if not fits:
-            self._plot.setYRange(low - 0.12 * span, high + 0.12 * span, padding=0.0)
-
-    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_ranges"):
-            self._take_theme()
-
-    def _take_theme(self) -> None:
-        pen = theme.colour("text")
-        for side in ("left", "bottom"):
-            axis = self._plot.getAxis(side)
-            axis.setPen(pen)
-            axis.setTextPen(pen)
+        self._plot.show_length(length)
 
 
 def figure_lines(figures: Sequence[Measured]) -> list[str]:

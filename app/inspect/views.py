@@ -194,7 +194,8 @@ class Views(QMainWindow):
     def _section(self) -> Section:
         start, end = self.line.ends_mm
         first, second = self.section.ranges
-        return Section(start, end, self.section.width_mm, first, second)
+        panel = self.section
+        return Section(start, end, panel.width_mm, first, second, panel.level_mm)
 
     def _measures_region(self) -> bool:
         return self._visible["section"] and self.section.has_region

@@ -6,7 +6,9 @@ from app.inspect.advice import Advice, Situation, advise
 from gelpolight_core.translation import tr
 
 
-def measuring_advice(now: Situation, *, held: bool, refused: str) -> Advice:
+def measuring_advice(
+    now: Situation, *, held: bool, refused: str, notes: tuple[str, ...] = ()
+) -> Advice:
     """Return what to do next.
 
     Parameters
@@ -17,6 +19,8 @@ def measuring_advice(now: Situation, *, held: bool, refused: str) -> Advice:
         Whether a picture is held or was opened, whatever the camera does.
     refused : str
         Why that picture cannot be measured on; empty where it can.
+    notes : tuple of str
+        What its reconstruction has to say.
     """
     live = advise(now)
     if now.used is None and (held or not now.kind):
@@ -25,7 +29,8 @@ def measuring_advice(now: Situation, *, held: bool, refused: str) -> Advice:
     if held:
         if refused:
             return Advice(refused, "live", tr("Back to the camera"), "fail", live.usable)
-        return Advice(usable=live.usable)
+        text = "; ".join(note[:1].upper() + note[1:] for note in notes)
+        return Advice(text, role="warn" if text else "text", usable=live.usable)
     if not now.kind:
         text = tr("No camera: choose one, open a picture, or try the virtual sensor.")
         return Advice(text, "virtual", tr("Use the virtual sensor"), usable=False)

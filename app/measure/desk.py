@@ -10,10 +10,11 @@ from PySide6.QtWidgets import (
     QFileDialog,
 )
 
-from app.inspect.advice import Known, Situation
+from app.inspect.advice import Situation
 from app.inspect.link import LiveLink
 from app.inspect.look import Look
 from app.inspect.products import Shown, Wanted
+from app.inspect.situation import situation_of
 from app.measure.advice import measuring_advice
 from app.measure.desk_frame import DeskFrame
 from app.measure.judging import Judged, judge
@@ -75,6 +76,10 @@ class Desk(DeskFrame):
         self.banner.act_wanted.connect(self._on_act)
         self.work.changed.connect(self._refresh)
         self.work.picture_changed.connect(self._refresh)
+        self.map.drawn.connect(self.details.show_tools)
+        self.details.wanted_changed.connect(self._want)
+        self.link.switched.connect(self._on_switched)
+        self.replay.moved.connect(self._on_replayed)
         self.work.busy_changed.connect(self._advise)
         self.work.refused.connect(self._on_refused)
         self.work.proposed.connect(self._on_proposed)
@@ -95,7 +100,7 @@ class Desk(DeskFrame):
         """Look at the source through the calibration in use."""
         self.library.refresh()
         self.show_validated()
-        self.link.want(Wanted(height=True))
+        self._want()
         self.link.enter(True)
         self.follow_bench()
         self._refresh()
@@ -110,6 +115,14 @@ class Desk(DeskFrame):
         self.work.close()
         self.link.use(None)
         self._loaded, self._shown = (None, None), None
+        self.details.finish()
+
+    def _want(self) -> None:
+        """Have made of live frames what is in sight."""
+        details = self.details
+        self.link.want(
+            Wanted(height=True, surface=details.wants_surface, camera=details.wants_camera)
+        )
 
     def open_file(self, path: Path) -> None:
         """Measure on a picture, or play a recording as the camera.
@@ -200,6 +213,7 @@ class Desk(DeskFrame):
         if self.work.taken is not None:
             return
         self.map.show_live(shown, Look())
+        self.details.show_live(shown)
         heightmap = shown.heightmap
         could, self._shown = self._can_hold, None if heightmap is None else shown
         if could != self._can_hold:
@@ -261,10 +275,23 @@ class Desk(DeskFrame):
     def _refresh(self) -> None:
         known = self.work.heightmap is not None or self._can_hold
         self.panel.show_work(self.work, known=known)
+        self._show_details()
         self.map.tools.allow(known)
         self.hold_action.setEnabled(self.work.taken is not None or self._can_hold)
         self.judge_again()
         self._advise()
+
+    def _show_details(self) -> None:
+        self.details.show_answer(self.work.answer)
+        self.details.show_result(self.work.tool, self.work.result)
+
+    def _on_switched(self) -> None:
+        self.replay.follow(None if self.link.stream is None else self.link.stream.source)
+
+    def _on_replayed(self) -> None:
+        """Let another frame of the recording be seen; the one that is held gives way."""
+        if self.work.taken is not None:
+            self.release()
 
     @property
     def _can_hold(self) -> bool:
@@ -292,6 +319,7 @@ class Desk(DeskFrame):
         self._refused, self._shown = "", None
         self.link.use(None)
         self.work.use(best)
+        self.details.use(None if best is None else best.calibration)
         if self.work.taken is None:
             self.map.say(tr("No depth yet."))
         self.show_validated()
@@ -312,25 +340,17 @@ class Desk(DeskFrame):
         self._advise()
 
     def _situation(self) -> Situation:
-        info, (live, _) = self.context.source.info, self._loaded
-        used = None
-        if live is not None:
-            camera = live.calibration.camera
-            used = Known(live.calibration.sensor.serial, (camera.width, camera.height))
-        summaries = (entry.summary for entry in self.library.entries)
-        return Situation(
-            kind="" if info is None else info.kind,
-            serial=self.link.serial,
-            size=self._size,
-            used=used,
-            library=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
-            trouble=self._trouble,
-        )
+        return situation_of(
+            self.link, self.library, self._loaded[0], context=self.context,
+            size=self._size, trouble=self._trouble,
+        )  # fmt: skip
 
     def _advise(self) -> None:
         """Say what to do next, and look through the calibration only where it fits."""
         held = self.work.taken is not None
-        advice = measuring_advice(self._situation(), held=held, refused=self._refused)
+        heightmap = self.work.heightmap if held else None
+        notes = () if heightmap is None else heightmap.notes
+        advice = measuring_advice(self._situation(), held=held, refused=self._refused, notes=notes)
         self.banner.advise(advice.text, (advice.act, advice.button), role=advice.role)
         live, best = self._loaded if advice.usable else (None, None)
         if live is not self.link.live:

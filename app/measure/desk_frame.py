@@ -11,14 +11,19 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMainWindow,
+    QMenu,
     QScrollArea,
+    QSplitter,
     QToolBar,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
 from app.inspect.banner import Banner
 from app.inspect.library import CalibrationBox, Library
+from app.inspect.replay_bar import ReplayBar
+from app.measure.details import Details
 from app.measure.side_panel import SidePanel
 from app.measure.tool_map import ToolMap
 from app.measure.work import Work
@@ -65,6 +70,8 @@ class DeskFrame(QMainWindow):
         self.library = Library(jobs, self.box, context=context)
         self.banner = Banner()
         self.map = ToolMap(self.work)
+        self.details = Details(jobs)
+        self.replay = ReplayBar("measure")
         self.panel = SidePanel()
         self.panel.who.setText(getpass.getuser())
         self.validated = named(QLabel(), "measure.validated", tr("Validated or not"))
@@ -80,13 +87,19 @@ class DeskFrame(QMainWindow):
         middle = QWidget()
         across = QHBoxLayout()
         across.setSpacing(0)
-        across.addWidget(self.map, 1)
+        self._split = named(QSplitter(Qt.Orientation.Vertical), "measure.split", tr("Views"))
+        self._split.addWidget(self.map)
+        self._split.addWidget(self.details)
+        self._split.setStretchFactor(0, 1)
+        self._split.setCollapsible(0, False)
+        across.addWidget(self._split, 1)
         across.addWidget(self.panel)
         column = QVBoxLayout(middle)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self.banner)
         column.addLayout(across, 1)
+        column.addWidget(self.replay)
         self.setCentralWidget(middle)
         self._build_bar()
         self._bench = QDockWidget(tr("Virtual bench"), self)
@@ -133,6 +146,8 @@ class DeskFrame(QMainWindow):
         bar.addActions([undo, redo])
         for action in (undo, redo):
             bar.widgetForAction(action).setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)
+        bar.addSeparator()
+        bar.addWidget(self._views_button())
         self.addToolBar(bar)
         make_action(
             self, "measure.propose", tr("What is pressed?"), self.propose_pressed.emit, keys=("Q",)
@@ -142,6 +157,34 @@ class DeskFrame(QMainWindow):
             self, "measure.keep_result", tr("Keep in the records"), self.keep_pressed.emit,
             keys=("Ctrl+Return",),
         )  # fmt: skip
+
+    def _views_button(self) -> QToolButton:
+        """Return the button that shows what the map does not."""
+        button = named(
+            QToolButton(), "measure.views", tr("Views"),
+            tr("The section that a tool reads; the tools in 3D and in the camera's picture"),
+        )  # fmt: skip
+        button.setText(tr("Views"))
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(button)
+        details = self.details
+        for name, text, part, keys in (
+            ("surface", tr("3D"), details.surface, "Alt+1"),
+            ("camera", tr("Camera"), details.camera, "Alt+3"),
+            ("section", tr("Section"), details.section, "Alt+6"),
+        ):
+            menu.addAction(
+                make_action(
+                    self, f"measure.show_{name}", text,
+                    lambda part=part: self._toggle_details(part), keys=(keys,),
+                )
+            )  # fmt: skip
+        button.setMenu(menu)
+        return button
+
+    def _toggle_details(self, part: QWidget) -> None:
+        there = self.details.isVisible() and self.details.currentWidget() is part
+        self.details.open_at(part, not there)
 
     def show_validated(self) -> None:
         """Say whether the calibration in use was tried on an object of known size."""

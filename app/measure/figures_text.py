@@ -8,8 +8,8 @@ from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.translation import tr
 
 MOST_DECIMALS = 4
-WITHOUT_SD = {"mm": 3, "um": 1, "deg": 2, "%": 2}
-UNITS = {"mm": " mm", "um": " \N{MICRO SIGN}m", "deg": "°", "%": " %"}
+WITHOUT_SD = {"mm": 3, "um": 1, "deg": 2, "%": 2, "percent": 2}
+UNITS = {"mm": " mm", "um": " \N{MICRO SIGN}m", "deg": "°", "%": " %", "percent": " %"}
 
 
 def decimals_for(sd: float | None, unit: str) -> int:

@@ -111,6 +111,8 @@ class Answer:
         Of the picture, with its uncertainty.
     picture : MapPicture
         How it is shown.
+    linear : (rows, columns, 3) float32
+        The camera's picture, linear light.
     results : mapping of int to ToolResult or str
         By the tools' keys; a sentence where a tool could not be applied.
     proposal : Proposal or None
@@ -119,6 +121,7 @@ class Answer:
 
     heightmap: HeightMap
     picture: MapPicture
+    linear: NDArray[np.float32]
     results: Mapping[int, ToolResult | str] = field(default_factory=lambda: MappingProxyType({}))
     proposal: Proposal | None = None
 
@@ -132,7 +135,7 @@ class Measuring:
     def __init__(self) -> None:
         self._reconstructor: Reconstructor | None = None
         self._taken: Taken | None = None
-        self._shown: tuple[HeightMap, MapPicture] | None = None
+        self._shown: tuple[HeightMap, MapPicture, NDArray[np.float32]] | None = None
         self._results: dict[Tool, ToolResult | str] = {}
 
     def __call__(self, question: Question) -> Answer:
@@ -143,16 +146,16 @@ class Measuring:
         InputError
             If the picture cannot be used, or is not of the calibration's size.
         """
-        heightmap, picture = self._depth_of(question)
+        heightmap, picture, linear = self._depth_of(question)
         results = {}
         for item in question.sheet.items:
             if item.tool not in self._results:
                 self._results[item.tool] = apply_tool(item.tool, heightmap)
             results[item.key] = self._results[item.tool]
         proposal = propose(heightmap) if question.propose else None
-        return Answer(heightmap, picture, MappingProxyType(results), proposal)
+        return Answer(heightmap, picture, linear, MappingProxyType(results), proposal)
 
-    def _depth_of(self, question: Question) -> tuple[HeightMap, MapPicture]:
+    def _depth_of(self, question: Question) -> tuple[HeightMap, MapPicture, NDArray[np.float32]]:
         reconstructor = self._reconstructor_for(question)
         if question.taken is not self._taken or self._shown is None:
             self._taken = None
@@ -160,7 +163,7 @@ class Measuring:
             heightmap = reconstructor.depth(
                 picture.rgb, name=question.taken.name, normals=False, uncertainty=True
             )
-            self._shown = heightmap, map_picture(heightmap, Look())
+            self._shown = heightmap, map_picture(heightmap, Look()), picture.rgb
             self._taken, self._results = question.taken, {}
         return self._shown
 

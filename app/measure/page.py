@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 
-from app.inspect.first_calibration import calibrate_virtual_sensor
+from app.inspect.first_calibration import begin_first_calibration
 from app.measure.desk import PICTURES, RECORDING, Desk
 from app.measure.indenters_dialog import IndentersDialog
 from app.measure.keeping import Kept, record_of
@@ -19,11 +19,12 @@ from app.measure.record_table import quantity_text, shape_label
 from app.measure.results_view import ResultsView
 from app.shell.context import AppContext
 from app.shell.dropping import dropped_paths
-from app.shell.jobs import Job, Jobs
+from app.shell.jobs import Jobs
 from app.shell.settings import Limits
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter, read_indenters, write_indenters
 from gelpolight_core.errors import InputError
+from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.translation import tr
 
 
@@ -62,6 +63,7 @@ class MeasurePage(QWidget):
         self.desk.limits_wanted.connect(self.edit_limits)
         self.desk.kept.connect(self.keep)
         self.desk.panel.records_wanted.connect(lambda: self.tabs.setCurrentWidget(self.results))
+        self.protocol.completed.connect(self._keep_evaluation)
         self.book.changed.connect(self._show_count)
         self.book.refused.connect(lambda text: context.toasts.show(text, "fail"))
         self.book.noticed.connect(lambda text: context.toasts.show(text, "warn"))
@@ -152,6 +154,16 @@ class MeasurePage(QWidget):
 
         self.book.add(record, done)
 
+    def _keep_evaluation(self, record: MeasurementRecord) -> None:
+        """Write a run that is complete into the records, once."""
+
+        def done(number: int) -> None:
+            if number:
+                text = tr("The evaluation is in the records as number {n}.")
+                self.context.toasts.show(text.format(n=number), "pass")
+
+        self.book.add_once(record, done)
+
     def _show_count(self) -> None:
         count = len(self.book.records)
         place = self.tabs.indexOf(self.results)
@@ -196,18 +208,4 @@ class MeasurePage(QWidget):
 
     def calibrate_now(self) -> None:
         """Calibrate the virtual sensor, so that there is something to measure with."""
-        bench, workspace = self.context.source.bench, self.context.workspace
-        if bench is None or self.jobs.busy:
-            return
-
-        def done(_path: Path) -> None:
-            self.context.toasts.show(tr("The virtual sensor is calibrated."), "pass")
-            self.context.requests.calibrations_changed.emit()
-
-        self.jobs.submit(
-            Job(
-                tr("Calibrating the virtual sensor"),
-                lambda tell: calibrate_virtual_sensor(bench.design, workspace, tell),
-                done,
-            )
-        )
+        begin_first_calibration(self.jobs, context=self.context)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import getpass
 import math
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
 from app.measure.protocol_press import PressingView
@@ -23,6 +25,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.protocol import Protocol, check_protocol, protocol_reach_mm
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.records.evaluation_entry import evaluation_record
 from gelpolight_core.translation import tr
 
 NAME_FORMAT = "%Y-%m-%d-%H%M%S"
@@ -35,7 +38,14 @@ class ProtocolView(QWidget):
     ----------
     context : AppContext
         The program's.
+
+    Signals
+    -------
+    completed(object)
+        A run is evaluated to its end: the MeasurementRecord to be kept of it.
     """
+
+    completed = Signal(object)
 
     def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -181,8 +191,22 @@ class ProtocolView(QWidget):
         self.work.evaluate()
 
     def _show_result(self, evaluation: Evaluation) -> None:
-        if self.result is not None:
-            self.result.show_evaluation(evaluation)
+        if self.result is None or self.work is None:
+            return
+        self.result.show_evaluation(evaluation)
+        run, limits = self.work.run, self.context.settings.limits
+        if run.next() is None:
+            record = evaluation_record(
+                evaluation,
+                serial=run.content.serial,
+                calibration_id=run.content.calibration,
+                size_limit_percent=limits.size_percent,
+                height_limit_percent=limits.height_percent,
+                operator=getpass.getuser(),
+                folder=str(run.folder),
+            )
+            if record is not None:
+                self.completed.emit(record)
 
     def _leave_run(self) -> None:
         self._close_run()

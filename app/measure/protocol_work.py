@@ -23,6 +23,7 @@ from gelpolight_core.measurement.presses import picture_reconstruction
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.run_lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.evaluation_files import write_evaluation_files
 from gelpolight_core.translation import tr
@@ -43,11 +44,14 @@ class Equipped:
         Of its calibration.
     ledger : Ledger
         What is measured already.
+    lock : RunLock
+        Keeps other programs from writing the run.
     """
 
     run: ProtocolRun
     reconstructor: Reconstructor
     ledger: Ledger
+    lock: RunLock
 
 
 def equip(run: ProtocolRun, calibration: Path) -> Equipped:
@@ -56,7 +60,8 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
     Raises
     ------
     InputError
-        If the calibration cannot be read, or the run was begun with another one.
+        If the calibration cannot be read, the run was begun with another one, or another program
+        writes it.
     """
     reconstructor = Reconstructor(read_calibration(calibration))
     made = reconstructor.calibration
@@ -68,7 +73,12 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
             where=str(run.folder),
             advice=tr("Use that calibration, or begin a new run"),
         )
-    return Equipped(run, reconstructor, run_ledger(run, reconstructor))
+    lock = RunLock(run.folder)
+    try:
+        return Equipped(run, reconstructor, run_ledger(run, reconstructor), lock)
+    except BaseException:
+        lock.release()
+        raise
 
 
 class ProtocolWork(QObject):
@@ -172,6 +182,7 @@ class ProtocolWork(QObject):
 
     def retire(self) -> None:
         """Stop measuring after the press at hand, and go; the run can be gone on with."""
+        self._equipped.lock.release()
         self._jobs.cancel()
         if self._jobs.busy:
             self._jobs.progressed.connect(self._go_when_done)
@@ -180,6 +191,7 @@ class ProtocolWork(QObject):
 
     def close(self) -> None:
         """Stop measuring and wait for the press at hand: nothing runs afterwards."""
+        self._equipped.lock.release()
         self._jobs.close()
 
     def _go_when_done(self, title: str, _share: float) -> None:

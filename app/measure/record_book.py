@@ -11,6 +11,7 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
 from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.records.evaluation_entry import add_once
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.translation import tr
 
@@ -70,6 +71,10 @@ class RecordBook(QObject):
     def add(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
         """Keep a measurement; `done` is told its number once it is on the disk."""
         self._do(tr("Keeping the measurement"), lambda records: records.add(record), done)
+
+    def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
+        """Keep an evaluation unless it is there already; `done` is told its number, or 0."""
+        self._do(tr("Keeping the evaluation"), lambda records: add_once(records, record), done)
 
     def remove(self, numbers: tuple[int, ...]) -> None:
         """Remove measurements; it can be undone."""

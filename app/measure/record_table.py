@@ -18,6 +18,7 @@ from app.measure.placing import kind_label
 from app.shell import theme
 from app.shell.icons import icon
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord, Quantity
+from gelpolight_core.records.evaluation_entry import SHAPE as EVALUATION
 from gelpolight_core.translation import tr
 
 Index = QModelIndex | QPersistentModelIndex
@@ -44,6 +45,8 @@ def verdict_word(verdict: str) -> str:
 
 def shape_label(shape: str) -> str:
     """Return what people call what was measured."""
+    if shape == EVALUATION:
+        return tr("Evaluation (mean errors)")
     return kind_label(shape.replace("_", "-"))
 
 
@@ -159,7 +162,7 @@ class RecordFilter(QSortFilterProxyModel):
 
 
 def _depth(record: MeasurementRecord) -> Quantity | None:
-    return record.quantity("height_mm")
+    return record.quantity("height_mm") or record.quantity("depth_error_percent")
 
 
 def _quantity(record: MeasurementRecord, column: int) -> Quantity | None:

@@ -49,10 +49,13 @@ class ToolMap(QWidget):
         A tool was chosen: the picture must stand.
     refused(str)
         A sentence: why a tool cannot be placed like this.
+    drawn(object, int)
+        The tools as they are drawn now (tuple of DrawnTool), and the key of the chosen one.
     """
 
     hold_wanted = Signal()
     refused = Signal(str)
+    drawn = Signal(object, int)
 
     def __init__(self, work: Work) -> None:
         super().__init__()
@@ -185,6 +188,7 @@ class ToolMap(QWidget):
         drawn = tuple(_drawn(item, work.results.get(item.key)) for item in work.sheet.items)
         grips = () if work.tool is None else grips_of(work.tool)
         self.layer.show_tools(drawn, work.chosen, grips, work.grip)
+        self.drawn.emit(drawn, work.chosen)
         self._tell()
 
     def _on_grip(self, name: str) -> None:

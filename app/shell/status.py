@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +12,9 @@ from PySide6.QtWidgets import QLabel, QStatusBar
 
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
+
+WINDOW_S = 3.0
+LEAST_HZ = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +31,8 @@ class Status:
         Time of the processing of one frame.
     dropped : int or None
         Frames that were not processed since the source was opened.
+    skipped_hz : float
+        Such frames a second, of late.
     calibration : str or None
         Name of the calibration in use.
     calibration_note : str
@@ -36,8 +43,28 @@ class Status:
     rate_hz: float | None = None
     processing_ms: float | None = None
     dropped: int | None = None
+    skipped_hz: float = 0.0
     calibration: str | None = None
     calibration_note: str = ""
+
+
+class Skipped:
+    """How many frames a second were skipped in the last seconds, from their number so far."""
+
+    def __init__(self) -> None:
+        self._counts: deque[tuple[float, int]] = deque()
+
+    def rate_hz(self, count: int | None, now_s: float) -> float:
+        """Note a number at a time; return the rate. None, or fewer than before: begin anew."""
+        if count is None or (self._counts and count < self._counts[-1][1]):
+            self._counts.clear()
+        if count is None:
+            return 0.0
+        self._counts.append((now_s, count))
+        while now_s - self._counts[0][0] > WINDOW_S:
+            self._counts.popleft()
+        (first_s, first), (last_s, last) = self._counts[0], self._counts[-1]
+        return (last - first) / (last_s - first_s) if last_s > first_s else 0.0
 
 
 class StatusModel(QObject):
@@ -48,9 +75,13 @@ class StatusModel(QObject):
     def __init__(self) -> None:
         super().__init__()
         self.value = Status()
+        self._skipped = Skipped()
 
     def update(self, **changes: Any) -> None:
         """Replace some fields; unknown names are refused."""
+        if "dropped" in changes:
+            rate = self._skipped.rate_hz(changes["dropped"], time.monotonic())
+            changes["skipped_hz"] = rate
         new = replace(self.value, **changes)
         if new != self.value:
             self.value = new
@@ -71,7 +102,14 @@ class StatusLine(QStatusBar):
                 ("camera", tr("Camera"), tr("Where the pictures come from")),
                 ("rate", tr("Frame rate"), tr("Frames a second from the camera")),
                 ("processing", tr("Processing time"), tr("Time to process one frame")),
-                ("dropped", tr("Dropped frames"), tr("Frames that were not processed")),
+                (
+                    "dropped",
+                    tr("Skipped frames"),
+                    tr(
+                        "Frames a second that are not looked at, for newer ones have come by then."
+                        "\nThat is as it should be; a recording keeps every frame."
+                    ),
+                ),
                 ("calibration", tr("Calibration in use"), tr("The calibration in use")),
             )
         }
@@ -90,6 +128,13 @@ class StatusLine(QStatusBar):
             label.setVisible(bool(text))
 
 
+def skipped_text(rate_hz: float) -> str:
+    """Return what is said of frames that are not looked at."""
+    if rate_hz < LEAST_HZ:
+        return tr("none skipped")
+    return tr("{n:.0f} a second skipped").format(n=max(rate_hz, 1.0))
+
+
 def status_texts(status: Status) -> dict[str, str]:
     """Return what each place of the status bar says; empty where nothing is known."""
     texts = {
@@ -98,7 +143,7 @@ def status_texts(status: Status) -> dict[str, str]:
         "processing": ""
         if status.processing_ms is None
         else tr("{x:.1f} ms").format(x=status.processing_ms),
-        "dropped": "" if status.dropped is None else tr("{n} dropped").format(n=status.dropped),
+        "dropped": "" if status.dropped is None else skipped_text(status.skipped_hz),
         "calibration": tr("No calibration in use")
         if status.calibration is None
         else status.calibration,

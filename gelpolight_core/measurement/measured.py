@@ -34,7 +34,8 @@ class Measured:
         In `unit`.
     sd : float or None
         Standard deviation: the picture's noise, the model and the calibration together. None
-        where the height map states none. How well a person placed the tool is no part of it.
+        where the height map states none. Points that a person placed count as known to one node;
+        how well lines, rectangles and rims were placed is no part of it.
     unit : str
         ``mm``, ``um`` or ``deg``.
     name : str

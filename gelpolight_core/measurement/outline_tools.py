@@ -92,7 +92,9 @@ class RectangleTool:
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         _check_edge(self.edge)
-        area, spread = self.rectangle, (0.0, 0.0)
+        # A side as drawn lies between two edges, each placed to one node.
+        by_hand = math.sqrt(2.0) * heightmap.pitch_mm
+        area, spread = self.rectangle, (by_hand, by_hand)
         if self.edge == "steepest":
             found = rectangle_at_steepest(heightmap, area)
             area, spread = found.rectangle, found.sides_sd_mm

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from gelpolight_core.measurement.measured import (
     flags_at,
     map_errors,
     measured,
+    value_at,
 )
 from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
@@ -56,14 +58,21 @@ class Distance:
         def deeper(d: Array, stretch: float) -> float:
             return float(d[1] - d[0])
 
+        places = np.stack([x, y], axis=1)
+
+        def by_places(at: Array, d: Array) -> tuple[float, ...]:
+            away = math.hypot(*(at[1] - at[0]))
+            return away, math.hypot(away, float(d[1] - d[0])), float(d[1] - d[0])
+
+        figures = (
+            measured("distance", "mm", plane, depth, errors),
+            measured("distance_3d", "mm", space, depth, errors),
+            measured("depth_difference", "mm", deeper, depth, errors),
+        )
         return tool_result(
             self,
-            (
-                measured("distance", "mm", plane, depth, errors),
-                measured("distance_3d", "mm", space, depth, errors),
-                measured("depth_difference", "mm", deeper, depth, errors),
-            ),
-            (np.stack([x, y], axis=1),),
+            with_placing(figures, by_places, places, heightmap),
+            (places,),
             flags_at(heightmap, x, y),
         )
 
@@ -144,15 +153,62 @@ class Angle:
             )
             return _angle_deg(first, second)
 
+        def by_places(at: Array, d: Array) -> tuple[float, ...]:
+            to_first, to_second = at[0] - at[1], at[2] - at[1]
+            first, second = np.array([*to_first, d[0] - d[1]]), np.array([*to_second, d[2] - d[1]])
+            return _angle_deg(to_first, to_second), _angle_deg(first, second)
+
+        figures = (
+            measured("angle", "deg", plane, depth, errors),
+            measured("angle_3d", "deg", space, depth, errors),
+        )
         return tool_result(
             self,
-            (
-                measured("angle", "deg", plane, depth, errors),
-                measured("angle_3d", "deg", space, depth, errors),
-            ),
+            with_placing(figures, by_places, places, heightmap),
             (places,),
             flags_at(heightmap, x, y),
         )
+
+
+def with_placing(
+    figures: tuple[Measured, ...],
+    compute: Callable[[Array, Array], tuple[float, ...]],
+    places_mm: Array,
+    heightmap: HeightMap,
+) -> tuple[Measured, ...]:
+    """Return figures with what placing adds: nobody places a point better than to one node.
+
+    Each place is moved by a node in x and in y, with the depth that the surface has there, and
+    the changes count as independent. Figures without a standard deviation keep none.
+
+    Parameters
+    ----------
+    figures : tuple of Measured
+        With the standard deviations of the depth alone.
+    compute : callable (places (N, 2), depths (N,)) -> values
+        The same figures from places.
+    places_mm : (N, 2)
+        Where the points are.
+    heightmap : HeightMap
+        What was measured on.
+    """
+    if all(figure.sd is None for figure in figures):
+        return figures
+    pitch = heightmap.pitch_mm
+    spread = np.zeros(len(figures))
+    for point in range(len(places_mm)):
+        for axis in range(2):
+            there = []
+            for step in (-pitch, pitch):
+                moved = np.array(places_mm, np.float64)
+                moved[point, axis] += step
+                depth = value_at(heightmap, heightmap.depth_mm, *moved.T)
+                there.append(compute(moved, depth))
+            spread += (0.5 * np.subtract(*there)) ** 2
+    return tuple(
+        figure if figure.sd is None else replace(figure, sd=math.hypot(figure.sd, math.sqrt(own)))
+        for figure, own in zip(figures, spread.tolist(), strict=True)
+    )
 
 
 def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:

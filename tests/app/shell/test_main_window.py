@@ -20,7 +20,7 @@ from app.shell.pages import PageEntry, all_pages
 from app.shell.preferences import PreferencesDialog
 from app.shell.settings import Limits, Settings
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
-from app.shell.status import Status, status_texts
+from app.shell.status import Skipped, Status, skipped_text, status_texts
 from gelpolight_core.errors import InputError
 
 
@@ -389,6 +389,16 @@ def test_the_demo_puts_the_virtual_sensor_in_once(window: MainWindow) -> None:
     assert window.page("calibrate").events == ["enter", "begin demo"]
 
 
+def test_frames_that_are_not_looked_at_are_told_as_a_rate_of_the_last_seconds() -> None:
+    skipped = Skipped()
+    rates = [skipped.rate_hz(1000 + 20 * second, float(second)) for second in range(8)]
+    assert rates[0] == 0.0 and rates[-1] == pytest.approx(20.0)
+    assert skipped.rate_hz(1140, 11.0) == 0.0
+    assert skipped.rate_hz(3, 12.0) == 0.0
+    assert skipped_text(20.4) == "20 a second skipped"
+    assert skipped_text(0.0) == "none skipped"
+
+
 def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
     assert status_texts(Status())["camera"] == "No camera"
     window.context.status.update(
@@ -403,7 +413,7 @@ def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
     said = {label.objectName(): label.text() for label in bar.findChildren(QLabel)}
     assert said["main.status.rate"] == "30.0 fps"
     assert said["main.status.processing"] == "10.7 ms"
-    assert said["main.status.dropped"] == "3 dropped"
+    assert said["main.status.dropped"] == "none skipped"
     assert "not validated" in said["main.status.calibration"]
     with pytest.raises(TypeError):
         window.context.status.update(speed=1)

@@ -1,0 +1,50 @@
+"""How things stand on a live page: what the advice is given on."""
+
+from __future__ import annotations
+
+from app.inspect.advice import Known, Situation, Size
+from app.inspect.library import Library
+from app.inspect.link import LiveLink
+from app.shell.context import AppContext
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+
+def situation_of(
+    link: LiveLink,
+    library: Library,
+    loaded: Reconstructor | None,
+    *,
+    context: AppContext,
+    size: Size | None,
+    trouble: str,
+    drift: str = "",
+) -> Situation:
+    """Return how things stand.
+
+    Parameters
+    ----------
+    link : LiveLink
+        With the source's stream.
+    library : Library
+        All calibrations.
+    loaded : Reconstructor or None
+        Of the calibration in use.
+    context : AppContext
+        With the choice of the source.
+    size, trouble, drift
+        As in :class:`Situation`.
+    """
+    info, used = context.source.info, None
+    if loaded is not None:
+        camera = loaded.calibration.camera
+        used = Known(loaded.calibration.sensor.serial, (camera.width, camera.height))
+    summaries = (entry.summary for entry in library.entries)
+    return Situation(
+        kind="" if info is None else info.kind,
+        serial=link.serial,
+        size=size,
+        used=used,
+        library=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
+        trouble=trouble,
+        drift=drift,
+    )

@@ -1,0 +1,94 @@
+"""An evaluation by the protocol as one line of the lab's records."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+from gelpolight_core.measurement.evaluation import DIRECTIONS, Evaluation, Group
+from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord, Quantity
+from gelpolight_core.records.records import Records
+
+SHAPE = "evaluation"
+NAMES = {"planar": "planar_error_percent", "depth": "depth_error_percent"}
+
+
+def evaluation_record(
+    evaluation: Evaluation,
+    *,
+    serial: str,
+    calibration_id: str,
+    size_limit_percent: float,
+    height_limit_percent: float,
+    operator: str = "",
+    folder: str = "",
+) -> MeasurementRecord | None:
+    """Return what is to be kept of a whole evaluation: its mean absolute errors.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        Of all presses.
+    serial, calibration_id, operator
+        As in :class:`MeasurementRecord`.
+    size_limit_percent, height_limit_percent : float
+        Largest mean errors that pass.
+    folder : str
+        Where the presses are; kept as the picture's name.
+
+    Returns
+    -------
+    record : MeasurementRecord or None
+        None where nothing could be measured.
+    """
+    limits = {"planar": size_limit_percent, "depth": height_limit_percent}
+    errors = {
+        direction: evaluation.overall(direction).mean_absolute_percent for direction in DIRECTIONS
+    }
+    found = {direction: error for direction, error in errors.items() if math.isfinite(error)}
+    if not found:
+        return None
+    quantities = tuple(Quantity(NAMES[direction], error) for direction, error in found.items())
+    within = all(error <= limits[direction] for direction, error in found.items())
+    failed = len(evaluation.failed)
+    return MeasurementRecord(
+        serial=serial,
+        calibration_id=calibration_id,
+        shape=SHAPE,
+        quantities=quantities,
+        verdict=DOUBTFUL if failed else (PASSED if within else FAILED),
+        reason="" if not failed else f"{failed} of {len(evaluation.results)} not measured",
+        settings={"limits_percent": limits},
+        details={"groups": [_plain(group) for group in evaluation.groups]},
+        operator=operator,
+        picture=folder,
+    )
+
+
+def add_once(records: Records, record: MeasurementRecord) -> int:
+    """Add an evaluation, unless one of the same run with the same errors is there.
+
+    Returns
+    -------
+    number : int
+        The new one's; 0 where nothing was added.
+    """
+    for known in records.measurements():
+        same = (known.shape, known.picture, known.calibration_id) == (
+            record.shape,
+            record.picture,
+            record.calibration_id,
+        )
+        if same and known.quantities == record.quantities:
+            return 0
+    return records.add(record)
+
+
+def _plain(group: Group) -> dict[str, Any]:
+    """Return plain values; what is not known, None."""
+    plain = asdict(group)
+    plain["statistic"] = {
+        key: value if math.isfinite(value) else None for key, value in plain["statistic"].items()
+    }
+    return plain
