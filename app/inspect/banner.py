@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QEvent, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.shell import theme
@@ -14,7 +14,12 @@ TELL_FROM = 0.005
 
 
 class Banner(QWidget):
-    """Says what to do next.
+    """Says what to do next; its room is its own, so that nothing moves when it has nothing to say.
+
+    Parameters
+    ----------
+    idle : str
+        Said quietly where there is nothing else.
 
     Signals
     -------
@@ -27,10 +32,11 @@ class Banner(QWidget):
     act_wanted = Signal(str)
     stop_wanted = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, idle: str = "") -> None:
         super().__init__()
         named(self, "inspect.banner", tr("What to do next"))
-        self._act, self._advice = "", ""
+        self._act, self._advice, self._role = "", "", ""
+        self._idle = idle
         self._text = named(QLabel(), "inspect.advice", tr("Advice"))
         self._text.setWordWrap(True)
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -41,18 +47,18 @@ class Banner(QWidget):
         self._stop = named(QPushButton(tr("Stop")), "inspect.stop", tr("Stop the work"))
         self._stop.clicked.connect(self.stop_wanted)
         row = QHBoxLayout(self)
-        row.setContentsMargins(10, 5, 10, 5)
+        row.setContentsMargins(10, 4, 10, 4)
         for widget in (self._text, self._button, self._bar, self._stop):
             row.addWidget(widget)
+        lines = 2 * self._text.fontMetrics().lineSpacing()
+        self.setFixedHeight(max(lines, self._button.sizeHint().height()) + 8)
         self._working = False
         self._show()
 
     def advise(self, text: str, act: tuple[str, str] = ("", ""), *, role: str = "") -> None:
         """Say something, with a button (name, text) that does it; empty: nothing."""
-        self._advice, self._act = text, act[0]
+        self._advice, self._act, self._role = text, act[0], role
         self._button.setText(act[1])
-        colour = theme.colour(role or "text").name()
-        self._text.setStyleSheet(f"color: {colour};")
         self._show()
 
     def show_work(self, title: str, share: float) -> None:
@@ -63,10 +69,17 @@ class Banner(QWidget):
             self._text.setText(tr("{title}…").format(title=title))
         self._show()
 
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_working"):
+            self._show()
+
     def _show(self) -> None:
+        role = "text" if self._working else self._role or "text"
         if not self._working:
-            self._text.setText(self._advice)
+            self._text.setText(self._advice or self._idle)
+            role = role if self._advice else "muted"
+        self._text.setStyleSheet(f"color: {theme.colour(role).name()};")
         self._button.setVisible(bool(self._act) and not self._working)
         self._bar.setVisible(self._working)
         self._stop.setVisible(self._working)
-        self.setVisible(self._working or bool(self._advice))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import json
+import math
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -71,6 +73,35 @@ class Look:
     relief: bool = True
     exaggeration: float = 1.0
     light: Light = field(default_factory=Light)
+
+
+def look_as_text(look: Look) -> str:
+    """Return a look as text for the settings."""
+    return json.dumps(asdict(look))
+
+
+def look_from_text(text: str) -> Look:
+    """Return the look that a text describes; what it does not say, or says wrongly, is as usual."""
+    try:
+        kept = json.loads(text)
+        span, light = kept["range_mm"], kept["light"]
+        look = Look(
+            colours=str(kept["colours"]),
+            range_mm=None if span is None else (float(span[0]), float(span[1])),
+            contour_mm=float(kept["contour_mm"]),
+            relief=bool(kept["relief"]),
+            exaggeration=float(kept["exaggeration"]),
+            light=Light(float(light["azimuth_deg"]), float(light["height_deg"])),
+        )
+    except (ValueError, KeyError, TypeError, IndexError):
+        return Look()
+    return look if look.colours in COLOUR_MAPS and _is_finite(look) else Look()
+
+
+def _is_finite(look: Look) -> bool:
+    light = look.light
+    numbers = (look.contour_mm, look.exaggeration, light.azimuth_deg, light.height_deg)
+    return all(math.isfinite(number) for number in (*numbers, *(look.range_mm or ())))
 
 
 @lru_cache(maxsize=16)

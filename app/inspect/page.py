@@ -57,7 +57,9 @@ class InspectPage(QWidget):
         self.box = CalibrationBox()
         self.library = Library(self.jobs, self.box, context=context)
         self.ways = WayChoice(self.jobs, self, context=context)
-        self.banner = Banner()
+        self.banner = Banner(
+            tr("Press an object into the membrane. Space lets the picture stand with all detail.")
+        )
         self._readout = named(QLabel(), "inspect.readout", tr("What is under the cursor"))
         self._rate = named(QLabel(), "inspect.rate", tr("How fast it is shown"))
         self._cursor = (math.nan, math.nan)

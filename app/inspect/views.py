@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 from app.inspect.cuts import Section
 from app.inspect.draped import DrapedLine
 from app.inspect.height_panel import HeightPanel
-from app.inspect.look import Look
+from app.inspect.look import Look, look_as_text, look_from_text
 from app.inspect.look_panel import LookPanel
 from app.inspect.normals_panel import NormalsPanel
 from app.inspect.products import Shown, Wanted
@@ -262,16 +262,19 @@ class Views(QMainWindow):
     # Layout
 
     def restore(self) -> None:
-        """Arrange the views as they were left."""
+        """Arrange the views and show depth as they were left."""
+        self.look.show_look(look_from_text(self._context.settings.look))
+        self._on_look()
         state = self._context.settings.layout("inspect")
         if not state.isEmpty():
             self.restoreState(state, LAYOUT_VERSION)
         self.follow_source()
 
     def keep(self) -> None:
-        """Remember how the views are arranged."""
+        """Remember how the views are arranged, and how they show depth."""
         state: QByteArray = self.saveState(LAYOUT_VERSION)
         self._context.settings.keep_layout("inspect", state)
+        self._context.settings.look = look_as_text(self.look.look)
 
     def finish(self) -> None:
         """Give back what the views hold."""

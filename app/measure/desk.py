@@ -64,6 +64,7 @@ class Desk(DeskFrame):
         self._shown: Shown | None = None
         self._trouble = self._refused = ""
         self._connect()
+        self.restore()
 
     def _connect(self) -> None:
         self.hold_pressed.connect(self.toggle_hold)
@@ -107,6 +108,7 @@ class Desk(DeskFrame):
 
     def leave(self) -> None:
         """Let the source go; a picture that is held stays."""
+        self.keep_layout()
         self.link.enter(False)
 
     def close_work(self) -> None:

@@ -68,7 +68,9 @@ class DeskFrame(QMainWindow):
         self.box = CalibrationBox()
         self.box.setObjectName("measure.calibration")
         self.library = Library(jobs, self.box, context=context)
-        self.banner = Banner()
+        self.banner = Banner(
+            tr("Place a tool, or ask what is pressed. Space goes back to the camera.")
+        )
         self.map = ToolMap(self.work)
         self.details = Details(jobs)
         self.replay = ReplayBar("measure")
@@ -181,6 +183,14 @@ class DeskFrame(QMainWindow):
             )  # fmt: skip
         button.setMenu(menu)
         return button
+
+    def restore(self) -> None:
+        """Divide the room between the map and what is below it as it was left."""
+        self._split.restoreState(self.context.settings.layout("measure"))
+
+    def keep_layout(self) -> None:
+        """Remember how the room is divided."""
+        self.context.settings.keep_layout("measure", self._split.saveState())
 
     def _toggle_details(self, part: QWidget) -> None:
         there = self.details.isVisible() and self.details.currentWidget() is part

@@ -150,6 +150,15 @@ class Settings:
         """Remember the layout of a page's views."""
         self._store.setValue(f"layout/{page}", state)
 
+    @property
+    def look(self) -> str:
+        """How depth is shown, as text that the views understand; empty at first."""
+        return self._text("look")
+
+    @look.setter
+    def look(self, text: str) -> None:
+        self._store.setValue("look", text)
+
     def save(self) -> None:
         """Write the file now."""
         self._store.sync()

@@ -204,7 +204,7 @@ def with_placing(
                 moved[point, axis] += step
                 depth = value_at(heightmap, heightmap.depth_mm, *moved.T)
                 there.append(compute(moved, depth))
-            spread += (0.5 * np.subtract(*there)) ** 2
+            spread += (0.5 * np.subtract(there[0], there[1])) ** 2
     return tuple(
         figure if figure.sd is None else replace(figure, sd=math.hypot(figure.sd, math.sqrt(own)))
         for figure, own in zip(figures, spread.tolist(), strict=True)

@@ -1,0 +1,30 @@
+"""Two programs on one run of the protocol."""
+
+from __future__ import annotations
+
+import getpass
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.run_lock import RunLock
+
+
+def test_a_second_program_is_told_who_writes_the_run(tmp_path: Path) -> None:
+    with RunLock(tmp_path), pytest.raises(InputError) as refusal:
+        RunLock(tmp_path)
+    assert getpass.getuser() in str(refusal.value)
+    assert str(tmp_path) in str(refusal.value)
+
+
+def test_a_run_that_was_left_can_be_written_by_another(tmp_path: Path) -> None:
+    first = RunLock(tmp_path)
+    first.release()
+    first.release()
+    RunLock(tmp_path).release()
+
+
+def test_a_folder_that_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        RunLock(tmp_path / "nowhere")

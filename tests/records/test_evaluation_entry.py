@@ -1,0 +1,59 @@
+"""Evaluations in the lab's records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.measurement.evaluation import Evaluation, PressResult
+from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.truth import PressTruth
+from gelpolight_core.records.evaluation_entry import add_once, evaluation_record
+from gelpolight_core.records.records import NAME, Records
+
+
+class _Measured:
+    """Stands for a measurement; only its being there counts."""
+
+
+def evaluation(*errors: tuple[float, float], failed: int = 0) -> Evaluation:
+    truth = PressTruth("p.png", Truth("cylinder", 5.0, 1.0))
+    good = [PressResult(truth, _Measured(), "", size, depth) for size, depth in errors]  # type: ignore[arg-type]
+    nan = float("nan")
+    bad = [PressResult(truth, None, "too dark", nan, nan)] * failed
+    return Evaluation((*good, *bad), (), ())
+
+
+def record(found: Evaluation, **more: object) -> object:
+    return evaluation_record(
+        found,
+        serial="A",
+        calibration_id="A-1",
+        size_limit_percent=5.0,
+        height_limit_percent=8.0,
+        folder="run",
+        **more,  # type: ignore[arg-type]
+    )
+
+
+def test_the_mean_errors_are_kept_and_judged_by_the_limits() -> None:
+    kept = record(evaluation((2.0, -4.0), (-4.0, 6.0)))
+    assert kept.quantity("planar_error_percent").value == pytest.approx(3.0)
+    assert kept.quantity("depth_error_percent").value == pytest.approx(5.0)
+    assert kept.verdict == "pass"
+    assert record(evaluation((6.0, 1.0))).verdict == "fail"
+    assert record(evaluation((1.0, 1.0), failed=1)).verdict == "doubtful"
+    assert record(evaluation(failed=2)) is None
+
+
+def test_the_same_evaluation_is_kept_once(tmp_path: Path) -> None:
+    records = Records.open(tmp_path / NAME)
+    try:
+        first = add_once(records, record(evaluation((2.0, 2.0))))
+        assert first > 0
+        assert add_once(records, record(evaluation((2.0, 2.0)))) == 0
+        assert add_once(records, record(evaluation((2.0, 3.0)))) > first
+        assert [r.shape for r in records.measurements()] == ["evaluation"] * 2
+    finally:
+        records.close()
