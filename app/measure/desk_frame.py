@@ -36,6 +36,7 @@ from app.widgets.source_button import SourceButton
 from gelpolight_core.translation import tr
 
 BENCH_WIDTH = 270
+FIRST_SIZES = [620, 300]
 
 
 class DeskFrame(QMainWindow):
@@ -94,6 +95,7 @@ class DeskFrame(QMainWindow):
         self._split.addWidget(self.details)
         self._split.setStretchFactor(0, 1)
         self._split.setCollapsible(0, False)
+        self._split.setSizes(FIRST_SIZES)
         across.addWidget(self._split, 1)
         across.addWidget(self.panel)
         column = QVBoxLayout(middle)

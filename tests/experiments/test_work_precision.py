@@ -13,6 +13,7 @@ import pytest
 from app.command_line import work_precision
 from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.experiments.integrators import measure_integrators
 from gelpolight_core.experiments.methods import Scene, methods
@@ -128,6 +129,20 @@ def test_the_report_holds_every_method(
     with (out / "work-precision.csv").open() as stream:
         assert len(list(csv.DictReader(stream))) == len(points)
     assert (out / "work-precision.html").read_text().count("data:image/png") == 3
+
+
+def test_one_calibration_is_measured_as_it_is(
+    small_calibration: Calibration, small_session: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "small.gplcal"
+    write_calibration(small_calibration, file)
+    arguments = ["work-precision", str(small_session), "--calibration", str(file), "--repeats", "1"]
+    out = tmp_path / "out"
+    assert main([*arguments, "--methods", "paper,directional", "-o", str(out)]) == 0
+    points = json.loads((out / "work-precision.json").read_text())["points"]
+    paper, directional = points
+    assert paper["rms_um"] > 0.0 and paper["median_ms"] > 0.0
+    assert directional["gap"] and directional["rms_um"] is None
 
 
 @pytest.mark.parametrize(

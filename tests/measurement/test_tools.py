@@ -112,6 +112,19 @@ def test_a_distance_is_told_in_the_plane_in_space_and_in_depth() -> None:
         Distance((0.0, 0.0), (30.0, 0.0)).apply(made(lambda x, y: x))
 
 
+def test_points_placed_by_hand_are_known_to_one_node_and_no_better() -> None:
+    slope = made(lambda x, y: 0.5 * x, **stated(8, 1e-7))
+    result = Distance((0.0, 0.0), (3.0, 0.0)).apply(slope)
+    assert result["distance"].sd >= math.sqrt(2.0) * PITCH * 0.999
+    assert result["distance"].sd < 3.0 * PITCH
+    assert result["depth_difference"].sd == pytest.approx(0.5 * math.sqrt(2.0) * PITCH, rel=0.05)
+    angle = Angle((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)).apply(slope)["angle"]
+    assert math.radians(angle.sd) == pytest.approx(math.hypot(*[PITCH / 2.0] * 4), rel=0.05)
+    drawn = RectangleTool(Rectangle((0.0, 0.0), (2.0, 1.0))).apply(slope)
+    assert drawn["side_a"].sd >= math.sqrt(2.0) * PITCH
+    assert Distance((0.0, 0.0), (3.0, 0.0)).apply(made(lambda x, y: x))["distance"].sd is None
+
+
 def test_an_angle_is_told_in_the_plane_and_in_space() -> None:
     result = Angle((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)).apply(made(lambda x, y: x + y))
     assert result["angle"].value == pytest.approx(90.0)

@@ -95,6 +95,20 @@ def test_the_profile_on_screen_is_the_core_s(dome: HeightMap, frame: Frame) -> N
     assert {"step_height", "slope", "angle", "sa", "sq", "sz"} <= set(figures)
 
 
+def test_the_width_is_measured_at_the_level_that_is_chosen(dome: HeightMap, frame: Frame) -> None:
+    line = (-4.0, -1.0), (7.0, -1.0)
+    half, _ = _made(dome, frame, section=Section(*line))
+    low, _ = _made(dome, frame, section=Section(*line, level_mm=0.1))
+    assert half.cut.width_ends is not None and low.cut.width_ends is not None
+    assert half.cut.width_ends[2] == pytest.approx(0.4, abs=0.01)
+    assert low.cut.width_ends[2] == 0.1
+    left, right, _level = low.cut.width_ends
+    width = next(f.value for f in low.cut.figures if f.name == "width")
+    assert width == pytest.approx(right - left)
+    # The dome is 0.8 - (r / 3)^2 deep.
+    assert width == pytest.approx(2.0 * 3.0 * np.sqrt(0.7), abs=0.05)
+
+
 def test_a_line_beside_the_sensor_says_so_and_measures_nothing(
     dome: HeightMap, frame: Frame
 ) -> None:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtGui import QAction, QDropEvent
 from pytestqt.qtbot import QtBot
 
 from app.command_line.main import main
@@ -23,6 +23,9 @@ from app.shell.context import AppContext
 from app.shell.settings import Limits
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.measurement.tools import ProfileWidth
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
 
 PATIENCE_MS = 60_000
 
@@ -285,3 +288,50 @@ def test_a_steady_press_before_the_camera_is_held_and_recognised_by_itself(
     desk.hold_action.trigger()
     assert desk.work.taken is None
     assert not desk.panel.keep.isEnabled()
+
+
+@pytest.mark.usefixtures("library")
+def test_a_section_is_shown_where_its_width_was_read_and_the_tools_in_the_other_views(
+    page: MeasurePage, qtbot: QtBot, press: Path
+) -> None:
+    page.open_path(press)
+    desk = page.desk
+    qtbot.waitUntil(lambda: desk.work.heightmap is not None, timeout=PATIENCE_MS)
+    desk.details.open_at(desk.details.section)
+    depth = desk.work.heightmap
+    row, column = np.unravel_index(depth.depth_mm.argmax(), depth.depth_mm.shape)
+    x, y = float(depth.x_mm[column]), float(depth.y_mm[row])
+    desk.work.add(ProfileWidth((x - 6.0, y), (x + 6.0, y)))
+    _measured(page, qtbot)
+    assert desk.details.section.currentWidget() is desk.details.plot
+    assert not desk.map.panel.grab().isNull() and not desk.details.plot.grab().isNull()
+
+    desk.details.open_at(desk.details.camera)
+    assert desk.details.camera.picture_size == (320, 240)
+    desk.details.open_at(desk.details.surface)
+    qtbot.waitUntil(lambda: desk.details.surface.view is not None, timeout=PATIENCE_MS)
+    view = desk.details.surface.view
+    qtbot.waitUntil(lambda: view.drawings > 0, timeout=PATIENCE_MS)
+    desk.details.open_at(desk.details.surface, False)
+    assert not desk.details.wants_surface
+
+
+@pytest.mark.usefixtures("library")
+def test_a_recording_is_gone_through_frame_by_frame(
+    page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
+) -> None:
+    rgb = np.ascontiguousarray(cv2.imread(str(press))[..., ::-1])
+    path = tmp_path / "press.gplrec"
+    with RecordingWriter(path, RecordingHeader(serial="virtual-1")) as writer:
+        for number in range(4):
+            writer.append(rgb, number, 100.0 + 0.05 * number)
+    page.desk.auto.setChecked(False)
+    page.open_path(path)
+    desk = page.desk
+    qtbot.waitUntil(lambda: desk.replay.isVisible(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: desk.hold_action.isEnabled(), timeout=PATIENCE_MS)
+    desk.hold()
+    assert desk.work.taken is not None
+    desk.replay.findChild(QAction, "replay.on").trigger()
+    assert desk.work.taken is None
+    qtbot.waitUntil(lambda: desk.hold_action.isEnabled(), timeout=PATIENCE_MS)
