@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import pyqtgraph as pg
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
+    QFrame,
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
@@ -25,6 +27,7 @@ from gelpolight_core.translation import tr
 
 FIRST, SECOND = QColor(11, 92, 173, 60), QColor(23, 138, 70, 60)
 DEG = "deg"
+SIDE_WIDTH = 186
 
 
 class SectionPanel(QWidget):
@@ -69,7 +72,13 @@ class SectionPanel(QWidget):
         save.clicked.connect(self.save_wanted)
         self._figures = named(QLabel(), "inspect.section.figures", tr("Measured"))
         self._figures.setWordWrap(True)
-        self._figures.setMinimumWidth(180)
+        self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
+        scroll = QScrollArea()
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(self._figures)
+        scroll.setFixedWidth(SIDE_WIDTH)
         last = QHBoxLayout()
         last.addWidget(self._region, 1)
         last.addWidget(save)
@@ -77,8 +86,7 @@ class SectionPanel(QWidget):
         side.addWidget(self._width)
         side.addWidget(self._level)
         side.addLayout(last)
-        side.addWidget(self._figures)
-        side.addStretch(1)
+        side.addWidget(scroll, 1)
         row = QHBoxLayout(self)
         row.setContentsMargins(2, 2, 6, 4)
         row.addWidget(self._plot, 1)
@@ -179,4 +187,5 @@ def figure_text(figure: Measured, where: str = "") -> str:
     unit = "°" if figure.unit == DEG else f" {figure.unit}"
     digits = {"mm": 3, "um": 1}.get(figure.unit, 1)
     sd = "" if figure.sd is None else f" ± {figure.sd:.{digits}f}"
-    return f"{figure.label}{where}: <b>{figure.value:.{digits}f}{sd}{unit}</b>"
+    value = round(figure.value, digits) + 0.0  # never -0.0
+    return f"{figure.label}{where}: <b>{value:.{digits}f}{sd}{unit}</b>"

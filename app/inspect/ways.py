@@ -17,7 +17,7 @@ from gelpolight_core.reconstruction.efforts import FOUND, FULL, PAPER, WAYS, Way
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
-WIDTH_CHARACTERS = 30
+WIDTH_CHARACTERS = 32
 TIMED = 15
 """Frames that a time is the median of."""
 
