@@ -24,7 +24,9 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.protocol import PressWanted, Protocol
 from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.run_lock import RunLock
 from gelpolight_core.optics.refraction import camera_to_membrane
+from gelpolight_core.records.entry import MeasurementRecord
 
 WAIT_MS = 30_000
 
@@ -164,7 +166,12 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
     assert view.work is None
     again = view.findChild(QPushButton, "protocol.run.0")
     assert "1 of 2 presses" in again.text()
-    again.click()
+    with RunLock(folder):  # as another program does
+        again.click()
+        qtbot.waitUntil(lambda: "written by" in view.setup.problem.text(), timeout=WAIT_MS)
+    kept: list[MeasurementRecord] = []
+    view.completed.connect(kept.append)
+    view.findChild(QPushButton, "protocol.run.0").click()
     qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
     assert view.work.run.folder == folder
     take_bare(view, qtbot)
@@ -172,6 +179,9 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
 
     # The last press leads to the result by itself.
     qtbot.waitUntil(lambda: "all 2 presses" in view.result.verdict.text(), timeout=WAIT_MS)
+    assert [(r.shape, r.picture, r.serial) for r in kept] == [
+        ("evaluation", str(folder), view.work.run.content.serial)
+    ]
     view.result.save(folder / "report")
     qtbot.waitUntil((folder / "report" / "gauge.csv").is_file, timeout=WAIT_MS)
     names = {path.suffix for path in (folder / "report").iterdir()}
