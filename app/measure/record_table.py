@@ -118,8 +118,9 @@ class RecordModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.TextAlignmentRole and column in _RIGHT:
             return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         if role == Qt.ItemDataRole.DecorationRole and column == WHAT:
-            name = f"tool-{record.shape.replace('_', '-')}"
-            return icon(name)
+            if record.shape == EVALUATION:
+                return icon("report")
+            return icon(f"tool-{record.shape.replace('_', '-')}")
         if role == Qt.ItemDataRole.DecorationRole and column == VERDICT:
             found = _VERDICTS.get(record.verdict)
             return None if found is None else icon(*found)
