@@ -1,20 +1,14 @@
-"""A calibration in the making: captures, decisions and results of one session folder.
+"""A calibration in the making: a session folder, its results, and which of them are stale.
 
-Everything captured or decided is on disk before the call that brings it returns, so that a crash
-loses nothing; results are made anew from there. The project knows which results are stale. It may
-be used by two threads: one that captures and decides, one that computes.
+Results are made anew from what is on disk. The project may be used by two threads: one that
+captures and decides, one that computes.
 """
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.inputs import (
@@ -25,34 +19,15 @@ from gelpolight_core.calibration.inputs import (
     changes_between,
     inputs_of,
 )
-from gelpolight_core.calibration.intake import read_bytes, refuse_other_size, refuse_unfit
+from gelpolight_core.calibration.kept_session import KeptSession
 from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, stages_of
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.status import StageState, StageStatus, judged
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.quality import QualityTable
-from gelpolight_core.session.capture import average_frames, write_picture
-from gelpolight_core.session.copies import file_hash, refuse_copies
-from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
-from gelpolight_core.session.decisions import (
-    Decisions,
-    PlacedCircle,
-    Point,
-    write_decisions,
-)
-from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
-from gelpolight_core.session.description import write_description
-from gelpolight_core.session.outside import KnownFiles
-from gelpolight_core.session.session import (
-    ONE_IMAGE_STAGES,
-    Session,
-    read_session,
-)
+from gelpolight_core.session.copies import RememberedHashes, refuse_copies
 from gelpolight_core.translation import tr
-
-Frame = NDArray[Any]
 
 
 class Cancelled(Exception):
@@ -65,7 +40,7 @@ class _Outcome:
     fault: InputError | None
 
 
-class CalibrationProject:
+class CalibrationProject(KeptSession):
     """One session folder with its results.
 
     Parameters
@@ -80,215 +55,15 @@ class CalibrationProject:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._lock = threading.RLock()
-        self._hashes = _RememberedHashes()
-        self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
-        self._session = read_session(folder)
+        super().__init__(folder)
+        self._hashes = RememberedHashes()
         self._results = StageResults()
         self._outcomes: dict[Stage, _Outcome] = {}
-
-    @property
-    def session(self) -> Session:
-        """The session as it stands."""
-        return self._session
 
     @property
     def results(self) -> StageResults:
         """The newest result of every stage, stale or not."""
         return self._results
-
-    # What a person captures and decides -------------------------------------------------------
-
-    def add_capture(
-        self, stage: Stage, frames: Sequence[Frame], *, radius_mm: float | None = None
-    ) -> str:
-        """Keep frames of one view as one picture, their average; return its name.
-
-        A new capture takes the place of the earlier ones where a stage has a single view; those
-        are kept, excluded.
-
-        Parameters
-        ----------
-        stage : Stage
-            One with pictures of its own.
-        frames : sequence of (rows, columns, 3) uint8 or uint16
-            RGB.
-        radius_mm : float, optional
-            Of the ball, for a press.
-
-        Raises
-        ------
-        InputError
-            If it cannot be written, or has another size than the session's pictures.
-        """
-        refuse_other_size(self._session, (frames[0].shape[1], frames[0].shape[0]))
-        folder = FOLDERS[stage]
-        with self._lock:
-            name = self._next_name(folder)
-            path = self._session.folder / folder / name
-            self._keep(name, radius_mm, lambda: write_picture(average_frames(frames), path))
-            self._replace_views(folder, {name})
-        return name
-
-    def import_files(
-        self, stage: Stage, files: Sequence[Path], *, radius_mm: float | None = None
-    ) -> tuple[str, ...]:
-        """Copy picture files into a stage; return their new names.
-
-        Parameters
-        ----------
-        stage : Stage
-            One with pictures of its own.
-        files : sequence of Path
-            PNG or TIFF.
-        radius_mm : float, optional
-            Of the ball in them, for presses.
-
-        Raises
-        ------
-        InputError
-            If a file is no picture that fits into the session; then none is taken.
-        """
-        folder = FOLDERS[stage]
-        refuse_unfit(self._session, stage, files)
-        names: list[str] = []
-        with self._lock:
-            for path in files:
-                name = self._next_name(folder, path.suffix.lower())
-                target = self._session.folder / folder / name
-                self._keep(name, radius_mm, partial(_copy, path, target))
-                names.append(name)
-            self._replace_views(folder, set(names))
-        return tuple(names)
-
-    def _keep(self, name: str, radius_mm: float | None, write: Callable[[], None]) -> None:
-        """Write a picture; its radius first, so that no press ever stands with another's."""
-        before = self._session.ball_radii_mm.get(name)
-        if radius_mm is not None:
-            self.set_ball_radius(name, radius_mm)
-        try:
-            write()
-        except InputError:
-            if radius_mm is not None:
-                self.set_ball_radius(name, before)
-            raise
-
-    def decide(self, decisions: Decisions) -> None:
-        """Take new decisions in the place of the present ones, on disk first."""
-        with self._lock:
-            path = self._session.folder / DECISIONS
-            self._files.refuse_changed(path)
-            write_decisions(decisions, self._session.folder)
-            self._files.take(path)
-            self._session = replace(self._session, decisions=decisions)
-
-    def exclude(self, stage: Stage, name: str, excluded: bool = True) -> None:
-        """Leave a picture out, or take it in again."""
-        with self._lock:
-            key = f"{FOLDERS[stage]}/{name}"
-            names = self._session.decisions.excluded
-            names = names | {key} if excluded else names - {key}
-            self.decide(replace(self._session.decisions, excluded=names))
-
-    def place_spot(self, led: int, place: Point | None) -> None:
-        """Set an LED's mirror spot by hand; None goes back to what was detected."""
-        with self._lock:
-            spots = _with(self._session.decisions.spots_px, led, place)
-            self.decide(replace(self._session.decisions, spots_px=spots))
-
-    def place_ball(self, name: str, circle: PlacedCircle | None) -> None:
-        """Set the contact in a picture of a ball by hand; None goes back to what was detected."""
-        with self._lock:
-            balls = _with(self._session.decisions.balls, name, circle)
-            self.decide(replace(self._session.decisions, balls=balls))
-
-    def edit_curves(self, curves: Mapping[int, tuple[Point, ...]]) -> None:
-        """Set the reflectance curves that are drawn by hand; the others are as fitted."""
-        with self._lock:
-            self.decide(replace(self._session.decisions, curves=dict(curves)))
-
-    def describe(self, session: Session) -> None:
-        """Take what is stated of the sensor, its boards and the usual ball, on disk first.
-
-        Folder, decisions and the radii stated for single presses stay.
-        """
-        with self._lock:
-            self._describe(replace(session, ball_radii_mm=self._session.ball_radii_mm))
-
-    def set_ball_radius(self, name: str, radius_mm: float | None) -> None:
-        """State the radius of the ball in one picture; None goes back to the usual one."""
-        with self._lock:
-            radii = _with(self._session.ball_radii_mm, name, radius_mm)
-            self._describe(replace(self._session, ball_radii_mm=radii))
-
-    def _describe(self, session: Session) -> None:
-        kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
-        path = kept.folder / DESCRIPTION
-        self._files.refuse_changed(path)
-        write_description(kept)
-        self._files.take(path)
-        self._session = kept
-
-    # What somebody else changes ----------------------------------------------------------------
-
-    def changed_outside(self) -> tuple[Path, ...]:
-        """Return the session's files that somebody else has changed since they were read.
-
-        Until :meth:`reload` or :meth:`overwrite`, what would write over them is refused.
-        """
-        with self._lock:
-            return self._files.changed()
-
-    def reload(self) -> None:
-        """Read description and decisions anew.
-
-        Raises
-        ------
-        InputError
-            If they cannot be used; then all stays as it was.
-        """
-        with self._lock:
-            folder = self._session.folder
-            files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
-            self._session = read_session(folder)
-            self._files = files
-
-    def overwrite(self) -> None:
-        """Write description and decisions as they are known here over what was changed.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
-        with self._lock:
-            for path in self._files.changed():
-                if path.name == DECISIONS:
-                    write_decisions(self._session.decisions, self._session.folder)
-                else:
-                    write_description(self._session)
-                self._files.take(path)
-
-    def _next_name(self, folder: str, suffix: str = ".png") -> str:
-        taken = [p.stem for p in self._session.captured(folder)]
-        numbers = [int(stem[-3:]) for stem in taken if stem[-3:].isdigit()]
-        number = max([*numbers, len(taken)], default=0) + 1
-        return f"{_STEMS[folder]}_{number:03d}{suffix}"
-
-    def _replace_views(self, folder: str, names: set[str]) -> None:
-        if folder in ONE_IMAGE_STAGES:
-            former = {
-                f"{folder}/{path.name}"
-                for path in self._session.found(folder)
-                if path.name not in names
-            }
-            now = self._session.decisions
-            # A spot was placed in the picture that goes.
-            spots = {} if folder == FOLDERS[Stage.LIGHTS] else now.spots_px
-            if former:
-                self.decide(replace(now, excluded=now.excluded | former, spots_px=spots))
-
-    # What is computed -------------------------------------------------------------------------
 
     def statuses(self) -> dict[Stage, StageStatus]:
         """Return how every stage stands at present."""
@@ -399,46 +174,8 @@ class CalibrationProject:
         return judged(stage, self._results)
 
 
-_STEMS = {
-    "checkerboard": "view",
-    "top_pose": "top",
-    "mirror": "mirror",
-    "whiteboard": "whiteboard",
-    "background": "background",
-    "balls": "ball",
-}
-
-
-def _copy(source: Path, target: Path) -> None:
-    data = read_bytes(source)
-    make_folder(target.parent)
-    write_atomically(target, lambda stream: stream.write(data))
-
-
-def _with(mapping: Mapping[Any, Any], key: Any, value: Any) -> dict[Any, Any]:
-    changed = {k: v for k, v in mapping.items() if k != key}
-    if value is not None:
-        changed[key] = value
-    return changed
-
-
 def _closure(stage: Stage) -> set[Stage]:
     found = {stage}
     for need in NEEDS[stage]:
         found |= _closure(need)
     return found
-
-
-class _RememberedHashes:
-    """Hashes of files, made anew only when a file's size or time has changed."""
-
-    def __init__(self) -> None:
-        self._known: dict[Path, tuple[tuple[int, int], str]] = {}
-
-    def __call__(self, path: Path) -> str:
-        stat = path.stat()
-        mark = stat.st_size, stat.st_mtime_ns
-        known = self._known.get(path)
-        if known is None or known[0] != mark:
-            known = self._known[path] = mark, file_hash(path)
-        return known[1]

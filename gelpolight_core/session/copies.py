@@ -41,3 +41,19 @@ def refuse_copies(files: Iterable[Path]) -> None:
                 where=str(path),
                 advice=tr("Capture this picture itself, or remove the copy"),
             )
+
+
+class RememberedHashes:
+    """Hashes of files, made anew only when a file's size or time has changed."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, tuple[tuple[int, int], str]] = {}
+
+    def __call__(self, path: Path) -> str:
+        """Return a file's hash."""
+        stat = path.stat()
+        mark = stat.st_size, stat.st_mtime_ns
+        known = self._known.get(path)
+        if known is None or known[0] != mark:
+            known = self._known[path] = mark, file_hash(path)
+        return known[1]
