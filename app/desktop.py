@@ -76,7 +76,12 @@ def run(arguments: Sequence[str] = ()) -> int:
             )
         stop_listening = _close_on_signals(window)
         modules = [name for entry in window.entries.values() for name in entry.modules]
-        QTimer.singleShot(FIRST_LOOK_MS, window.loader, lambda: window.loader.load(modules))
+
+        def go_on() -> None:
+            window.choose_source_again()
+            window.loader.load(modules)
+
+        QTimer.singleShot(FIRST_LOOK_MS, window.loader, go_on)
         status = application.exec()
         stop_listening()
         ended = join_left_behind(LAST_JOIN_S)

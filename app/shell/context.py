@@ -60,6 +60,29 @@ class SourceChoice(QObject):
         for info in recordings([file])():
             self.choose(info)
 
+    def choose_folder(self, folder: Path) -> None:
+        """Choose a folder of pictures, to be shown one after the other."""
+        from app.sources.listing import picture_folders  # heavy, as above
+
+        for info in picture_folders([folder])():
+            self.choose(info)
+
+    @property
+    def remembered(self) -> tuple[str, Path | None]:
+        """Kind and file of the source, by which it is chosen again; an empty kind: none."""
+        return ("", None) if self.info is None else (self.info.kind, self.info.file)
+
+    def choose_again(self, kind: str, file: Path | None) -> None:
+        """Choose what was remembered, unless a source is chosen already; what is gone is not."""
+        if self.info is not None:
+            return
+        if kind == "virtual":
+            self.choose_virtual_sensor()
+        elif kind == "folder" and file is not None:
+            self.choose_folder(file)
+        elif kind == "recording" and file is not None:
+            self.choose_recording(file)
+
 
 class Requests(QObject):
     """What a page asks of the window."""

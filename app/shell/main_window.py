@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,8 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
+# What the sources are made with.
+SOURCES = ("app.sources.listing", "app.sources.bench")
 FIRST_SIZE = QSize(1280, 800)
 # Raised when toolbars change, so that an older layout is not forced onto a newer window.
 LAYOUT_VERSION = 1
@@ -89,6 +92,7 @@ class MainWindow(QMainWindow):
         requests.choose_session.connect(self.choose_session)
         requests.demo.connect(context.source.choose_virtual_sensor)
         requests.begin_demo.connect(self.begin_demo)
+        context.source.changed.connect(self._remember_source)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         self._restore_layout()
 
@@ -203,6 +207,16 @@ class MainWindow(QMainWindow):
             _call(page, "begin_demo")
 
         self._with_page("calibrate", begin)
+
+    def choose_source_again(self) -> None:
+        """Choose the source of last time, once what it needs is loaded."""
+        kind, file = self.context.settings.source
+        if kind:
+            again = partial(self.context.source.choose_again, kind, file)
+            self.loader.when_loaded(SOURCES, again)
+
+    def _remember_source(self) -> None:
+        self.context.settings.source = self.context.source.remembered
 
     # Sessions and files
 

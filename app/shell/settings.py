@@ -98,6 +98,18 @@ class Settings:
         self._store.remove("recent_sessions")
 
     @property
+    def source(self) -> tuple[str, Path | None]:
+        """Kind and file of the source that was chosen last; an empty kind: none was."""
+        file = self._text("source/file")
+        return self._text("source/kind"), Path(file) if file else None
+
+    @source.setter
+    def source(self, chosen: tuple[str, Path | None]) -> None:
+        kind, file = chosen
+        self._store.setValue("source/kind", kind)
+        self._store.setValue("source/file", "" if file is None else str(file))
+
+    @property
     def limits(self) -> Limits:
         """Where the program begins to warn; a value that is no number counts as not set."""
         default = Limits()

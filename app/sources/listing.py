@@ -45,7 +45,8 @@ def picture_folders(folders: Sequence[Path]) -> Finder:
         for folder in folders:
             if folder.is_dir():
                 detail = str(folder.parent)
-                yield SourceInfo("folder", folder.name, detail, partial(FolderSource, folder))
+                make = partial(FolderSource, folder)
+                yield SourceInfo("folder", folder.name, detail, make, folder)
 
     return find
 
@@ -56,7 +57,8 @@ def recordings(files: Sequence[Path]) -> Finder:
     def find() -> Iterable[SourceInfo]:
         for file in files:
             if file.is_file():
-                yield SourceInfo("recording", file.stem, str(file.parent), partial(_play, file))
+                detail = str(file.parent)
+                yield SourceInfo("recording", file.stem, detail, partial(_play, file), file)
 
     return find
 

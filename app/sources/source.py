@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -149,9 +150,12 @@ class SourceInfo:
         What is shown; `detail` says what tells it from others of its kind.
     open : callable
         Returns the source, quick and not yet open: the stream's own thread opens it.
+    file : Path or None
+        The folder or recording that plays it; None of what is no file.
     """
 
     kind: str
     name: str
     detail: str
     open: Callable[[], Source]
+    file: Path | None = None

@@ -8,7 +8,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QMenu, QToolButton, QWidget
 
 from app.shell.context import AppContext
-from app.sources.listing import picture_folders
 from app.widgets.naming import named
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
@@ -60,8 +59,7 @@ class SourceButton(QToolButton):
     def use_folder(self, folder: Path) -> None:
         """Take the pictures of a folder as the camera's."""
         self._context.settings.last_folder = folder
-        for info in picture_folders([folder])():
-            self._context.source.choose(info)
+        self._context.source.choose_folder(folder)
 
     def choose_recording(self) -> None:
         """Let the person choose a recording that plays the camera."""
