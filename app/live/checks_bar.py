@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen
+from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
 
 from app.live.picture_checks import Exposure
 from app.widgets.naming import named
 from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
+
+# Below this the advice and the focus have no room side by side.
+NARROW = 620
 
 SIGNS = {Verdict.PASS: "\u2713", Verdict.WARN: "!", Verdict.FAIL: "\u2715"}
 
@@ -64,7 +67,10 @@ class FocusBar(QWidget):
 
 
 class ChecksBar(QWidget):
-    """Two lines of words and figures about the picture above."""
+    """Words and figures about the picture above: two lines, or four beneath a narrow one.
+
+    How many they are depends on the width alone, so that nothing jumps when a word changes.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -74,17 +80,37 @@ class ChecksBar(QWidget):
         self._pixel = named(QLabel(), "live.pixel", tr("Pixel under the pointer"))
         self._rate = named(QLabel(), "live.rate", tr("Frame rate"))
         self._rate.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        # Long advice is cut off rather than widening the window.
+        # Long words are cut off rather than widening the window.
         self._exposure.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._pixel.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        layout = QGridLayout(self)
-        layout.setContentsMargins(6, 3, 6, 3)
-        layout.setVerticalSpacing(2)
-        layout.addWidget(self._exposure, 0, 0)
-        layout.addWidget(self.focus, 0, 1)
-        layout.addWidget(self._pixel, 1, 0)
-        layout.addWidget(self._rate, 1, 1)
-        layout.setColumnStretch(0, 1)
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(6, 3, 6, 3)
+        self._grid.setVerticalSpacing(2)
+        self._grid.setColumnStretch(0, 1)
+        self._narrow: bool | None = None
+        self._arrange(narrow=False)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give long advice a second line where one is too short."""
+        super().resizeEvent(event)
+        self._arrange(narrow=event.size().width() < NARROW)
+
+    def _arrange(self, *, narrow: bool) -> None:
+        if narrow == self._narrow:
+            return
+        self._narrow = narrow
+        places = {
+            self._exposure: (0, 0, 1, 2) if narrow else (0, 0, 1, 1),
+            self.focus: (2, 0, 1, 1) if narrow else (0, 1, 1, 1),
+            self._pixel: (1, 0, 1, 2) if narrow else (1, 0, 1, 1),
+            self._rate: (2, 1, 1, 1) if narrow else (1, 1, 1, 1),
+        }
+        for widget, place in places.items():
+            self._grid.removeWidget(widget)
+            self._grid.addWidget(widget, *place)
+        self._exposure.setWordWrap(narrow)
+        lines = 2 if narrow else 1
+        self._exposure.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
 
     def show_exposure(self, exposure: Exposure | None) -> None:
         """Show the advice about the exposure; None for nothing."""
