@@ -14,14 +14,16 @@ from PySide6.QtGui import (
     QUndoCommand,
     QUndoStack,
 )
-from PySide6.QtWidgets import QLabel, QSplitter, QToolBar, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QToolBar, QToolButton, QVBoxLayout, QWidget
 
 from app.calibrate import lut_model as model
 from app.calibrate.lut_effect import Effect
+from app.calibrate.lut_hints import HINT, LASSO_HINT, node_hint
 from app.calibrate.lut_live import LivePanel
 from app.calibrate.lut_model import CHANNELS, CurveEdit
 from app.calibrate.lut_plot import CurvePlot
 from app.widgets.naming import named
+from app.widgets.roomy_label import RoomyLabel
 from gelpolight_core.calibration.scatter import ReflectanceScatter
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -100,11 +102,12 @@ class LutEditor(QWidget):
         self.live = None if effect is None else LivePanel(start, scatter.names, effect)
         self._repaint = QTimer(self, interval=0, singleShot=True)
         self._repaint.timeout.connect(self._follow_theme)
-        self._notice = named(QLabel(), "lut.notice", tr("What was done"))
-        self._hint = named(QLabel(), "lut.hint", tr("How to edit"))
-        for label in (self._notice, self._hint):
-            label.setTextFormat(Qt.TextFormat.PlainText)
-            label.setWordWrap(True)
+        self._notice = named(RoomyLabel(), "lut.notice", tr("What was done"))
+        self._hint = named(
+            RoomyLabel(HINT, LASSO_HINT, node_hint(99, 99, 0.0, 0.0)),
+            "lut.hint",
+            tr("How to edit"),
+        )
         self._actions = self._make_actions()
         self._lay_out()
         self._connect()
@@ -343,22 +346,12 @@ class LutEditor(QWidget):
 
     def _hint_text(self) -> str:
         if self._actions["lasso"].isChecked():
-            return tr("Drag a line around the points to leave out. Esc puts the lasso away.")
+            return LASSO_HINT
         if self.chosen is None:
-            return tr(
-                "Drag a ring to move it; click one to choose it; double-click the curve for a new "
-                "one; the wheel zooms. A ring stays between its neighbours: Fewer nodes gives room."
-            )
-        curve = self._shown.curves[self.channel]
-        return tr(
-            "Node {number} of {all}: cosine {cosine:.4f}, value {value:.4f}. Arrow keys nudge it "
-            "(Shift: ten times), Page Up and Page Down choose its neighbours, Del removes it."
-        ).format(
-            number=self.chosen + 1,
-            all=len(curve.cosines),
-            cosine=curve.cosines[self.chosen],
-            value=curve.values[self.chosen],
-        )
+            return HINT
+        curve, chosen = self._shown.curves[self.channel], self.chosen
+        count = len(curve.cosines)
+        return node_hint(chosen + 1, count, curve.cosines[chosen], curve.values[chosen])
 
     def _on_node_moved(self, index: int, cosine: float, value: float, end: bool) -> None:
         moved = model.move_node(self._state, self.channel, index, cosine, value)
@@ -371,13 +364,13 @@ class LutEditor(QWidget):
     def _nudge(self, across: float, up: float) -> None:
         assert self.chosen is not None
         curve = self._state.curves[self.channel]
-        self._do(
-            tr("nudge node"),
-            model.move_node,
-            self.chosen,
-            curve.cosines[self.chosen] + NUDGE * across,
-            curve.values[self.chosen] + NUDGE * up * curve.values[-1],
-        )
+        cosine = curve.cosines[self.chosen] + NUDGE * across
+        value = curve.values[self.chosen] + NUDGE * up * curve.values[-1]
+        moved = model.move_node(self._state, self.channel, self.chosen, cosine, value)
+        if moved == self._state:
+            self._notice.setText(tr("The node cannot go further that way."))
+        else:
+            self._commit(tr("nudge node"), moved)
 
     def _choose_beside(self, step: int) -> None:
         count = len(self._state.curves[self.channel].cosines)

@@ -1,0 +1,36 @@
+"""A label of several lines that keeps its height when its text changes."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRect, QSize, Qt
+from PySide6.QtWidgets import QLabel, QWidget
+
+HIGH = 10_000
+
+
+class RoomyLabel(QLabel):
+    """Plain text, wrapped, with room for the longest of the texts that it may show.
+
+    Parameters
+    ----------
+    *texts : str
+        Those texts; without any, one line is kept.
+    """
+
+    def __init__(self, *texts: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._texts = texts or (" ",)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setWordWrap(True)
+        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+
+    def heightForWidth(self, width: int) -> int:
+        """Return the height of the longest text, or of the present one where that is higher."""
+        metrics, wrap = self.fontMetrics(), Qt.TextFlag.TextWordWrap
+        area = QRect(0, 0, width, HIGH)
+        texts = (*self._texts, self.text())
+        return max(metrics.boundingRect(area, wrap, text).height() for text in texts)
+
+    def minimumSizeHint(self) -> QSize:
+        """Return a size that leaves the width to others."""
+        return QSize(0, self.fontMetrics().lineSpacing())
