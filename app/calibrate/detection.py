@@ -36,6 +36,8 @@ class Detection:
         Judged numbers for a table beside the picture.
     found : BoardView, MirrorSpots, BallPress or None
         The core's own result, such as for the list of earlier views.
+    warns : bool
+        Whether the sentence is advice, although the frame may be captured.
     """
 
     overlay: Overlay
@@ -43,6 +45,7 @@ class Detection:
     ready: bool
     figures: tuple[Figure, ...] = ()
     found: Found | None = None
+    warns: bool = False
 
 
 def as_picture(rgb: Rgb, name: str = "") -> Picture:
@@ -72,7 +75,8 @@ def judged(
     bad = [f for f in figures if f.verdict is not Verdict.PASS and f.advice]
     worst = next((f for f in bad if f.verdict is Verdict.FAIL), bad[0] if bad else None)
     text = good if worst is None else f"{figure_text(worst)}. {worst.advice}."
-    return Detection(overlay, text, table.verdict is not Verdict.FAIL, figures, found)
+    ready = table.verdict is not Verdict.FAIL
+    return Detection(overlay, text, ready, figures, found, warns=worst is not None)
 
 
 def figure_text(figure: Figure) -> str:

@@ -181,7 +181,7 @@ class Looking(QObject):
 
     def _show(self, found: Detection) -> None:
         self._pictures.view.set_overlay(found.overlay)
-        self._panel.show_live(found.sentence, ready=found.ready)
+        self._panel.show_live(found.sentence, ready=found.ready and not found.warns)
 
     def _on_detected(self, item: Any) -> None:
         if self.name:

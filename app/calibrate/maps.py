@@ -14,6 +14,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
+from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.results import StageResults
@@ -151,12 +152,19 @@ class MapsView(QWidget):
         named(self, "calibrate.maps", tr("Result as pictures"))
         self._grid = QGridLayout(self)
         self._shown: list[_PanelView] = []
+        self._none = named(QLabel(), "calibrate.maps.none", tr("Why there is no picture"))
+        self._none.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._none.setWordWrap(True)
+        self._grid.addWidget(self._none, 0, 0, 1, 2)
 
-    def show_panels(self, panels: Sequence[Panel]) -> None:
-        """Show these pictures."""
+    def show_panels(self, panels: Sequence[Panel], *, none: str = "") -> None:
+        """Show these pictures; where there are none, say why."""
+        self._none.setText(none)
+        self._none.setVisible(not panels and bool(none))
         while len(self._shown) > len(panels):
             view = self._shown.pop()
             self._grid.removeWidget(view)
+            view.hide()
             view.deleteLater()
         for number, panel in enumerate(panels):
             if number == len(self._shown):
@@ -178,9 +186,7 @@ class _PanelView(QWidget):
         self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._picture.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self._picture.setMinimumSize(120, 90)
-        font = self._title.font()
-        font.setBold(True)
-        self._title.setFont(font)
+        make_bold(self._title)
         for label in (self._title, self._caption):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         column.addWidget(self._title)

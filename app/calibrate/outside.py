@@ -6,7 +6,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from app.calibrate.controller import CalibrationController
-from app.shell import theme
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -30,6 +30,8 @@ class OutsideBar(QWidget):
         self._refusal = ""
         self.sentence = named(QLabel(), "calibrate.outside.sentence", tr("What was changed"))
         self.sentence.setWordWrap(True)
+        show_meaning(self.sentence, "warn")
+        make_bold(self.sentence)
         self.sentence.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
         self.reload = named(
             QPushButton(tr("Re&load")),
@@ -72,7 +74,6 @@ class OutsideBar(QWidget):
             names=tr(" and ").join(path.name for path in changed)
         )
         self.sentence.setText(self._refusal or said)
-        self.sentence.setStyleSheet(f"color: {theme.colour('warn').name()}; font-weight: bold;")
         self.setVisible(bool(changed))
 
     def _reload(self) -> None:

@@ -131,7 +131,7 @@ class CalibratePage(QWidget):
         self._stack.addWidget(self.wizard)
         self._stack.setCurrentWidget(self.wizard)
         self.context.settings.add_recent_session(project.session.folder)
-        self.wizard.go_to(step or self.wizard.first_open_step())
+        self.wizard.go_to(step or self.wizard.standing.first_open_step())
         if self._shown:
             self.wizard.enter()
 

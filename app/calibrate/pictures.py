@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 from app.calibrate.film_strip import FilmStrip
 from app.calibrate.maps import MapsView
 from app.live.live_view import LiveView
-from app.shell import theme
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -71,6 +71,8 @@ class Pictures(QWidget):
         row.setContentsMargins(8, 4, 8, 4)
         self.why = named(QLabel(), "calibrate.lost.why", tr("Why no picture comes"))
         self.why.setWordWrap(True)
+        show_meaning(self.why, "fail")
+        make_bold(self.why)
         self.why.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
         again = named(
             QPushButton(tr("Re&connect")), "calibrate.reconnect", tr("Open the camera again")
@@ -84,7 +86,6 @@ class Pictures(QWidget):
     def show_lost(self, why: str) -> None:
         """Say why no more pictures come; an empty text: they do."""
         self.why.setText(why)
-        self.why.setStyleSheet(f"color: {theme.colour('fail').name()}; font-weight: bold;")
         self.lost.setVisible(bool(why))
 
     def show_looked_at(self, name: str) -> None:

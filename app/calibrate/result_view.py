@@ -16,13 +16,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.calibrate.states import is_done, state_colour, state_icon, state_word
+from app.calibrate.states import RUNNING, is_done, state_icon, state_meaning, state_word
 from app.calibrate.steps import Step
-from app.shell import theme
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
+from app.widgets.roomy_label import RoomyLabel
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
+from gelpolight_core.quality import QualityTable
 from gelpolight_core.translation import tr
 
 
@@ -48,10 +50,7 @@ class ResultView(QWidget):
         column = QVBoxLayout(self)
         self.headline = named(QLabel(), "result.headline", tr("Verdict"))
         self.headline.setWordWrap(True)
-        font = self.headline.font()
-        font.setPointSizeF(font.pointSizeF() * 1.2)
-        font.setBold(True)
-        self.headline.setFont(font)
+        make_bold(self.headline, size=1.2)
         column.addWidget(self.headline)
         scroll = QScrollArea()
         scroll.setWidgetResizable(True)
@@ -79,22 +78,35 @@ class ResultView(QWidget):
             button.clicked.connect(signal)
             buttons.addWidget(button)
         column.addLayout(buttons)
-        self.saved = named(QLabel(), "result.saved", tr("Where it was saved"))
-        self.saved.setWordWrap(True)
+        self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
         self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         column.addWidget(self.saved)
 
     def show_saved(self, sentence: str, role: str = "pass") -> None:
         """Say where the calibration or its report was saved, or why not."""
         self.saved.setText(sentence)
-        self.saved.setStyleSheet(f"color: {theme.colour(role).name()};")
+        show_meaning(self.saved, role)
 
-    def show_statuses(
-        self, statuses: Mapping[Stage, StageStatus], running: Stage | None, *, busy: bool
+    def show_states(
+        self,
+        states: Mapping[str, tuple[str, str]],
+        statuses: Mapping[Stage, StageStatus],
+        *,
+        busy: bool,
     ) -> None:
-        """Show how every stage stands; `busy`: one is computed, or is to be next."""
+        """Show how every stage stands.
+
+        Parameters
+        ----------
+        states : mapping
+            State and sentence by the step's key, as the list of steps shows them.
+        statuses : mapping
+            Every stage's own.
+        busy : bool
+            Whether one is computed, or is to be next.
+        """
         for stage, row in self._rows.items():
-            row.show_status(statuses[stage], running=stage is running)
+            row.show_state(*states[row.step.key], statuses[stage].quality)
         done = all(is_done(statuses[stage].state.value) for stage in self._rows)
         made = all(
             is_done(statuses[stage].state.value) or statuses[stage].state is StageState.FAIL
@@ -116,7 +128,8 @@ class ResultView(QWidget):
                 text = tr("Stages that are not of the present captures: {n}. Press Recompute.")
             text = text.format(n=len(open_steps))
         self.headline.setText(text)
-        self.save.setEnabled(done or (made and running is None))
+        running = any(states[row.step.key][0] == RUNNING for row in self._rows.values())
+        self.save.setEnabled(done or (made and not running))
         self.save.setStyleSheet("font-weight: bold;" if done else "")
         self.report.setEnabled(self.save.isEnabled())
 
@@ -128,13 +141,14 @@ class _StageRow(QWidget):
 
     def __init__(self, step: Step) -> None:
         super().__init__()
-        self._step = step
+        self.step = step
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 2, 0, 2)
         row = QHBoxLayout()
         self._sign, self._word, self._said = QLabel(), QLabel(), QLabel()
         self._said.setWordWrap(True)
         self._word.setMinimumWidth(96)
+        make_bold(self._word)
         self.more = named(
             QToolButton(),
             f"result.{step.key}.more",
@@ -164,11 +178,10 @@ class _StageRow(QWidget):
         self.more.toggled.connect(self.table.setVisible)
         column.addWidget(self.table)
 
-    def show_status(self, status: StageStatus, *, running: bool) -> None:
-        state = "running" if running else status.state.value
+    def show_state(self, state: str, sentence: str, quality: QualityTable) -> None:
         self._sign.setPixmap(state_icon(state).pixmap(18, 18))
         self._word.setText(state_word(state).capitalize())
-        self._word.setStyleSheet(f"color: {state_colour(state).name()}; font-weight: bold;")
-        self._said.setText(status.sentence)
-        self.table.set_table(status.quality)
-        self.more.setVisible(bool(status.quality.figures))
+        show_meaning(self._word, state_meaning(state))
+        self._said.setText(sentence)
+        self.table.set_table(quality)
+        self.more.setVisible(bool(quality.figures))

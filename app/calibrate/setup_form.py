@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell import theme
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
@@ -76,10 +76,7 @@ class SetupForm(QScrollArea):
         middle.addWidget(holder)
         middle.addStretch(1)
         self.title = QLabel(tr("What is known of the sensor"))
-        font = self.title.font()
-        font.setPointSizeF(font.pointSizeF() * 1.35)
-        font.setBold(True)
-        self.title.setFont(font)
+        make_bold(self.title, size=1.35)
         self.task = QLabel(
             tr(
                 "State it from the housing's drawing and the parts; every length here scales the"
@@ -147,7 +144,7 @@ class SetupForm(QScrollArea):
         for row in (self.lens_board, self.top_board):
             row.print.clicked.connect(lambda _=False, row=row: self._save_board(row.board()))
         form.addRow(tr("Lens views"), self.lens_board)
-        form.addRow(tr("On the top surface"), self.top_board)
+        form.addRow(tr("Top surface"), self.top_board)
         return box
 
     def _build_balls(self) -> QGroupBox:
@@ -161,7 +158,7 @@ class SetupForm(QScrollArea):
     def show_problem(self, sentence: str) -> None:
         """Say why what is stated could not be taken."""
         self.problem.setText(sentence)
-        self.problem.setStyleSheet(f"color: {theme.colour('fail').name()};")
+        show_meaning(self.problem, "fail")
 
     def show_session(self, session: Session, *, new: bool) -> None:
         """Show what is stated of a session; `new`: nothing of it is on disk yet."""
@@ -228,7 +225,7 @@ class SetupForm(QScrollArea):
             return
         shown = QDesktopServices.openUrl(QUrl.fromLocalFile(chosen))
         self.problem.setText("" if shown else tr("Written to {path}").format(path=chosen))
-        self.problem.setStyleSheet("")
+        show_meaning(self.problem, "")
 
     def _on_accept(self) -> None:
         self.accepted.emit(self.stated())

@@ -8,7 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLabel, QPushButton, QVBoxLayout, QWidget
 
-from app.shell import theme
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -38,10 +38,7 @@ class StartView(QWidget):
         column.setAlignment(Qt.AlignmentFlag.AlignCenter)
         column.setSpacing(10)
         title = QLabel(tr("Calibrate a sensor"))
-        font = title.font()
-        font.setPointSizeF(font.pointSizeF() * 1.6)
-        font.setBold(True)
-        title.setFont(font)
+        make_bold(title, size=1.6)
         said = QLabel(
             tr(
                 "The program leads you through the lens, the top surface, the lights and the"
@@ -64,6 +61,7 @@ class StartView(QWidget):
             column.addWidget(button)
         self.problem = named(QLabel(), "start.problem", tr("Why it was not opened"))
         self.problem.setWordWrap(True)
+        show_meaning(self.problem, "fail")
         self.problem.setFixedWidth(460)
         self.problem.hide()
         column.addWidget(self.problem)
@@ -74,7 +72,6 @@ class StartView(QWidget):
     def show_problem(self, sentence: str) -> None:
         """Say why a session was not opened; an empty text: it was."""
         self.problem.setText(sentence)
-        self.problem.setStyleSheet(f"color: {theme.colour('fail').name()};")
         self.problem.setVisible(bool(sentence))
 
     def show_recent(self, folders: Sequence[Path]) -> None:

@@ -33,11 +33,15 @@ def state_word(state: str) -> str:
     }[state]
 
 
+def state_meaning(state: str) -> str:
+    """Return the meaning for a state, by which the theme colours it."""
+    names = {"empty": "muted", BEGUN: "muted", "waiting": "stale", "running": "accent"}
+    return names.get(state, state)
+
+
 def state_colour(state: str) -> QColor:
     """Return the colour for a state, in the theme of now."""
-    names = {"empty": "muted", BEGUN: "muted", "waiting": "stale", "running": "accent"}
-    name = names.get(state, state)
-    return theme.colour(name)
+    return theme.colour(state_meaning(state))
 
 
 def state_icon(state: str) -> QIcon:

@@ -22,9 +22,9 @@ from PySide6.QtWidgets import (
 )
 
 from app.calibrate.assembly import AssemblyPicture
-from app.calibrate.states import RUNNING, state_colour, state_icon, state_word
+from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.steps import Step
-from app.shell import theme
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.calibration.inputs import Stage
@@ -90,10 +90,7 @@ class StepPanel(QWidget):
 
     def _build_head(self) -> None:
         self.title = named(QLabel(), "calibrate.title", tr("Step"))
-        font = self.title.font()
-        font.setPointSizeF(font.pointSizeF() * 1.35)
-        font.setBold(True)
-        self.title.setFont(font)
+        make_bold(self.title, size=1.35)
         self.task = named(_wrapped(), "calibrate.task", tr("What to do"))
         self.assembly = AssemblyPicture()
         for widget in (self.title, self.assembly, self.task):
@@ -161,9 +158,7 @@ class StepPanel(QWidget):
         row = QHBoxLayout()
         self._sign = QLabel()
         self._word = named(QLabel(), "calibrate.state", tr("State of the step"))
-        font = self._word.font()
-        font.setBold(True)
-        self._word.setFont(font)
+        make_bold(self._word)
         self.recompute = named(
             QPushButton(tr("&Recompute")),
             "calibrate.recompute",
@@ -234,7 +229,7 @@ class StepPanel(QWidget):
     def show_notice(self, sentence: str, role: str) -> None:
         """Say what became of the last capture, import or correction."""
         self.notice.setText(sentence)
-        self.notice.setStyleSheet(f"color: {theme.colour(role).name()};" if sentence else "")
+        show_meaning(self.notice, role)
 
     def show_running(self) -> None:
         """Say that the step is being computed; its figures stay until there are others."""
@@ -245,13 +240,12 @@ class StepPanel(QWidget):
     def _show_sign(self, state: str) -> None:
         self._sign.setPixmap(state_icon(state).pixmap(18, 18))
         self._word.setText(state_word(state).capitalize())
-        self._word.setStyleSheet(f"color: {state_colour(state).name()};")
+        show_meaning(self._word, state_meaning(state))
 
     def show_live(self, sentence: str, *, ready: bool) -> None:
         """Say what the live picture shows."""
         self.live.setText(sentence)
-        role = "pass" if ready else "warn"
-        self.live.setStyleSheet(f"color: {theme.colour(role).name()};" if sentence else "")
+        show_meaning(self.live, "pass" if ready else "warn")
 
     def show_state(
         self,

@@ -106,7 +106,7 @@ class Validating(QObject):
         """Capture the press, then measure it."""
         stream = self._controller.watching.stream
         if stream is not None and self._capture is None and self._path is not None:
-            self._panel.result.setText(tr("Capturing: hold the object still."))
+            self._panel.say(tr("Capturing: hold the object still."))
             self._capture = stream.capture(FRAMES)
             self._panel.show_work(0.0)
             self._poll.start()
@@ -173,7 +173,7 @@ class Validating(QObject):
         def done(trial: Trial) -> None:
             self._show(trial, text)
 
-        self._panel.result.setText(tr("Measuring."))
+        self._panel.say(tr("Measuring."))
         self._controller.jobs.submit(Job(tr("Measuring the press"), work, done, self._refuse))
 
     def _show(self, trial: Trial, text: str) -> None:
@@ -186,7 +186,7 @@ class Validating(QObject):
         self._trial = None
         self._panel.show_work(None)
         self._panel.show_trial(None)
-        self._panel.result.setText(sentence)
+        self._panel.say(sentence, "warn")
 
     def keep(self) -> None:
         """Record the trial beside the calibration."""

@@ -17,10 +17,10 @@ from PySide6.QtWidgets import (
 )
 
 from app.calibrate.assembly import AssemblyPicture
-from app.calibrate.states import state_colour
 from app.calibrate.step_panel import WIDTH, lay_button, side_scroll
 from app.calibrate.steps import Step
 from app.calibrate.trial import KnownObject, Trial
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -57,10 +57,7 @@ class ValidationPanel(QWidget):
         column = QVBoxLayout(inside)
         column.setContentsMargins(12, 10, 12, 10)
         title = QLabel(step.title)
-        font = title.font()
-        font.setPointSizeF(font.pointSizeF() * 1.35)
-        font.setBold(True)
-        title.setFont(font)
+        make_bold(title, size=1.35)
         picture = AssemblyPicture()
         picture.show_assembly(step.assembly)
         task = QLabel(step.task)
@@ -115,6 +112,7 @@ class ValidationPanel(QWidget):
         column.addWidget(self.keep)
         self.verdict = named(QLabel(), "validation.verdict", tr("Validated or not"))
         self.verdict.setWordWrap(True)
+        make_bold(self.verdict)
         column.addWidget(self.verdict)
         column.addStretch(1)
         self.show_trial(None)
@@ -192,35 +190,38 @@ class ValidationPanel(QWidget):
         """Show how a trial went."""
         self.keep.setEnabled(trial is not None)
         if trial is None:
-            self.result.setText("")
+            self.say("")
             return
         rows = []
         for c in trial.comparisons:
-            state = "pass" if c.passed else "fail"
             word = tr("within") if c.passed else tr("beyond")
             rows.append(
                 tr(
                     "<b>{what}</b>: measured {m:.3f} mm, true {t:.3f} mm, error"
-                    " <span style='color:{c}'><b>{e:+.2f} %</b>, {word} ±{limit:g} %</span>"
+                    " <b>{e:+.2f} %</b>, {word} ±{limit:g} %"
                 ).format(
                     what=c.quantity.capitalize(),
                     m=c.measured_mm,
                     t=c.true_mm,
                     e=c.error_percent,
-                    c=state_colour(state).name(),
                     word=word,
                     limit=c.limit_percent,
                 )
             )
         if trial.measurement.verdict != "ok":
             rows.append(tr("Doubtful: {reason}").format(reason=trial.measurement.reason))
-        self.result.setText("<br>".join(rows))
+        passed = all(c.passed for c in trial.comparisons)
+        self.say("<br>".join(rows), "pass" if passed else "fail")
+
+    def say(self, sentence: str, meaning: str = "") -> None:
+        """Say how a trial gets on, or why it came to nothing."""
+        self.result.setText(sentence)
+        show_meaning(self.result, meaning)
 
     def show_verdict(self, text: str, *, passed: bool) -> None:
         """Say whether the calibration is validated."""
-        state = "pass" if passed else "fail"
         self.verdict.setText(text)
-        self.verdict.setStyleSheet(f"color: {state_colour(state).name()}; font-weight: bold;")
+        show_meaning(self.verdict, "pass" if passed else "fail")
 
 
 def _length(name: str, accessible: str, value: float) -> QDoubleSpinBox:

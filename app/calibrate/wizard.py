@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from PySide6.QtCore import QEvent, QTimer
+from PySide6.QtWidgets import QWidget
 
-from PySide6.QtWidgets import (
-    QApplication,
-    QFileDialog,
-    QWidget,
-)
-
-from app.calibrate.look import read_raw
 from app.calibrate.looking import Looking
-from app.calibrate.maps import Panel, panels_of, refraction_panels
+from app.calibrate.maps import Panel
 from app.calibrate.pictures import PICTURE, RESULT
 from app.calibrate.saving import Saving
-from app.calibrate.states import BEGUN, RUNNING, is_done, step_state
-from app.calibrate.steps import Step
-from app.calibrate.takes import takes_of
+from app.calibrate.standing import Standing
+from app.calibrate.taking import Taking
 from app.calibrate.trial import KnownObject
 from app.calibrate.validating import Validating
 from app.calibrate.wizard_frame import WizardFrame
@@ -25,7 +18,7 @@ from app.shell.actions import make_action
 from app.shell.context import AppContext
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
-from gelpolight_core.calibration.status import StageState, StageStatus
+from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
@@ -44,20 +37,20 @@ class Wizard(WizardFrame):
 
     def __init__(self, project: CalibrationProject, *, context: AppContext) -> None:
         super().__init__(project, context=context)
-        self._statuses: dict[Stage, StageStatus] = project.statuses()
-        self._running: Stage | None = None
-        self._build_keys()
         self.looking = Looking(self.controller, self.pictures, self.panel, self.step)
         self.saving = Saving(self.controller, self.result, context=context)
         self.validating = Validating(self.controller, self.validation, context=context)
+        self.taking = Taking(self, self.looking)
+        self.standing = Standing(self, self.looking, self.validating)
+        self._build_keys()
         self._connect()
-        self._refresh()
+        self.standing.refresh()
         self.controller.look_for_boards()
         self.controller.compute()
 
     def _build_keys(self) -> None:
         self._capture_key = make_action(
-            self, "calibrate.capture_now", tr("Capture"), self._capture, keys=("C", "F5")
+            self, "calibrate.capture_now", tr("Capture"), self.taking.capture, keys=("C", "F5")
         )
         self._live_key = make_action(
             self, "calibrate.live_again", tr("Back to the live picture"),
@@ -75,15 +68,12 @@ class Wizard(WizardFrame):
     def _connect(self) -> None:
         self.step_list.chosen.connect(lambda row: self.go_to(self.steps[row].key))
         panel, pictures, controller = self.panel, self.pictures, self.controller
-        panel.capture_wanted.connect(self._capture)
-        panel.import_wanted.connect(self._import)
         panel.next_wanted.connect(lambda: self._go_by(1))
         panel.cancel_wanted.connect(controller.jobs.cancel)
         panel.recompute_wanted.connect(self._recompute)
         panel.lay_wanted.connect(self._lay_on_bench)
         self.validation.lay_wanted.connect(self._lay_on_bench)
         pictures.strip.chosen.connect(self.look_at)
-        pictures.strip.excluded.connect(self._on_excluded)
         pictures.live_wanted.connect(self.looking.live)
         pictures.reconnect_wanted.connect(self.camera.open)
         pictures.view.clicked.connect(self._on_clicked)
@@ -93,13 +83,11 @@ class Wizard(WizardFrame):
         pictures.view.saved.connect(
             lambda path: self.panel.show_notice(tr("Saved {p}").format(p=path), "pass")
         )
-        self.looking.good.connect(self._capture_by_itself)
         self.looking.looked.connect(self._on_looked)
         self.setup.accepted.connect(self._on_stated)
         self.result.step_wanted.connect(self.go_to)
-        controller.changed.connect(self._refresh)
-        controller.captured.connect(self._on_captured)
-        controller.progressed.connect(self._on_progress)
+        controller.changed.connect(self.standing.refresh)
+        controller.progressed.connect(self.standing.show_progress)
         controller.refused.connect(self._refuse)
         controller.changed.connect(self.outside.look)
         self.saving.saved.connect(self.validating.take)
@@ -109,6 +97,13 @@ class Wizard(WizardFrame):
         self.context.source.changed.connect(self.camera.open)
 
     # The page around
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Draw the signs anew in another theme."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "standing"):
+            # Not at once: Qt walks over all widgets, and none may be made or lost meanwhile.
+            QTimer.singleShot(0, self, self.standing.refresh)
 
     def enter(self) -> None:
         """Look at the camera, as the wizard is shown."""
@@ -166,15 +161,6 @@ class Wizard(WizardFrame):
 
     # Steps
 
-    def first_open_step(self) -> str:
-        """Return the first step that is not complete."""
-        for step in self.steps:
-            if step.stage is not None:
-                state, _ = self._state_of(step, None)
-                if state in (StageState.EMPTY.value, BEGUN, StageState.FAIL.value):
-                    return step.key
-        return "result"
-
     def go_to(self, key: str) -> None:
         """Show a step."""
         self.step = next(step for step in self.steps if step.key == key)
@@ -193,7 +179,7 @@ class Wizard(WizardFrame):
         self.looking.take_step(self.step)
         self.camera.use(self.looking.has_pictures or key == "validation")
         self._compute_what_never_was()
-        self._refresh()
+        self.standing.refresh()
         centre: dict[str, QWidget] = {"setup": self.setup, "result": self.result}
         self.centre.setCurrentWidget(centre.get(key, self.pictures))
         if key == "reflectance":
@@ -237,87 +223,6 @@ class Wizard(WizardFrame):
         self.curves.take_results()
         self.centre.setCurrentWidget(self.curves)
 
-    # How everything stands
-
-    def _refresh(self) -> None:
-        """Show how everything stands now."""
-        self._statuses = self.controller.statuses()
-        running = self.controller.running
-        states = {s.key: self._state_of(s, running) for s in self.steps}
-        states["validation"] = self.validating.state
-        self.step_list.show_states(states)
-        self._show_state(*states[self.step.key])
-        self.pictures.strip.show_takes(
-            takes_of(self.step, self.project, self._statuses, self.controller.lens_views())
-        )
-        self.result.show_statuses(self._statuses, running, busy=self.controller.jobs.busy)
-        self._show_maps()
-        if self.step.key == "reflectance" and self.curves is not None:
-            self.curves.take_results()
-        self.looking.refresh()
-
-    def _count(self, step: Step) -> int:
-        return len(self.project.session.found(step.folder)) if step.stage else 0
-
-    def _state_of(self, step: Step, running: Stage | None) -> tuple[str, str]:
-        return step_state(step, self._statuses, running, taken=self._count(step))
-
-    def _show_state(self, state: str, sentence: str) -> None:
-        count = self._count(self.step)
-        self.panel.show_count(count)
-        if state == RUNNING:
-            self.panel.show_running()
-            return
-        stages = self.step.stages
-        stale = bool(stages) and state in (StageState.STALE.value, StageState.WAITING.value)
-        offer = stale and not self.controller.jobs.busy and self.project.stale(upto=stages[-1])
-        finished = is_done(state) and count >= (self.step.wanted if self.step.stage else 0)
-        advance = finished and not self.panel.finished
-        self.panel.show_state(
-            state,
-            sentence,
-            [self._statuses[stage].quality for stage in stages],
-            recompute=bool(offer),
-            finished=finished,
-        )
-        # Only from the button that was pressed last: nobody is interrupted in a field.
-        if advance and QApplication.focusWidget() in (None, self.panel.capture):
-            self.panel.next.setFocus()
-
-    def _show_maps(self) -> None:
-        if self.step.key == "refraction":
-            self._show_refraction()
-        elif self.step.key != "validation":
-            stage = self.step.stages[0] if self.step.stages else None
-            panels = panels_of(stage, self.project.results)
-            self.pictures.maps.show_panels(panels)
-            self.pictures.show_tab(RESULT, bool(panels))
-
-    def _show_refraction(self) -> None:
-        """Show the press that is most oblique, or the one chosen, before and after."""
-        results, pictures = self.project.results, self.pictures
-        found = {ball.file: ball.press for ball in results.balls if ball.press is not None}
-        panels: tuple[Panel, ...] = ()
-        if found and results.table is not None:
-            name = self.looking.name
-            if name not in found:
-                name = max(found, key=lambda n: sum(c * c for c in found[n].pose.centre_mm))
-            try:
-                raw = read_raw(self.project.session.folder / "balls" / name)
-                panels = refraction_panels(raw, found[name], results)
-            except InputError as error:
-                self._refuse(str(error))
-        pictures.maps.show_panels(panels)
-        pictures.show_tab(RESULT, True)
-        pictures.show_tab(PICTURE, False)
-
-    def _on_progress(self, title: str, share: float) -> None:
-        self.panel.show_work(title, share)
-        running = self.controller.running
-        if not title or running is not self._running:
-            self._running = running
-            self._refresh()
-
     # Pictures
 
     def look_at(self, name: str) -> None:
@@ -331,49 +236,7 @@ class Wizard(WizardFrame):
         self._live_key.setEnabled(bool(self.looking.name))
         self._follow_bench()
         if self.step.key == "refraction":
-            self._show_refraction()
-
-    def _capture(self) -> None:
-        if self.looking.name:
-            self.looking.live()
-        elif self.looking.has_pictures:
-            self.panel.show_notice("", "pass")
-            self.controller.capture(self.step, radius_mm=self.looking.radius_mm)
-
-    def _capture_by_itself(self) -> None:
-        if self.panel.automatic.isChecked():
-            self.looking.captured()
-            self._capture()
-
-    def _on_captured(self, stage: str, name: str) -> None:
-        if self.step.stage is not None and self.step.stage.value == stage:
-            self.panel.show_notice(tr("Captured {name}.").format(name=name), "pass")
-            self.pictures.strip.show_newest()
-
-    def _import(self) -> None:
-        stage = self.step.stage
-        if stage is None:
-            return
-        files, _ = QFileDialog.getOpenFileNames(
-            self,
-            tr("Import pictures"),
-            str(self.context.settings.last_folder),
-            tr("Pictures (*.png *.tif *.tiff)"),
-        )
-        if files:
-            self.context.settings.last_folder = Path(files[0]).parent
-            self.import_files([Path(file) for file in files])
-
-    def import_files(self, files: list[Path]) -> None:
-        """Take picture files into the step."""
-        if self.step.stage is not None:
-            self.panel.show_notice("", "pass")
-            radius_mm = self.looking.radius_mm
-            self.controller.import_files(self.step.stage, files, radius_mm=radius_mm)
-
-    def _on_excluded(self, name: str, excluded: bool) -> None:
-        if self.step.stage is not None:
-            self.controller.exclude(self.step.stage, name, excluded)
+            self.standing.show_refraction()
 
     def _on_stated(self, stated: Session) -> None:
         self.controller.describe(stated)

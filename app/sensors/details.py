@@ -19,6 +19,7 @@ from app.sensors.model import made_cell
 from app.shell.icons import icon
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
+from app.widgets.sign import Sign
 from app.workspace.entries import Entry, parse_time
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.quality import Verdict, verdict_word
@@ -96,9 +97,7 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
     heading = QWidget()
     row = QHBoxLayout(heading)
     row.setContentsMargins(0, 10, 0, 0)
-    sign = QLabel(heading)
-    sign.setPixmap(icon(verdict.value, verdict.value).pixmap(18, 18))
-    row.addWidget(sign)
+    row.addWidget(Sign(icon(verdict.value, verdict.value), heading))
     row.addWidget(QLabel(f"<b>{title}</b>", heading))
     row.addWidget(QLabel(verdict_word(verdict), heading))
     row.addStretch(1)

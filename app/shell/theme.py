@@ -33,6 +33,9 @@ COLOURS = {
     "tip": ("#fffbe8", "#33383f"),
 }
 
+# Those that a text may have because of what it says.
+MEANINGS = ("pass", "warn", "fail", "stale", "accent", "muted")
+
 STYLE = """
 QToolTip {{ color: {text}; background: {tip}; border: 1px solid {line}; padding: 3px; }}
 QStatusBar {{ border-top: 1px solid {line}; }}
@@ -117,7 +120,8 @@ def palette_for(dark: bool) -> QPalette:
 def style_sheet(dark: bool) -> str:
     """Return what Fusion cannot take from a palette, such as the frame of a check box."""
     colours = {name: pair[dark] for name, pair in COLOURS.items()}
-    return STYLE.format(**colours, check=CHECK.as_posix())
+    meanings = [f'QLabel[meaning="{name}"] {{ color: {colours[name]}; }}' for name in MEANINGS]
+    return "\n".join([STYLE.format(**colours, check=CHECK.as_posix()), *meanings])
 
 
 def apply(application: QApplication, choice: str) -> None:

@@ -407,3 +407,17 @@ def test_a_press_is_validated_from_its_picture_with_the_truth_beside_it(
     assert (known.shape, known.size_mm, known.height_mm) == ("cylinder", 5.0, 1.0)
     technician.click("validation.keep")
     assert technician.state("validation") == "pass"
+
+
+def test_arrow_keys_on_a_node_are_in_the_history(
+    technician: Technician, computed_project: Made, qtbot: QtBot
+) -> None:
+    technician.begin(computed_project(), "reflectance")
+    step, history = technician.wizard.curves, technician.wizard.controller.undo
+    technician.until(lambda: step.editor is not None)
+    step.editor.choose_node(3)
+    step.editor.plot.setFocus()
+    for key in (Qt.Key.Key_Up, Qt.Key.Key_Up, Qt.Key.Key_Left):
+        qtbot.keyClick(QApplication.focusWidget(), key)
+    assert [history.text(n) for n in range(history.count())] == ["nudge node (red)"] * 3
+    technician.rest()

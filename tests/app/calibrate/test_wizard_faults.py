@@ -120,7 +120,7 @@ def test_a_file_that_does_not_belong_there_is_not_imported(
     technician.begin(project, "balls")
     before = project.session.captured("balls")
     file = wrong_files(project.session.folder, tmp_path / "wrong")[kind]
-    technician.wizard.import_files([file])
+    technician.wizard.taking.import_files([file])
     technician.rest()
     assert said in technician.wizard.panel.notice.text()
     assert project.session.captured("balls") == before
@@ -138,7 +138,7 @@ def test_good_files_are_imported_with_the_radius_that_is_shown(
     if read_rgb(small_session / "balls" / "ball_01.png").dtype == np.uint8:
         cv2.imwrite(str(file), np.clip(shown - 1, 0, None).astype(np.uint8)[..., ::-1])
     technician.wizard.panel.radius.setValue(4.0)
-    technician.wizard.import_files([file])
+    technician.wizard.taking.import_files([file])
     technician.rest()
     name = project.session.captured("balls")[-1].name
     assert project.session.ball_radii_mm[name] == 4.0
