@@ -1,4 +1,4 @@
-"""What can be undone: a person's corrections of a session."""
+"""What can be undone: a person's captures and corrections in a session."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ class Correction(QUndoCommand):
         Called after either.
     refused : callable
         Told why it could not be done.
+    is_done : bool, optional
+        Whether it stands already as it comes into the history, as a capture does.
     """
 
     def __init__(
@@ -34,13 +36,18 @@ class Correction(QUndoCommand):
         *,
         done: Callable[[], None],
         refused: Callable[[str], object],
+        is_done: bool = False,
     ) -> None:
         super().__init__(text)
+        self._is_done = is_done
         self._act, self._take_back = act, take_back
         self._done, self._refused = done, refused
 
     def redo(self) -> None:
         """Correct."""
+        if self._is_done:
+            self._is_done = False
+            return
         self._run(self._act)
 
     def undo(self) -> None:

@@ -34,7 +34,7 @@ class CalibrationController(QObject):
     watching : Watching
         The camera.
     undo : QUndoStack
-        Every correction by hand, in one history.
+        Every capture and correction by hand, in one history.
     jobs, desk : Jobs
         The computations, and the short work beside them.
 
@@ -109,6 +109,12 @@ class CalibrationController(QObject):
         self.desk.submit(Job(tr("Importing pictures"), work, taken, must=True))
 
     def _taken(self, stage: Stage, names: tuple[str, ...]) -> None:
+        text = tr("Import {n} pictures").format(n=len(names))
+        if len(names) == 1:
+            text = tr("Take {name}").format(name=names[0])
+        take_again = partial(self.project.take_again, stage, names)
+        take_back = partial(self.project.take_back, stage, names)
+        self.undo.push(self._command(text, take_again, take_back, stage, is_done=True))
         self.changed.emit()
         for name in names:
             self.captured.emit(stage.value, name)
@@ -188,12 +194,23 @@ class CalibrationController(QObject):
         stage : Stage or None
             What to compute afterwards, with what it rests on; None: everything.
         """
+        self.undo.push(self._command(text, act, take_back, stage))
 
+    def _command(
+        self,
+        text: str,
+        act: Callable[[], None],
+        take_back: Callable[[], None],
+        stage: Stage | None,
+        *,
+        is_done: bool = False,
+    ) -> Correction:
         def done() -> None:
             self.changed.emit()
             self.compute(stage)
 
-        self.undo.push(Correction(text, act, take_back, done=done, refused=self.refused.emit))
+        refused = self.refused.emit
+        return Correction(text, act, take_back, done=done, refused=refused, is_done=is_done)
 
     def reload(self) -> None:
         """Read what is stated and decided anew; the history begins anew with it.

@@ -100,11 +100,10 @@ class WizardFrame(QMainWindow):
 
     def _build_docks(self) -> None:
         self.history = QDockWidget(tr("History"), self)
-        named(self.history, "calibrate.history", tr("History of corrections"))
-        self._undo_view = named(
-            QUndoView(self.controller.undo), "calibrate.history.list", tr("History of corrections")
-        )
-        self._undo_view.setEmptyLabel(tr("As captured"))
+        history = tr("History of captures and corrections")
+        named(self.history, "calibrate.history", history)
+        self._undo_view = named(QUndoView(self.controller.undo), "calibrate.history.list", history)
+        self._undo_view.setEmptyLabel(tr("As opened"))
         self.history.setWidget(self._undo_view)
         self.bench_dock = BenchDock(self.context.source, self)
         for dock in (self.history, self.bench_dock):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,14 @@ from gelpolight_core.session.session import (
 Frame = NDArray[Any]
 
 
+@dataclass(frozen=True, slots=True)
+class _Replaced:
+    """What a new view has taken the place of: pictures, and the spots placed in them."""
+
+    pictures: frozenset[str] = frozenset()
+    spots_px: Mapping[int, Point] = field(default_factory=dict)
+
+
 class KeptSession:
     """One session folder that a person works at.
 
@@ -57,6 +65,7 @@ class KeptSession:
         self._lock = threading.RLock()
         self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
         self._session = read_session(folder)
+        self._replaced: dict[str, _Replaced] = {}
 
     @property
     def session(self) -> Session:
@@ -124,6 +133,31 @@ class KeptSession:
                 names.append(name)
             self._replace_views(folder, set(names))
         return tuple(names)
+
+    def take_back(self, stage: Stage, names: Sequence[str]) -> None:
+        """Leave out pictures that came together, as if they had not.
+
+        What they had taken the place of is in use again. The pictures themselves stay.
+        """
+        with self._lock:
+            taken, former = self._taken(stage, names)
+            now = self._session.decisions
+            excluded = (now.excluded | taken) - former.pictures
+            spots = {**now.spots_px, **former.spots_px}
+            self.decide(replace(now, excluded=excluded, spots_px=spots))
+
+    def take_again(self, stage: Stage, names: Sequence[str]) -> None:
+        """Take in what was taken back."""
+        with self._lock:
+            taken, former = self._taken(stage, names)
+            now = self._session.decisions
+            excluded = (now.excluded - taken) | former.pictures
+            spots = {led: p for led, p in now.spots_px.items() if led not in former.spots_px}
+            self.decide(replace(now, excluded=excluded, spots_px=spots))
+
+    def _taken(self, stage: Stage, names: Sequence[str]) -> tuple[set[str], _Replaced]:
+        taken = {f"{FOLDERS[stage]}/{name}" for name in names}
+        return taken, self._replaced.get(min(taken), _Replaced())
 
     def _keep(self, name: str, radius_mm: float | None, write: Callable[[], None]) -> None:
         """Write a picture; its radius first, so that no press ever stands with another's."""
@@ -251,6 +285,9 @@ class KeptSession:
             spots = {} if folder == FOLDERS[Stage.LIGHTS] else now.spots_px
             if former:
                 self.decide(replace(now, excluded=now.excluded | former, spots_px=spots))
+                gone = {k: v for k, v in now.spots_px.items() if k not in spots}
+                first = min(f"{folder}/{name}" for name in names)
+                self._replaced[first] = _Replaced(frozenset(former), gone)
 
 
 _STEMS = {

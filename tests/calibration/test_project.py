@@ -97,6 +97,24 @@ def test_a_new_capture_of_a_single_view_takes_the_place_of_the_former(
     assert all(path.is_file() for path in before)
 
 
+def test_what_was_captured_can_be_taken_back_and_again(
+    project: CalibrationProject,
+) -> None:
+    former = [path.name for path in project.session.found("whiteboard")]
+    name = project.add_capture(Stage.RADIANCE, [np.full((240, 320, 3), 90, np.uint8)])
+    press = project.add_capture(Stage.BALLS, [np.full((240, 320, 3), 80, np.uint8)])
+    project.take_back(Stage.BALLS, [press])
+    project.take_back(Stage.RADIANCE, [name])
+    session = read_session(project.session.folder)
+    assert [path.name for path in session.found("whiteboard")] == former
+    assert press not in {path.name for path in session.found("balls")}
+    assert {path.name for path in session.captured("whiteboard")} == {*former, name}
+    project.take_again(Stage.RADIANCE, [name])
+    session = read_session(project.session.folder)
+    assert [path.name for path in session.found("whiteboard")] == [name]
+    assert project.session == session
+
+
 def test_a_name_is_never_given_twice(project: CalibrationProject) -> None:
     frame = [np.zeros((240, 320, 3), np.uint8)]
     first = project.add_capture(Stage.LENS, frame)
