@@ -93,6 +93,7 @@ class ResultView(QWidget):
         statuses: Mapping[Stage, StageStatus],
         *,
         busy: bool,
+        saved: str = "",
     ) -> None:
         """Show how every stage stands.
 
@@ -104,6 +105,8 @@ class ResultView(QWidget):
             Every stage's own.
         busy : bool
             Whether one is computed, or is to be next.
+        saved : str, optional
+            Name of the calibration that was saved of the present captures.
         """
         for stage, row in self._rows.items():
             row.show_state(*states[row.step.key], statuses[stage].quality)
@@ -116,10 +119,18 @@ class ResultView(QWidget):
         if done:
             warned = sum(s.state is StageState.WARN for s in statuses.values())
             text = tr("Every stage is complete. Save the calibration, then validate it.")
-            if warned:
+            if saved:
+                text = tr("Every stage is complete, and saved as {name}. Validate it next.")
+                text = text.format(name=saved)
+            elif warned:
                 text = tr(
                     "Every stage is complete, {n} with a warning. Look at the advice, then save."
                 ).format(n=warned)
+        elif busy and saved:
+            text = tr(
+                "Saved already as {name}: you can validate it now. The stages are computed again"
+                " beside it."
+            ).format(name=saved)
         elif busy:
             text = tr("Computing: one moment.")
         else:
@@ -131,7 +142,8 @@ class ResultView(QWidget):
         running = any(states[row.step.key][0] == RUNNING for row in self._rows.values())
         self.save.setEnabled(done or (made and not running))
         self.save.setStyleSheet("font-weight: bold;" if done else "")
-        self.report.setEnabled(self.save.isEnabled())
+        # The report waits for the stages by itself.
+        self.report.setEnabled(self.save.isEnabled() or bool(busy and saved))
 
 
 class _StageRow(QWidget):

@@ -53,7 +53,8 @@ class Standing(QObject):
         frame.pictures.strip.show_takes(
             takes_of(step, frame.project, self._statuses, self._controller.lens_views())
         )
-        frame.result.show_states(states, self._statuses, busy=self._controller.jobs.busy)
+        busy, saved = self._controller.jobs.busy, self._validating.saved
+        frame.result.show_states(states, self._statuses, busy=busy, saved=saved)
         self._show_maps()
         if step.key == "reflectance" and frame.curves is not None:
             frame.curves.take_results()
@@ -71,7 +72,10 @@ class Standing(QObject):
         """Return the first step that is not complete."""
         states = self._states(None)
         pictured = (step for step in self._frame.steps if step.stage is not None)
-        return next((step.key for step in pictured if states[step.key][0] in OPEN), "result")
+        found = next((step.key for step in pictured if states[step.key][0] in OPEN), "")
+        tried = states["validation"][0] != StageState.EMPTY.value
+        last = "validation" if self._validating.saved and not tried else "result"
+        return found or last
 
     def count(self, step: Step) -> int:
         """Return how many captures a step has in use."""

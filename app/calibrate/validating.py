@@ -19,8 +19,9 @@ from app.calibrate.maps import Panel
 from app.calibrate.trial import KnownObject, Trial, run_trial
 from app.calibrate.validation_panel import ValidationPanel
 from app.shell.context import AppContext
-from app.shell.jobs import Job
+from app.shell.jobs import Job, Jobs
 from app.sources.source import Frame
+from app.workspace.entries import read_entry
 from app.workspace.validation import Validation, read_validation, write_validation
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
@@ -42,6 +43,11 @@ class Validating(QObject):
         super().__init__(panel)
         self._controller, self._panel, self._context = controller, panel, context
         self._path: Path | None = None
+        self._inputs = ""  # what the calibration that is tried rests on
+        # Of its own: a press is measured while the stages are computed again.
+        self.jobs = Jobs("validating", self)
+        self.jobs.progressed.connect(lambda title, share: panel.show_work(share if title else None))
+        self.jobs.refused.connect(controller.refused)
         self._reconstructor: Reconstructor | None = None
         self._trial: tuple[Trial, str] | None = None
         self._capture: Future[list[Frame]] | None = None
@@ -55,8 +61,9 @@ class Validating(QObject):
         panel.trial_wanted.connect(self.measure)
         panel.import_wanted.connect(self.choose_press)
         panel.keep_wanted.connect(self.keep)
-        panel.show_calibration("")
+        self._show_calibration()
         self._find_earlier()
+        controller.changed.connect(self._show_calibration)
 
     def show_pictures_in(self, shown: Callable[[Panel], None]) -> None:
         """Hand the shaded depth of every trial to `shown`."""
@@ -72,26 +79,44 @@ class Validating(QObject):
             return "pass", tr("Validated")
         return "fail", tr("The last validation failed")
 
+    @property
+    def saved(self) -> str:
+        """Name of the saved calibration, where it is that of the present captures."""
+        if self._path is None or self._inputs != self._controller.project.all_inputs:
+            return ""
+        return self._path.stem
+
     def take(self, path: str) -> None:
         """Try this saved calibration from now on."""
         self._path, self._reconstructor, self._trial = Path(path), None, None
-        self._panel.show_calibration(Path(path).stem)
+        summary = read_entry(self._path).summary
+        self._inputs = "" if summary is None else summary.inputs
+        self._show_calibration()
         self._panel.show_trial(None)
         self._show_verdict()
 
     def _find_earlier(self) -> None:
-        """Go on with the newest calibration that was saved from this session."""
-        session = self._controller.project.session
+        """Go on with the calibration of the present captures, or the session's newest."""
+        project = self._controller.project
+        session, present = project.session, project.all_inputs
         try:
             entries = self._context.workspace.entries()
         except InputError as error:
             self._context.toasts.show(str(error), "warn")
             return
-        for entry in entries:
-            of_session = entry.summary is not None and entry.summary.session == session.folder.name
-            if of_session and entry.serial == session.sensor.serial:
-                self.take(str(entry.path))
-                return
+        found = [
+            (entry.summary.inputs != present, entry.path)
+            for entry in entries
+            if entry.summary is not None
+            and entry.summary.session == session.folder.name
+            and entry.serial == session.sensor.serial
+        ]
+        if found:
+            self.take(str(min(found, key=lambda one: one[0])[1]))
+
+    def _show_calibration(self) -> None:
+        name = "" if self._path is None else self._path.stem
+        self._panel.show_calibration(name, present=bool(self.saved))
 
     def refresh(self) -> None:
         """Follow the camera."""
@@ -101,6 +126,7 @@ class Validating(QObject):
         """Wait for nothing any more."""
         self._poll.stop()
         self._capture = None
+        self.jobs.close()
 
     def measure(self) -> None:
         """Capture the press, then measure it."""
@@ -174,7 +200,7 @@ class Validating(QObject):
             self._show(trial, text)
 
         self._panel.say(tr("Measuring."))
-        self._controller.jobs.submit(Job(tr("Measuring the press"), work, done, self._refuse))
+        self.jobs.submit(Job(tr("Measuring the press"), work, done, self._refuse))
 
     def _show(self, trial: Trial, text: str) -> None:
         self._trial = trial, text

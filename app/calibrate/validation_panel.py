@@ -157,13 +157,23 @@ class ValidationPanel(QWidget):
         if known.height_mm is not None:
             self.height.setValue(known.height_mm)
 
-    def show_calibration(self, name: str) -> None:
-        """Say which calibration is tried; an empty name: none is saved yet."""
-        self.calibration.setText(
-            tr("Calibration: {name}").format(name=name)
-            if name
-            else tr("Save the calibration first: a validation belongs to a saved one.")
-        )
+    def show_calibration(self, name: str, *, present: bool) -> None:
+        """Say which calibration is tried.
+
+        Parameters
+        ----------
+        name : str
+            Its name; empty where none is saved yet.
+        present : bool
+            Whether it was made from the captures and corrections as they are now.
+        """
+        said = tr("Calibration: {name}, of the present captures.")
+        if not name:
+            said = tr("Save the calibration first (step 10): a validation belongs to one.")
+        elif not present:
+            said = tr("Calibration: {name}. What it was made from has changed: save it anew.")
+        self.calibration.setText(said.format(name=name))
+        show_meaning(self.calibration, "" if present else "warn")
         self._has_calibration = bool(name)
         self._allow()
 

@@ -67,6 +67,9 @@ class Provenance:
         Exposure and the like, where they are known.
     edits : tuple of HandEdit
         What was changed by hand since, in that order.
+    inputs : str
+        Changes with anything that the calibration rests on: captures, statements, corrections.
+        Empty where nobody noted it.
     """
 
     created: str
@@ -76,6 +79,7 @@ class Provenance:
     sources: Mapping[str, str]
     camera_settings: Mapping[str, str] = field(default_factory=dict)
     edits: tuple[HandEdit, ...] = ()
+    inputs: str = ""
 
 
 @dataclass(frozen=True, slots=True)

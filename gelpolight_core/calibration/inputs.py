@@ -107,6 +107,20 @@ def inputs_of(
     return found
 
 
+def all_inputs(session: Session, hashes: Callable[[Path], str] = file_hash) -> str:
+    """Return a text that changes with anything that a session's calibration rests on.
+
+    Parameters
+    ----------
+    session, hashes
+        As for :func:`inputs_of`.
+    """
+    stages = inputs_of(session, hashes)
+    curves = sorted(session.decisions.curves.items())
+    rests_on = [stages[stage].fingerprint for stage in Stage], session.sensor.serial, curves
+    return hashlib.sha256(repr(rests_on).encode()).hexdigest()
+
+
 def changes_between(before: StageInputs, now: StageInputs) -> tuple[str, ...]:
     """Say in words what has changed since a result was made."""
     old, new = dict(before.pictures), dict(now.pictures)

@@ -50,7 +50,7 @@ class CalibrationSummary:
     ----------
     identity, serial, model : str
         The calibration's short name, its sensor and the model that it was made for.
-    created, operator, program_version, session : str
+    created, operator, program_version, session, inputs : str
         As in its provenance.
     picture_size : tuple of int
         Width and height of the camera's pictures, px.
@@ -65,6 +65,7 @@ class CalibrationSummary:
     operator: str
     program_version: str
     session: str
+    inputs: str
     picture_size: tuple[int, int]
     quality: Mapping[str, QualityTable]
 
@@ -126,6 +127,7 @@ def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
         "serial": manifest["sensor"]["serial"],
         "model": manifest["model"],
         **{k: provenance[k] for k in ("created", "operator", "program_version", "session")},
+        "inputs": provenance.get("inputs", ""),
     }
     for key, text in texts.items():
         if not isinstance(text, str):

@@ -13,7 +13,7 @@ import numpy as np
 from gelpolight_core import __version__
 from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
 from gelpolight_core.calibration.edit import edited
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.inputs import FOLDERS, Stage, all_inputs
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.calibration.refinement import bare_calibration
 from gelpolight_core.calibration.results import StageResults, require_balls
@@ -279,4 +279,5 @@ def _provenance(session: Session) -> Provenance:
         program_version=__version__,
         session=session.folder.resolve().name,
         sources=sources,
+        inputs=all_inputs(session),
     )

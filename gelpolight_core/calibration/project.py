@@ -16,6 +16,7 @@ from gelpolight_core.calibration.inputs import (
     NEEDS,
     Stage,
     StageInputs,
+    all_inputs,
     changes_between,
     inputs_of,
 )
@@ -64,6 +65,12 @@ class CalibrationProject(KeptSession):
     def results(self) -> StageResults:
         """The newest result of every stage, stale or not."""
         return self._results
+
+    @property
+    def all_inputs(self) -> str:
+        """A text that changes with anything that the calibration rests on."""
+        with self._lock:
+            return all_inputs(self._session, self._hashes)
 
     def statuses(self) -> dict[Stage, StageStatus]:
         """Return how every stage stands at present."""

@@ -223,3 +223,30 @@ def test_it_follows_the_theme(qtbot: QtBot, editor: LutEditor, choice: str) -> N
     shown = editor.plot.backgroundBrush().color()
     assert shown == theme.colour("base")
     theme.apply(QApplication.instance(), "light")
+
+
+@pytest.mark.parametrize("width", [620, 1100])
+def test_no_hint_moves_the_plot(qtbot: QtBot, editor: LutEditor, width: int) -> None:
+    editor.resize(width, 700)
+    heights = set()
+    for act in (
+        lambda: editor.choose_node(None),
+        lambda: editor.choose_node(3),
+        lambda: editor._notice.setText("One sentence."),
+        lambda: editor._actions["lasso"].trigger(),
+    ):
+        act()
+        QApplication.processEvents()
+        heights.add(editor.plot.height())
+    assert len(heights) == 1
+
+
+def test_a_node_at_its_neighbour_says_that_it_cannot_go_further(
+    qtbot: QtBot, editor: LutEditor
+) -> None:
+    editor.choose_node(3)
+    for _ in range(200):
+        qtbot.keyClick(editor.plot, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
+        if editor._notice.text():
+            break
+    assert "cannot go further" in editor._notice.text()

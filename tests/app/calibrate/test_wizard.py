@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from pytestqt.qtbot import QtBot
 from technician import Technician, ToldCamera, read_rgb
 
 from app.calibrate.steps import all_steps
+from app.shell import theme
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.project import CalibrationProject
@@ -55,8 +57,6 @@ def test_captures_do_not_wait_for_a_computation(
 
     def work(_tell: object) -> None:
         technician_waits.wait(20.0)
-
-    import threading
 
     technician_waits = threading.Event()
     technician.wizard.controller.jobs.submit(Job("Long work", work, lambda _: release.append(True)))
@@ -103,21 +103,35 @@ def test_leaving_a_picture_out_greys_it_and_undo_brings_it_back(
     assert technician.wizard.project.stale() == ()
 
 
-def test_undo_takes_back_one_correction_and_leaves_what_came_between(
+def test_a_capture_is_undone_before_what_was_done_before_it_and_can_come_back(
     technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
 ) -> None:
-    """Capturing again is no correction: undoing an older one must not bring the old view back."""
+    """The former view is in use again meanwhile, and no picture is ever deleted."""
     technician.begin(computed_project(), "lights")
-    controller = technician.wizard.controller
+    controller, project = technician.wizard.controller, technician.wizard.project
+    former = [path.name for path in project.session.found("mirror")]
+    controller.place_spot(1, (100.0, 90.0))
     controller.exclude(technician.wizard.steps[6].stage, "ball_02.png", True)
+    technician.rest()
     camera.show(read_rgb(small_session / "mirror" / "mirror.png"))
     name = technician.capture()
     technician.rest()
+    assert read_session(technician.session).decisions.spots_px == {}
     controller.undo.undo()
-    technician.rest()
-    session = technician.wizard.project.session
+    session = read_session(technician.session)
+    assert [path.name for path in session.found("mirror")] == former
+    assert session.decisions.spots_px == {1: (100.0, 90.0)}
+    assert "balls/ball_02.png" in session.decisions.excluded
+    assert (technician.session / "mirror" / name).is_file()
+    controller.undo.undo()
+    assert "balls/ball_02.png" not in read_session(technician.session).decisions.excluded
+    controller.undo.redo()
+    controller.undo.redo()
+    session = read_session(technician.session)
     assert [path.name for path in session.found("mirror")] == [name]
-    assert "balls/ball_02.png" not in session.decisions.excluded
+    assert session.decisions.spots_px == {}
+    assert "balls/ball_02.png" in session.decisions.excluded
+    technician.rest()
 
 
 def test_a_spot_moved_by_hand_stays_until_it_is_undone(
@@ -421,3 +435,64 @@ def test_arrow_keys_on_a_node_are_in_the_history(
         qtbot.keyClick(QApplication.focusWidget(), key)
     assert [history.text(n) for n in range(history.count())] == ["nudge node (red)"] * 3
     technician.rest()
+
+
+def test_a_step_that_waits_says_for_which(
+    technician: Technician, fresh: CalibrationProject
+) -> None:
+    technician.begin(fresh, "refraction")
+    assert "captured" in technician.wizard.panel.sentence.text()
+    assert "earlier steps" in technician.see("calibrate.maps.none").text()
+    technician.wizard.go_to("reflectance")
+    assert "step 2, Lens" in technician.wizard.panel.sentence.text()
+
+
+def test_words_and_signs_follow_the_theme(
+    technician: Technician, computed_project: Made, qapp: QApplication
+) -> None:
+    technician.begin(computed_project(), "lights")
+    panel = technician.wizard.panel
+    panel.show_notice("Captured.", "pass")
+    row = technician.wizard.step_list.item(2)
+    light = row.icon().pixmap(18, 18).toImage()
+    try:
+        theme.apply(qapp, "dark")
+        technician.until(lambda: row.icon().pixmap(18, 18).toImage() != light)
+        for label in (panel.notice, panel._word):
+            meant = theme.COLOURS[label.property("meaning")][True]
+            assert label.palette().color(label.foregroundRole()).name() == meant
+    finally:
+        theme.apply(qapp, "light")
+    technician.rest()
+
+
+def test_a_saved_calibration_is_validated_while_its_stages_are_computed_again(
+    technician: Technician, computed_project: Made, small_session: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    technician.begin(computed_project(), "result")
+    technician.click("result.save")
+    technician.rest()
+    folder, hold = technician.session, threading.Event()
+    technician.page._leave_session()
+    compute = CalibrationProject.compute
+    with monkeypatch.context() as slow:
+        slow.setattr(
+            CalibrationProject, "compute",
+            lambda self, *given: (hold.wait(60.0), compute(self, *given))[1],
+        )  # fmt: skip
+        technician.page.open_path(folder)
+        wizard = technician.wizard
+        assert wizard.step.key == "validation"
+        assert "present captures" in wizard.validation.calibration.text()
+        assert "validate it now" in wizard.result.headline.text()
+        wizard.validating.import_press(small_session / "presses" / "cylinder_s5_d100.png")
+        technician.until(lambda: "Diameter" in wizard.validation.result.text())
+        assert wizard.controller.jobs.busy
+        wizard.controller.exclude(wizard.steps[6].stage, "ball_01.png", True)
+        assert "has changed" in wizard.validation.calibration.text()
+        wizard.controller.undo.undo()
+        assert "present captures" in wizard.validation.calibration.text()
+        wizard.controller.jobs.cancel()
+        hold.set()
+        technician.rest()

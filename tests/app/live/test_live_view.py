@@ -473,3 +473,23 @@ def test_no_magnification_is_told_without_a_picture(view: LiveView) -> None:
     assert child(view, "live.zoom").text().endswith("%")
     view.set_stream(None)
     assert child(view, "live.zoom").text() == ""
+
+
+@pytest.mark.parametrize("width", [370, 630, 900])
+def test_the_exposures_advice_is_never_cut_off_and_moves_nothing(
+    view: LiveView, width: int
+) -> None:
+    view.resize(width, 700)
+    QApplication.processEvents()
+    heights = set()
+    for level in (0, 10, 128, 255):
+        bright = np.full((HEIGHT, WIDTH, 3), level, np.uint8)
+        view.show_picture(bright)
+        QApplication.processEvents()
+        label = child(view, "live.exposure")
+        assert label.text()
+        needed = label.heightForWidth(label.width()) if label.wordWrap() else 0
+        assert needed <= label.height()
+        assert label.wordWrap() or label.sizeHint().width() <= label.width()
+        heights.add(child(view, "live.checks").height())
+    assert len(heights) == 1

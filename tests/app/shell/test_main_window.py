@@ -175,6 +175,34 @@ def test_size_and_page_are_remembered(
     assert make_window().size().toTuple() == (1111, 777)
 
 
+def test_the_source_of_last_time_is_chosen_again(
+    context: AppContext, make_window: MakeWindow, tmp_path: Path, qtbot: QtBot
+) -> None:
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    window = make_window()
+    context.source.choose_folder(folder)
+    window.close()
+    context.source.info = None  # as the program starts anew
+    make_window().choose_source_again()
+    qtbot.waitUntil(lambda: context.source.info is not None)
+    assert context.source.remembered == ("folder", folder)
+
+
+def test_a_source_that_is_gone_or_was_put_away_is_not_chosen_again(
+    context: AppContext, make_window: MakeWindow, tmp_path: Path
+) -> None:
+    window = make_window()
+    context.source.choose_again("recording", tmp_path / "gone.gplrec")
+    assert context.source.info is None
+    context.source.choose_virtual_sensor()
+    assert context.settings.source == ("virtual", None)
+    context.source.choose(None)
+    window.choose_source_again()
+    assert context.settings.source == ("", None)
+    assert context.source.info is None
+
+
 def test_a_settings_file_of_nonsense_harms_nothing(tmp_path: Path) -> None:
     path = tmp_path / "desktop.ini"
     path.write_text(
