@@ -52,7 +52,7 @@ class ResultView(QWidget):
         self.headline.setWordWrap(True)
         make_bold(self.headline, size=1.2)
         column.addWidget(self.headline)
-        scroll = QScrollArea()
+        scroll = named(QScrollArea(), "result.scroll", tr("Every stage"))
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         inside = QWidget()

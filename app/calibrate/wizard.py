@@ -210,7 +210,8 @@ class Wizard(WizardFrame):
             "validation": self.validation.measure,
         }
         if self.looking.has_pictures and not self.panel.finished:
-            self.panel.capture.setFocus()
+            panel = self.panel
+            (panel.capture if panel.capture.isEnabled() else panel.import_files).setFocus()
         else:
             first.get(self.step.key, self.panel.next).setFocus()
 

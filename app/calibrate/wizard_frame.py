@@ -131,7 +131,12 @@ class WizardFrame(QMainWindow):
         for dock, text in ((self.history, tr("History")), (self.bench_dock, tr("Virtual bench"))):
             action = dock.toggleViewAction()
             action.setText(text)
+            action.setObjectName(f"{dock.objectName()}.shown")
             bar.addAction(action)
+        for action in bar.actions():
+            button = bar.widgetForAction(action)
+            named(button, f"{action.objectName()}.button", action.text())
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         bar.addSeparator()
         source = SourceButton(
             context=self.context, page="calibrate", none=tr("No camera: import pictures")

@@ -496,3 +496,20 @@ def test_a_saved_calibration_is_validated_while_its_stages_are_computed_again(
         wizard.controller.jobs.cancel()
         hold.set()
         technician.rest()
+
+
+def test_the_tab_key_goes_from_the_step_over_bar_and_list_to_the_picture_and_back(
+    technician: Technician, fresh: CalibrationProject, camera: ToldCamera, qtbot: QtBot
+) -> None:
+    technician.begin(fresh, "balls")
+    technician.until(technician.wizard.panel.capture.isEnabled)
+    technician.wizard.panel.radius.setFocus()
+    reached: list[str] = []
+    while (name := QApplication.focusWidget().objectName()) not in reached:
+        reached.append(name)
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+    parts = ("radius", "capture", "import", "automatic", "next", "leave.button", "source", "steps")
+    places = [reached.index(f"calibrate.{part}") for part in parts]
+    assert places == sorted(places)
+    assert reached.index("live.fit") > places[-1]
+    technician.rest()
