@@ -22,6 +22,7 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.roomy_label import RoomyLabel
+from app.widgets.sign import Sign
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.quality import QualityTable
@@ -157,7 +158,7 @@ class _StageRow(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 2, 0, 2)
         row = QHBoxLayout()
-        self._sign, self._word, self._said = QLabel(), QLabel(), QLabel()
+        self._sign, self._word, self._said = Sign(), QLabel(), QLabel()
         self._said.setWordWrap(True)
         self._word.setMinimumWidth(96)
         make_bold(self._word)
@@ -191,7 +192,7 @@ class _StageRow(QWidget):
         column.addWidget(self.table)
 
     def show_state(self, state: str, sentence: str, quality: QualityTable) -> None:
-        self._sign.setPixmap(state_icon(state).pixmap(18, 18))
+        self._sign.show_icon(state_icon(state))
         self._word.setText(state_word(state).capitalize())
         show_meaning(self._word, state_meaning(state))
         self._said.setText(sentence)

@@ -27,6 +27,7 @@ from app.calibrate.steps import Step
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
+from app.widgets.sign import Sign
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.translation import tr
@@ -156,7 +157,7 @@ class StepPanel(QWidget):
 
     def _build_state(self) -> None:
         row = QHBoxLayout()
-        self._sign = QLabel()
+        self._sign = Sign()
         self._word = named(QLabel(), "calibrate.state", tr("State of the step"))
         make_bold(self._word)
         self.recompute = named(
@@ -238,7 +239,7 @@ class StepPanel(QWidget):
         self.recompute.hide()
 
     def _show_sign(self, state: str) -> None:
-        self._sign.setPixmap(state_icon(state).pixmap(18, 18))
+        self._sign.show_icon(state_icon(state))
         self._word.setText(state_word(state).capitalize())
         show_meaning(self._word, state_meaning(state))
 

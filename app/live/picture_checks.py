@@ -83,11 +83,11 @@ def measure_exposure(rgb: Rgb) -> Exposure:
     brightest = _level_of_brightest(rgb)
     if share > SATURATED_WARN:
         verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
-        text = tr("Too bright: {p} % of the pixels are at the end of scale. Shorten the exposure.")
+        text = tr("Too bright: {p} % of the pixels are saturated. Shorten the exposure.")
         return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * share)))
     if brightest < DARK_SHARE_OF_SCALE:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
-        text = tr("Too dark: the brightest places reach {p} % of the scale. Lengthen the exposure.")
+        text = tr("Too dark: the brightest reach {p} % of the scale. Lengthen the exposure.")
         return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * brightest)))
     text = tr("Exposure is good: the brightest places reach {p} % of the scale.")
     return Exposure(share, brightest, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))

@@ -13,14 +13,19 @@ class Sign(QWidget):
 
     Parameters
     ----------
-    icon : QIcon
-        Of :func:`app.shell.icons.icon`, drawn anew whenever it is shown.
+    icon : QIcon, optional
+        One that is drawn anew whenever it is shown, as of :func:`app.shell.icons.icon`.
     """
 
-    def __init__(self, icon: QIcon, parent: QWidget | None = None) -> None:
+    def __init__(self, icon: QIcon | None = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._icon = icon
+        self._icon = icon or QIcon()
         self.setFixedSize(SIDE, SIDE)
+
+    def show_icon(self, icon: QIcon) -> None:
+        """Show another icon."""
+        self._icon = icon
+        self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the icon in the theme of now."""

@@ -182,7 +182,7 @@ def test_a_ball_that_could_not_be_written_leaves_no_radius_behind(
     project = computed_project()
     radii = dict(project.session.ball_radii_mm)
     monkeypatch.setattr(
-        "gelpolight_core.calibration.project.write_picture", lambda *_: full_picture()
+        "gelpolight_core.calibration.kept_session.write_picture", lambda *_: full_picture()
     )
     with pytest.raises(Exception, match="disk is full"):
         project.add_capture(Stage.BALLS, [np.zeros((240, 320, 3), np.uint8)], radius_mm=2.0)

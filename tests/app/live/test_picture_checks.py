@@ -43,9 +43,7 @@ def test_three_percent_at_the_end_of_scale_are_told_with_the_remedy(dtype: type)
     exposure = measure_exposure(rgb)
     assert exposure.saturated_share == pytest.approx(0.03, abs=1e-4)
     assert exposure.verdict is Verdict.FAIL
-    assert exposure.advice == (
-        "Too bright: 3 % of the pixels are at the end of scale. Shorten the exposure."
-    )
+    assert exposure.advice == ("Too bright: 3 % of the pixels are saturated. Shorten the exposure.")
 
 
 @pytest.mark.parametrize("dtype", DEPTHS)
