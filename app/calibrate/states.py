@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QPoint, QPointF, QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QIcon, QIconEngine, QPainter, QPen, QPixmap
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
 
 from app.calibrate.steps import Step
 from app.shell import theme
@@ -45,43 +45,26 @@ def state_colour(state: str) -> QColor:
 
 
 def state_icon(state: str) -> QIcon:
-    """Return a sign for a state: its shape tells it without the colour; it follows the theme."""
-    return QIcon(_Engine(state))
+    """Return a sign for a state: its shape tells it without the colour."""
+    sign = QIcon()
+    back = theme.colour("base")
+    sign.addPixmap(_picture(state, state_colour(state), back), QIcon.Mode.Normal)
+    # On the highlighted row of a list.
+    chosen, behind = theme.colour("highlighted"), theme.colour("highlight")
+    sign.addPixmap(_picture(state, chosen, behind), QIcon.Mode.Selected)
+    return sign
 
 
-class _Engine(QIconEngine):
-    """Paints a sign in the colours of the theme of now."""
-
-    def __init__(self, state: str) -> None:
-        super().__init__()
-        self._state = state
-
-    def clone(self) -> QIconEngine:
-        """Return a copy."""
-        return _Engine(self._state)
-
-    def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
-        """Draw into `rect`."""
-        colour, back = state_colour(self._state), theme.colour("base")
-        if mode is QIcon.Mode.Selected:  # on the highlighted row of a list
-            colour, back = theme.colour("highlighted"), theme.colour("highlight")
-        painter.save()
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.translate(rect.topLeft())
-        painter.scale(rect.width() / SIZE, rect.height() / SIZE)
-        _paint(painter, self._state, colour, back)
-        painter.restore()
-
-    def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
-        """Return a picture of the sign."""
-        if size.isEmpty():
-            return QPixmap()
-        picture = QPixmap(size)
-        picture.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(picture)
-        self.paint(painter, QRect(QPoint(0, 0), size), mode, state)
-        painter.end()
-        return picture
+def _picture(state: str, colour: QColor, back: QColor) -> QPixmap:
+    ratio = 2
+    picture = QPixmap(SIZE * ratio, SIZE * ratio)
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(picture)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    _paint(painter, state, colour, back)
+    painter.end()
+    return picture
 
 
 def _paint(painter: QPainter, state: str, colour: QColor, back: QColor) -> None:

@@ -14,7 +14,7 @@ class Sign(QWidget):
     Parameters
     ----------
     icon : QIcon, optional
-        One that is drawn anew whenever it is shown, as of :func:`app.shell.icons.icon`.
+        One of :func:`app.shell.icons.icon` is drawn anew in every theme.
     """
 
     def __init__(self, icon: QIcon | None = None, parent: QWidget | None = None) -> None:
