@@ -141,6 +141,7 @@ def _left_windows(before: list[QWidget]) -> list[QWidget]:
 
 def _left_threads(before: set[threading.Thread]) -> list[str]:
     end = time.monotonic() + GRACE_S
+    collected = False
     while True:
         left = [
             thread.name
@@ -149,4 +150,8 @@ def _left_threads(before: set[threading.Thread]) -> list[str]:
         ]
         if not left or time.monotonic() > end:
             return left
+        # A pool's threads end with the pool, which a cycle of references may still hold.
+        if not collected:
+            collected = True
+            gc.collect()
         time.sleep(0.02)
