@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.recording.matching import require_match
+from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.response.curve import CameraResponse
 from gelpolight_core.session.picture import Picture, linear_picture
@@ -149,18 +149,6 @@ def frame_range(text: str, count: int, *, where: str) -> range:
             ).format(n=count),
         )
     return range(begin, min(end, count))
-
-
-def recording_notes(recording: Recording) -> list[str]:
-    """Return what a person should know of a recording that is not all that it could be."""
-    notes = []
-    if recording.truncated:
-        notes.append(tr("the recording was cut short or is damaged; this is what is left of it"))
-    if recording.lost:
-        notes.append(
-            tr("{n} frames of the source are not in the recording").format(n=recording.lost)
-        )
-    return notes
 
 
 def _of_file(path: Path) -> Input:

@@ -41,6 +41,7 @@ def build_parser() -> argparse.ArgumentParser:
     # Not above: they load for seconds, and Ctrl-C shall be answered in that time too.
     from app.command_line import (
         ablation,
+        batch,
         benchmark,
         board,
         calibrate,
@@ -77,6 +78,7 @@ def build_parser() -> argparse.ArgumentParser:
         calibrate,
         inspect_calibration,
         reconstruct,
+        batch,
         measure,
         profile,
         evaluate,

@@ -1,4 +1,4 @@
-"""Whether a recording and a calibration belong together."""
+"""Whether a recording and a calibration belong together, and what is to be said of it."""
 
 from __future__ import annotations
 
@@ -37,3 +37,15 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
             where=str(recording.path),
             advice=tr("Choose a calibration for frames of this size"),
         )
+
+
+def recording_notes(recording: Recording) -> list[str]:
+    """Return what a person should know of a recording that is not all that it could be."""
+    notes = []
+    if recording.truncated:
+        notes.append(tr("the recording was cut short or is damaged; this is what is left of it"))
+    if recording.lost:
+        notes.append(
+            tr("{n} frames of the source are not in the recording").format(n=recording.lost)
+        )
+    return notes

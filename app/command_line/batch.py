@@ -1,0 +1,239 @@
+"""``gelpolight batch``: recordings and folders of any size become depth maps."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from tqdm import tqdm
+
+from app.command_line.common import add_effort, add_model, load_reconstructor
+from gelpolight_core.batch.cluster import ClusterRunner
+from gelpolight_core.batch.plan import Selection, plan_batch
+from gelpolight_core.batch.processes import ProcessRunner
+from gelpolight_core.batch.run import BatchProgress, Runner, run_batch
+from gelpolight_core.batch.settings import BatchSettings
+from gelpolight_core.batch.summary import FILE as SUMMARY
+from gelpolight_core.batch.summary import last_line
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.heightmap_files import FORMATS
+from gelpolight_core.measurement.measure import SHAPES
+from gelpolight_core.translation import tr
+
+SHOWN_FAULTS = 20
+"""Bad frames that are named while the work goes on; all of them are in the summary."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "batch", help=tr("turn recordings and folders of any size into depth maps, on many cores")
+    )
+    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
+    parser.add_argument(
+        "inputs",
+        type=Path,
+        nargs="+",
+        metavar="INPUT",
+        help=tr("recordings, pictures, and folders of them"),
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="OUT",
+        help=tr("folder of the run; one that was left is gone on with"),
+    )
+    parser.add_argument(
+        "--formats",
+        "--format",
+        default="npz",
+        metavar="LIST",
+        help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
+    )
+    parser.add_argument(
+        "--frames",
+        default="",
+        metavar="A:B",
+        help=tr("of each recording and folder, those from A, from 0, up to but not with B"),
+    )
+    parser.add_argument(
+        "--every", type=int, default=1, metavar="N", help=tr("of these, every N-th only")
+    )
+    parser.add_argument(
+        "--measure",
+        choices=SHAPES,
+        metavar="SHAPE",
+        help=tr("also measure what is pressed: {shapes}; takes several times as long").format(
+            shapes=", ".join(SHAPES)
+        ),
+    )
+    who = parser.add_mutually_exclusive_group()
+    who.add_argument(
+        "--workers",
+        type=int,
+        choices=range(1, 257),
+        default=1,
+        metavar="N",
+        help=tr("processes of this machine, each with a core of its own (1)"),
+    )
+    who.add_argument(
+        "--scheduler", metavar="ADDRESS", help=tr("of a Dask cluster that does the work instead")
+    )
+    add_effort(parser)
+    add_model(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Reconstruct every frame that has no result yet, and write the summary."""
+    formats = _formats(options.formats)
+    selection = _selection(options.frames, options.every)
+    # Also refuses here what each worker would refuse: a calibration that nothing can be made with.
+    reconstructor = load_reconstructor(
+        options.calibration, model=options.model, effort=options.effort
+    )
+    calibration = reconstructor.calibration
+    out = options.output.absolute()
+    plan = plan_batch(options.inputs, out, calibration, selection)
+    for note in plan.notes:
+        print(note, file=sys.stderr)
+    settings = BatchSettings(
+        options.calibration.absolute(),
+        calibration.identity,
+        reconstructor.model,
+        options.effort,
+        formats,
+        options.measure,
+    )
+    runner: Runner = (
+        ClusterRunner(settings, out, options.scheduler)
+        if options.scheduler
+        else ProcessRunner(settings, out, options.workers)
+    )
+    with _stopped_by_ctrl_c() as stopped, _Progress() as tell:
+        progress = run_batch(plan, settings, out, runner, tell=tell, stopped=stopped)
+    return _report(progress, options.output)
+
+
+class _Progress:
+    """A bar on stderr, with a line for each frame that could not be used."""
+
+    def __init__(self) -> None:
+        self._bar: tqdm[Any] | None = None
+
+    def __enter__(self) -> Callable[[BatchProgress], None]:
+        """Return the function to be told."""
+        return self._tell
+
+    def __exit__(self, *details: object) -> None:
+        """Close the bar."""
+        if self._bar is not None:
+            self._bar.close()
+
+    def _tell(self, progress: BatchProgress) -> None:
+        if self._bar is None:
+            self._bar = tqdm(
+                total=progress.total, initial=progress.before, file=sys.stderr, unit=tr("frame")
+            )
+        if progress.row is None:
+            return
+        if progress.row.error and progress.bad <= SHOWN_FAULTS:
+            tqdm.write(_bad_line(progress), file=sys.stderr)
+        self._bar.update()
+
+
+def _bad_line(progress: BatchProgress) -> str:
+    row = progress.row
+    assert row is not None
+    where = row.input
+    if row.frame is not None:
+        where = tr("{path}, frame {n}").format(path=where, n=row.frame)
+    said = last_line(row.error).removeprefix(f"{row.input}: ")
+    if progress.bad == SHOWN_FAULTS:
+        said += tr(" (further ones are in the summary only)")
+    return f"{where}: {said}"
+
+
+def _report(progress: BatchProgress, out: Path) -> int:
+    """Say what was done; return the exit status, or raise what tells it."""
+    done = progress.before + progress.done
+    if progress.left:
+        tqdm.write(
+            tr("{n} of {total} frames are done; the same command goes on from here").format(
+                n=done, total=progress.total
+            ),
+            file=sys.stderr,
+        )
+        raise KeyboardInterrupt
+    print(
+        tr("{n} depth maps in {folder}, {before} of them from before").format(
+            n=done, folder=out, before=progress.before
+        )
+    )
+    if progress.faults:
+        raise RuntimeError(f"{progress.faults} frames, see batch.jsonl in {out}")
+    if progress.bad:
+        raise InputError(
+            tr("{n} of {total} frames could not be used").format(
+                n=progress.bad, total=progress.total
+            ),
+            where=str(out / SUMMARY),
+            advice=tr("Its last column says why; mended ones are done by the same command"),
+        )
+    return 0
+
+
+@contextmanager
+def _stopped_by_ctrl_c() -> Iterator[Callable[[], bool]]:
+    """Let a first Ctrl-C end the work with the frames at hand, and only a second one break in."""
+    asked = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        if asked:
+            raise KeyboardInterrupt
+        asked = True
+        tqdm.write(tr("stopping: the frames at hand are brought to their end"), file=sys.stderr)
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: asked
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _formats(text: str) -> tuple[str, ...]:
+    formats = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    unknown = sorted(set(formats) - set(FORMATS))
+    if unknown or not formats:
+        raise InputError(
+            tr("unknown format {name}").format(name=", ".join(unknown) or '""'),
+            where="--formats",
+            advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
+        )
+    return formats
+
+
+def _selection(frames: str, every: int) -> Selection:
+    first, colon, end = frames.partition(":")
+    try:
+        selection = Selection(int(first or 0), int(end) if end else None, every)
+        if frames and not colon:
+            selection = Selection(selection.first, selection.first + 1, every)
+    except ValueError:
+        selection = Selection(-1)
+    if selection.first < 0 or every < 1 or (selection.end or 1) <= 0:
+        raise InputError(
+            tr("{text} names no frames").format(text=frames if every >= 1 else every),
+            where="--frames" if every >= 1 else "--every",
+            advice=tr("Give whole numbers, as in --frames 0:1000 --every 10"),
+        )
+    return selection

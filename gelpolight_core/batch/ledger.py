@@ -1,0 +1,193 @@
+"""What was done in a run, one line per frame; a frame counts once its line is on the disk.
+
+The files of a frame are whole before its line is written. A line that was cut short by a crash is
+no line: that frame is done again. Of two lines for one result the later one counts.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from gelpolight_core.measurement.ledger import unwritable
+from gelpolight_core.session.wholeness import unreadable
+
+FILE = "batch.jsonl"
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRow:
+    """What is noted of a frame.
+
+    Attributes
+    ----------
+    output : str
+        Its files in the run's folder, without their endings.
+    stamp : str
+        What the frame was told by; another stamp is another frame.
+    input : str
+        Picture or recording.
+    frame : int or None
+        Which of the recording's frames, from 0; None for a picture.
+    number, time_s : int or None, float or None
+        As :class:`~gelpolight_core.recording.recording.RecordedFrame` has them.
+    max_depth_mm : float or None
+        Largest depth in the working area.
+    volume_mm3 : float or None
+        Integral of the depth over the working area.
+    flagged_share : float or None
+        Share of the working area whose depth is flagged, 0..1.
+    notes : tuple of str
+        What is to be said of the result.
+    measured : dict or None
+        The measurement, as ``measure --json`` writes it.
+    seconds : float
+        Processor time.
+    error : str
+        Why there is no result; empty where there is one.
+    ours : bool
+        Whether that is a fault of this program.
+    """
+
+    output: str
+    stamp: str
+    input: str
+    frame: int | None = None
+    number: int | None = None
+    time_s: float | None = None
+    max_depth_mm: float | None = None
+    volume_mm3: float | None = None
+    flagged_share: float | None = None
+    notes: tuple[str, ...] = ()
+    measured: dict[str, Any] | None = None
+    seconds: float = 0.0
+    error: str = ""
+    ours: bool = False
+
+
+@dataclass(slots=True)
+class _Place:
+    """Where a result's line begins in the file."""
+
+    stamp: str
+    offset: int
+    good: bool
+    order: tuple[str, str, int]
+
+
+class BatchLedger:
+    """The file of a run's rows; only their places are kept in memory.
+
+    Parameters
+    ----------
+    path : Path
+        The file, made with the first row.
+
+    Raises
+    ------
+    InputError
+        If the file is there and cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._places: dict[str, _Place] = {}
+        self._end, self._torn = 0, False
+        if not path.exists():
+            return
+        try:
+            with path.open("rb") as file:
+                for line in file:
+                    self._take_in(line)
+        except OSError as error:
+            raise unreadable(error, path) from error
+
+    def has(self, output: str, stamp: str) -> bool:
+        """Return whether a frame has a result."""
+        place = self._places.get(output)
+        return place is not None and place.good and place.stamp == stamp
+
+    def keep(self, rows: Sequence[FrameRow]) -> None:
+        """Write rows to the end of the file, and wait until the disk has them.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        lines = [_packed(row) for row in rows]
+        if not lines:
+            return
+        try:
+            with self._path.open("ab") as file:
+                file.write((b"\n" if self._torn else b"") + b"".join(lines))
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise unwritable(error, self._path) from error
+        if self._torn:
+            self._end, self._torn = self._end + 1, False
+        for row, line in zip(rows, lines, strict=True):
+            self._note(row, len(line))
+
+    def rows(self) -> Iterator[FrameRow]:
+        """Return the rows that count, by folder, input and frame, each read from the file.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read any more.
+        """
+        places = sorted(self._places.values(), key=lambda place: place.order)
+        if not places:
+            return
+        try:
+            with self._path.open("rb") as file:
+                for place in places:
+                    file.seek(place.offset)
+                    row = _unpacked(file.readline())
+                    assert row is not None
+                    yield row
+        except OSError as error:
+            raise unreadable(error, self._path) from error
+
+    def _take_in(self, line: bytes) -> None:
+        """Take in one line; what is none is passed over."""
+        row = _unpacked(line)
+        if row is None:
+            self._end += len(line)
+        else:
+            self._note(row, len(line))
+        self._torn = not line.endswith(b"\n")
+
+    def _note(self, row: FrameRow, size: int) -> None:
+        folder = row.output.rpartition("/")[0]
+        frame = -1 if row.frame is None else row.frame
+        # A recording's frames are in their order, whatever their count of digits.
+        name = row.output if row.frame is None else row.input
+        order = (folder, name, frame)
+        self._places[row.output] = _Place(row.stamp, self._end, not row.error, order)
+        self._end += size
+
+
+def _packed(row: FrameRow) -> bytes:
+    """Return a row as a line; numbers keep their last bit, as JSON writes them shortest."""
+    return json.dumps(asdict(row), separators=(",", ":")).encode() + b"\n"
+
+
+def _unpacked(line: bytes) -> FrameRow | None:
+    """Return a line's row; None where it is no whole one."""
+    if not line.endswith(b"\n"):
+        return None
+    try:
+        content = json.loads(line)
+        row = FrameRow(**{**content, "notes": tuple(map(str, content["notes"]))})
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return None
+    texts = (row.output, row.stamp, row.input, row.error)
+    whole = row.frame is None or type(row.frame) is int
+    return row if whole and all(isinstance(text, str) for text in texts) else None

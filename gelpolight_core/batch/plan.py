@@ -1,0 +1,290 @@
+"""Which frames a run has: those of recordings, and pictures, each with a result of its own name."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.recording.matching import recording_notes, require_match
+from gelpolight_core.recording.reader import Recording, is_recording
+from gelpolight_core.recording.recording import ENDING
+from gelpolight_core.session.session import SUFFIXES
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One frame that is to be reconstructed.
+
+    Attributes
+    ----------
+    path : Path
+        The picture, or the recording.
+    index : int or None
+        Which of the recording's frames, from 0; None for a picture.
+    output : str
+        Its files in the run's folder, without their endings.
+    stamp : str
+        What tells it from another frame that takes its place later.
+    """
+
+    path: Path
+    index: int | None
+    output: str
+    stamp: str
+
+    @property
+    def name(self) -> str:
+        """Its name in the result."""
+        if self.index is None:
+            return self.path.name
+        return f"{self.output.rpartition('/')[2]}{self.path.suffix}"
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which frames of every recording, and pictures of every folder, are wanted.
+
+    Attributes
+    ----------
+    first, end : int, int or None
+        From `first`, counted from 0, up to but not with `end`; None: to the last.
+    every : int
+        Of these the first, and every so many-th after it.
+    """
+
+    first: int = 0
+    end: int | None = None
+    every: int = 1
+
+    def of(self, count: int) -> range:
+        """Return the chosen ones of so many."""
+        return range(self.first, count if self.end is None else min(self.end, count), self.every)
+
+
+@dataclass(frozen=True, slots=True)
+class _Pictures:
+    """Pictures of one folder."""
+
+    folder: Path
+    names: tuple[str, ...]
+    output: str
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def stems(self) -> Iterator[str]:
+        return (_joined(self.output, os.path.splitext(name)[0]) for name in self.names)
+
+    def job(self, index: int) -> Job:
+        path = self.folder / self.names[index]
+        output = _joined(self.output, os.path.splitext(self.names[index])[0])
+        try:
+            found = path.stat()
+        except OSError:  # the worker says in its own words why it cannot be read
+            return Job(path, None, output, "")
+        return Job(path, None, output, f"{found.st_size} {found.st_mtime_ns}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Frames:
+    """Frames of a recording; one that cannot be opened has a single frame, which tells so."""
+
+    path: Path
+    output: str
+    started: str = ""
+    numbers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @property
+    def stems(self) -> Iterator[str]:
+        yield f"{self.output}/"
+
+    def job(self, index: int) -> Job:
+        output = f"{self.output}/{self.path.stem}_{index:06d}"
+        return Job(self.path, index, output, f"{self.started} {self.numbers[index]}")
+
+
+@dataclass(frozen=True, slots=True)
+class BatchPlan:
+    """The frames of a run; none of them is read yet.
+
+    Attributes
+    ----------
+    sources : tuple
+        Recordings, and folders of pictures.
+    selection : Selection
+        Which of their frames.
+    notes : tuple of str
+        What a person should know of them.
+    """
+
+    sources: tuple[_Pictures | _Frames, ...]
+    selection: Selection
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        """Return how many frames there are."""
+        return sum(len(self.selection.of(len(source))) for source in self.sources)
+
+    def __iter__(self) -> Iterator[Job]:
+        """Return the frames one by one, made as they are asked for."""
+        for source in self.sources:
+            for index in self.selection.of(len(source)):
+                yield source.job(index)
+
+    @property
+    def folders(self) -> set[str]:
+        """The folders of the results, in that of the run."""
+        return {source.output for source in self.sources}
+
+
+def plan_batch(
+    inputs: Sequence[Path], out: Path, calibration: Calibration, selection: Selection
+) -> BatchPlan:
+    """Find the frames of recordings, pictures and folders, those in deeper folders included.
+
+    A folder's results lie in a folder of its name in `out`, as deep as they did there; a
+    recording's in a folder of its name; those of a picture that is named itself in `out`.
+
+    Parameters
+    ----------
+    inputs : sequence of Path
+        Recordings, pictures, folders.
+    out : Path
+        Folder of the results; what lies in it is passed over.
+    calibration : Calibration
+        That the recordings have to match.
+    selection : Selection
+        Which frames.
+
+    Raises
+    ------
+    InputError
+        If an input is not there or lies in `out`, a recording is of another sensor or size, two
+        results would have one name, or there are no frames.
+    """
+    found = _Found(out.resolve(), calibration)
+    for path in inputs:
+        found.take(path.absolute())
+    plan = BatchPlan(tuple(found.sources), selection, tuple(found.notes))
+    if not len(plan):
+        raise InputError(
+            tr("there are no frames to reconstruct"),
+            where=", ".join(map(str, inputs)),
+            advice=tr("Name recordings, pictures (PNG or TIFF) or folders of them"),
+        )
+    _refuse_twins(plan)
+    return plan
+
+
+class _Found:
+    """Gathers what the inputs hold."""
+
+    def __init__(self, out: Path, calibration: Calibration) -> None:
+        self._out, self._calibration = out, calibration
+        self.sources: list[_Pictures | _Frames] = []
+        self.notes: list[str] = []
+
+    def take(self, path: Path) -> None:
+        """Take in what a person named."""
+        place = path.resolve()
+        if not place.exists():
+            raise InputError(
+                tr("there is no such file or folder"),
+                where=str(path),
+                advice=tr("Check the name"),
+            )
+        if place.is_relative_to(self._out):
+            raise InputError(
+                tr("the input lies in the folder of the results"),
+                where=str(path),
+                advice=tr("Choose another folder for the results"),
+            )
+        if place.is_dir():
+            self._take_folder(path, place.name)
+        elif _seems_recording(path):
+            self._take_recording(path, "")
+        elif self.sources and _goes_on(self.sources[-1], path):
+            before = self.sources.pop()
+            assert isinstance(before, _Pictures)
+            self.sources.append(_Pictures(path.parent, (*before.names, path.name), ""))
+        else:
+            self.sources.append(_Pictures(path.parent, (path.name,), ""))
+
+    def _take_folder(self, folder: Path, output: str) -> None:
+        """Take in a folder and those in it; what is hidden is left out."""
+        pictures, recordings, folders, others = [], [], [], 0
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.name.startswith("."):
+                    continue
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append(entry.name)
+                elif entry.name.lower().endswith(SUFFIXES):
+                    pictures.append(entry.name)
+                elif entry.name.lower().endswith(ENDING):
+                    recordings.append(entry.name)
+                else:
+                    others += 1
+        if pictures:
+            self.sources.append(_Pictures(folder, tuple(sorted(pictures)), output))
+        for name in sorted(recordings):
+            self._take_recording(folder / name, output)
+        if others:
+            self.notes.append(
+                tr("{folder}: {n} files are neither PNG, TIFF nor recordings, and left out").format(
+                    folder=folder, n=others
+                )
+            )
+        for name in sorted(folders):
+            if (folder / name).resolve() != self._out:
+                self._take_folder(folder / name, _joined(output, name))
+
+    def _take_recording(self, path: Path, output: str) -> None:
+        output = _joined(output, path.stem)
+        try:
+            recording = Recording.open(path)
+        except InputError:  # the one frame that stands for it tells why
+            self.sources.append(_Frames(path, output))
+            return
+        with recording:
+            require_match(recording, self._calibration)
+            self.notes += [f"{path}: {note}" for note in recording_notes(recording)]
+            self.sources.append(_Frames(path, output, recording.header.started, recording.numbers))
+
+
+def _seems_recording(path: Path) -> bool:
+    return path.suffix.lower() == ENDING or is_recording(path)
+
+
+def _goes_on(source: _Pictures | _Frames, path: Path) -> bool:
+    """Return whether a picture is of the same folder as the one that was named before it."""
+    return isinstance(source, _Pictures) and not source.output and source.folder == path.parent
+
+
+def _refuse_twins(plan: BatchPlan) -> None:
+    # Some disks ignore the case.
+    names = Counter(stem.casefold() for source in plan.sources for stem in source.stems)
+    twins = [name for name, count in names.items() if count > 1]
+    if twins:
+        raise InputError(
+            tr("two inputs would have results named {name}").format(name=twins[0]),
+            where=tr("INPUT"),
+            advice=tr("Name their common folder in place of both, or use a folder for each run"),
+        )
+
+
+def _joined(folder: str, name: str) -> str:
+    return f"{folder}/{name}" if folder else name

@@ -1,0 +1,172 @@
+"""A run over many frames, which can be left at any time and gone on with.
+
+    batch.json   batch.jsonl   batch.csv   FOLDER/PICTURE.npz   RECORDING/RECORDING_000000.npz ...
+
+``batch.json`` says what the frames are done with, ``batch.jsonl`` what was done; ``batch.csv`` is
+made from it at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from gelpolight_core.batch.frame_work import Halt, Outcome
+from gelpolight_core.batch.ledger import FILE as LEDGER
+from gelpolight_core.batch.ledger import BatchLedger, FrameRow
+from gelpolight_core.batch.plan import BatchPlan, Job
+from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
+from gelpolight_core.batch.stopping import Stopped, workers_may_go_on
+from gelpolight_core.batch.summary import write_summary
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.export.heightmap_files import ending
+from gelpolight_core.measurement.run_lock import RunLock
+from gelpolight_core.translation import tr
+
+Runner = Callable[[Iterator[Job], int, Stopped], Generator[list[Outcome], None, None]]
+"""Does frames: takes them, their count and whether to stop; yields what became of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class BatchProgress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    total, before : int
+        Frames of the plan, and those of them that were done before.
+    done, bad, faults : int
+        Frames done now, frames without a result, and how many of these are faults of the program.
+    row : FrameRow or None
+        The last one; None at the beginning.
+    """
+
+    total: int
+    before: int
+    done: int = 0
+    bad: int = 0
+    faults: int = 0
+    row: FrameRow | None = None
+
+    @property
+    def left(self) -> int:
+        """Frames still to be done."""
+        return self.total - self.before - self.done - self.bad
+
+    def after(self, row: FrameRow) -> BatchProgress:
+        """Return how far it is with another frame."""
+        bad = bool(row.error)
+        return BatchProgress(
+            self.total,
+            self.before,
+            self.done + (not bad),
+            self.bad + bad,
+            self.faults + row.ours,
+            row,
+        )
+
+
+def run_batch(
+    plan: BatchPlan,
+    settings: BatchSettings,
+    out: Path,
+    runner: Runner,
+    *,
+    tell: Callable[[BatchProgress], None],
+    stopped: Stopped,
+) -> BatchProgress:
+    """Do the frames of a plan that have no result yet; write the summary when none is left.
+
+    A frame that could not be used is tried again when the run is gone on with.
+
+    Parameters
+    ----------
+    plan : BatchPlan
+        The frames.
+    settings : BatchSettings
+        What they are done with.
+    out : Path
+        Folder of the run, made when it is not there.
+    runner : callable
+        What does them: a :class:`~gelpolight_core.batch.processes.ProcessRunner` or a
+        :class:`~gelpolight_core.batch.cluster.ClusterRunner`.
+    tell : callable
+        Told how far it is, at the beginning and after each frame.
+    stopped : callable
+        Whether to stop; the frames at hand are brought to their end.
+
+    Raises
+    ------
+    InputError
+        If the run in the folder was begun with other settings, another program works at it, or it
+        cannot go on, as on a full disk; what is done stays done.
+    """
+    make_folder(out)
+    with RunLock(out):
+        begin_or_go_on(settings, out)
+        workers_may_go_on(out)
+        for folder in sorted(plan.folders):
+            make_folder(out / folder)
+            _remove_parts(out / folder)
+        ledger = BatchLedger(out / LEDGER)
+        endings = [ending(name) for name in settings.formats]
+
+        def is_done(job: Job) -> bool:
+            return ledger.has(job.output, job.stamp) and all(
+                (out / f"{job.output}.{name}").is_file() for name in endings
+            )
+
+        before = sum(map(is_done, plan))
+        progress = BatchProgress(len(plan), before)
+        tell(progress)
+        if progress.left:
+            jobs = (job for job in plan if not is_done(job))
+            progress = _do(jobs, progress, ledger, runner, tell, stopped)
+        if not progress.left:
+            write_summary(ledger, out, measured=settings.shape is not None)
+    return progress
+
+
+def _do(
+    jobs: Iterator[Job],
+    progress: BatchProgress,
+    ledger: BatchLedger,
+    runner: Runner,
+    tell: Callable[[BatchProgress], None],
+    stopped: Stopped,
+) -> BatchProgress:
+    halt: Halt | None = None
+    try:
+        with closing(runner(jobs, progress.left, stopped)) as results:
+            for outcomes in results:
+                rows = [outcome for outcome in outcomes if isinstance(outcome, FrameRow)]
+                ledger.keep(rows)
+                for row in rows:
+                    progress = progress.after(row)
+                    tell(progress)
+                halt = halt or next((one for one in outcomes if isinstance(one, Halt)), None)
+        if halt is not None:
+            raise halt.error()
+    except InputError as error:
+        raise _left_at(error, progress) from error
+    return progress
+
+
+def _left_at(error: InputError, progress: BatchProgress) -> InputError:
+    """Return an error that also tells how far the run came."""
+    return InputError(
+        tr("{found}; {n} of {total} frames are done").format(
+            found=error.found, n=progress.before + progress.done, total=progress.total
+        ),
+        where=error.where,
+        advice=tr("{advice}; the same command goes on from here").format(advice=error.advice),
+    )
+
+
+def _remove_parts(folder: Path) -> None:
+    """Remove what killed processes left of files that they had not finished."""
+    for path in folder.glob(".*.part"):
+        path.unlink(missing_ok=True)
