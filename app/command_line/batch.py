@@ -156,7 +156,9 @@ def _bad_line(progress: BatchProgress) -> str:
     where = row.input
     if row.frame is not None:
         where = tr("{path}, frame {n}").format(path=where, n=row.frame)
-    said = last_line(row.error).removeprefix(f"{row.input}: ")
+    said = last_line(row.error)
+    for known in (row.input, Path(row.input).name):
+        said = said.removeprefix(f"{known}: ")
     if progress.bad == SHOWN_FAULTS:
         said += tr(" (further ones are in the summary only)")
     return f"{where}: {said}"

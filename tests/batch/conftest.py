@@ -1,0 +1,99 @@
+"""What the tests of batches share: a small sensor, a day of its frames, workers in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gelpolight_core.batch.frame_work import Halt, Outcome, work
+from gelpolight_core.batch.plan import BatchPlan, Job, Selection, plan_batch
+from gelpolight_core.batch.run import BatchProgress, Runner, run_batch
+from gelpolight_core.batch.settings import BatchSettings
+from gelpolight_core.batch.stopping import Stopped
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+
+
+@pytest.fixture(scope="session")
+def calibration_file(
+    small_calibration: Calibration, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    path = tmp_path_factory.mktemp("sensor") / "small.gplcal"
+    write_calibration(small_calibration, path)
+    return path
+
+
+@pytest.fixture
+def day(small_session: Path, tmp_path: Path) -> Path:
+    """Return a folder with a recording of four frames, and two pictures in a folder of its own."""
+    folder = tmp_path / "day"
+    (folder / "left").mkdir(parents=True)
+    press = next(iter(sorted((small_session / "presses").glob("*.png"))))
+    bgr = cv2.imread(str(press))
+    with RecordingWriter(folder / "run.gplrec", RecordingHeader(serial="virtual-1")) as writer:
+        for number in range(4):
+            rgb = np.ascontiguousarray(np.roll(bgr[..., ::-1], number, axis=1))
+            writer.append(rgb, 10 + number, 5.0 + number / 30)
+    for name in ("a.png", "b.png"):
+        assert cv2.imwrite(str(folder / "left" / name), bgr)
+    return folder
+
+
+@pytest.fixture
+def settings(calibration_file: Path, small_calibration: Calibration) -> BatchSettings:
+    return BatchSettings(
+        calibration_file, small_calibration.identity, "paper", "best", ("npz", "tif")
+    )
+
+
+@pytest.fixture
+def plan(small_calibration: Calibration) -> Callable[..., BatchPlan]:
+    """Return a function that plans a run."""
+
+    def make(*inputs: Path, out: Path, selection: Selection | None = None) -> BatchPlan:
+        return plan_batch(inputs, out, small_calibration, selection or Selection())
+
+    return make
+
+
+def in_this_process(settings: BatchSettings, out: Path) -> Runner:
+    """Return a runner without any other process."""
+
+    def run(
+        jobs: Iterator[Job], count: int, stopped: Stopped
+    ) -> Generator[list[Outcome], None, None]:
+        while not stopped() and (job := next(jobs, None)) is not None:
+            outcomes = work(settings, out, [job])
+            yield outcomes
+            if any(isinstance(outcome, Halt) for outcome in outcomes):
+                return
+
+    return run
+
+
+Go = Callable[..., BatchProgress]
+
+
+@pytest.fixture
+def go(settings: BatchSettings, plan: Callable[..., BatchPlan]) -> Go:
+    """Return a function that does a run, until so many frames are done where that is said."""
+
+    def run(*inputs: Path, out: Path, until: int | None = None, **changes: object) -> BatchProgress:
+        runner = changes.pop("runner", None) or in_this_process(settings, out)
+        rows: list[BatchProgress] = []
+        return run_batch(
+            plan(*inputs, out=out, **changes),
+            settings,
+            out,
+            runner,
+            tell=rows.append,
+            stopped=lambda: until is not None and len(rows) > until,
+        )
+
+    return run

@@ -1,0 +1,146 @@
+"""``gelpolight batch`` as a person meets it: exit statuses, one line, going on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+
+from app.command_line import batch
+from app.command_line.main import INTERRUPTED, MENDABLE, main
+from gelpolight_core.batch.frame_work import work
+
+
+@pytest.fixture
+def command(calibration_file: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """Return a function that runs the command, without other processes."""
+
+    class InThisProcess:
+        def __init__(self, settings, out, workers):
+            self.settings, self.out = settings, out
+
+        def __call__(self, jobs, count, stopped):
+            while not stopped() and (job := next(jobs, None)) is not None:
+                yield work(self.settings, self.out, [job])
+
+    monkeypatch.setattr(batch, "ProcessRunner", InThisProcess)
+
+    def run(*arguments: str | Path) -> int:
+        given = ["batch", calibration_file, *arguments, "--model", "paper"]
+        if "-o" not in given:
+            given += ["-o", tmp_path / "out"]
+        return main([str(part) for part in given])
+
+    return run
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> str:
+    """Return the one line of a refusal."""
+    (line,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("gelpolight:")]
+    return line
+
+
+def test_a_second_call_finds_everything_done(
+    command, day: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(day) == 0
+    assert "6 depth maps in" in capsys.readouterr().out
+    assert command(day) == 0
+    assert "6 of them from before" in capsys.readouterr().out
+
+
+def test_a_bad_frame_is_named_and_counted_in_one_line(
+    command, day: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = day / "left" / "a.png"
+    cv2.imwrite(str(picture), cv2.imread(str(picture))[:50])
+    assert command(day) == MENDABLE
+    told = capsys.readouterr()
+    assert "5 depth maps" in told.out
+    assert "left/a.png: the picture is 320x50x3, the calibration is for" in told.err
+    assert "batch.csv: 1 of 6 frames could not be used" in told.err
+
+
+def test_ctrl_c_ends_with_the_frames_at_hand(
+    command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tell = batch._Progress._tell
+
+    def pressed(self, progress):
+        tell(self, progress)
+        if progress.done == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(batch._Progress, "_tell", pressed)
+    assert command(day) == INTERRUPTED
+    told = capsys.readouterr().err
+    assert "2 of 6 frames are done; the same command goes on from here" in told
+    assert "gelpolight: stopped" in told
+    monkeypatch.undo()
+
+
+def test_frames_can_be_chosen(command, day: Path, tmp_path: Path) -> None:
+    assert command(day / "run.gplrec", "--frames", "1:4", "--every", "2") == 0
+    made = sorted(path.name for path in (tmp_path / "out" / "run").iterdir())
+    assert made == ["run_000001.npz", "run_000003.npz"]
+
+
+def test_what_is_pressed_can_be_measured(command, day: Path, tmp_path: Path) -> None:
+    assert command(day / "left" / "a.png", "--measure", "cuboid", "--formats", "tif") == 0
+    head, row = (tmp_path / "out" / "batch.csv").read_text().splitlines()
+    values = dict(zip(head.split(","), row.split(","), strict=True))
+    assert values["shape"] == "cuboid"
+    assert 2.0 < float(values["side_mm"].split()[0]) < 8.0
+    assert (tmp_path / "out" / "a.tif").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--frames", "x"], "x names no frames"),
+        (["--every", "0"], "--every: 0 names no frames"),
+        (["--frames", "99:"], "there are no frames"),
+        (["--formats", "doc"], "unknown format doc"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_one_line(
+    command, day: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    assert command(day, *arguments) == MENDABLE
+    assert words in said(capsys)
+
+
+def test_inputs_that_cannot_be_are_refused_in_one_line(
+    command, day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "day.png").write_bytes(b"")
+    (tmp_path / "other" / "day").mkdir(parents=True)
+    (tmp_path / "other" / "day" / "run.gplrec").write_bytes((day / "run.gplrec").read_bytes())
+    for inputs, words in (
+        ([tmp_path / "empty"], "there are no frames"),
+        ([tmp_path / "none"], "there is no such file or folder"),
+        ([day, "-o", tmp_path], "the input lies in the folder of the results"),
+        ([day, tmp_path / "other" / "day"], "two inputs would have results named day/run/"),
+    ):
+        assert command(*inputs) == MENDABLE
+        assert words in said(capsys)
+
+
+def test_results_within_the_input_are_no_input(command, day: Path) -> None:
+    out = day / "out"
+    assert command(day, "-o", out, "--formats", "png,tif") == 0
+    assert command(day, "-o", out, "--formats", "png,tif") == 0
+    assert not (out / "day" / "out").exists()
+
+
+def test_without_dask_the_command_says_what_to_install(
+    command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert command(day, "--scheduler", "tcp://127.0.0.1:1") == MENDABLE
+    assert "Dask is not installed" in said(capsys)

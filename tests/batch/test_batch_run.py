@@ -1,0 +1,346 @@
+"""Runs over many frames: nothing is lost, nothing done twice, the same bits whoever does it."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import multiprocessing
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gelpolight_core.batch import frame_work
+from gelpolight_core.batch.ledger import FILE as LEDGER
+from gelpolight_core.batch.ledger import BatchLedger
+from gelpolight_core.batch.plan import Selection
+from gelpolight_core.batch.processes import ProcessRunner
+from gelpolight_core.batch.run import BatchProgress, run_batch
+from gelpolight_core.batch.settings import BatchSettings
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.heightmap_files import write_heightmap
+from gelpolight_core.measurement.run_lock import RunLock
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_picture
+
+
+def results(out: Path) -> dict[str, bytes]:
+    """Return the bytes of all results of a run."""
+    files = [path for path in out.rglob("*") if path.suffix in (".npz", ".tif")]
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
+
+
+def table(out: Path) -> list[dict[str, str]]:
+    with (out / "batch.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def lines(out: Path) -> list[str]:
+    return (out / LEDGER).read_text().splitlines()
+
+
+FRAMES = [f"day/run/run_{k:06d}" for k in range(4)]
+PICTURES = ["day/left/a", "day/left/b"]
+
+
+def test_every_frame_has_its_files_and_its_row(go, day: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert go(day, out=out).done == 6
+    assert sorted(results(out)) == sorted(
+        f"{name}.{ending}" for name in FRAMES + PICTURES for ending in ("npz", "tif")
+    )
+    rows = table(out)
+    assert [row["output"] for row in rows] == PICTURES + FRAMES
+    assert [row["frame"] for row in rows[2:]] == ["0", "1", "2", "3"]
+    assert [row["number"] for row in rows[2:]] == ["10", "11", "12", "13"]
+    assert float(rows[3]["time_s"]) == pytest.approx(5.0 + 1 / 30)
+    with np.load(out / "day/left/a.npz") as held:
+        inside = (held["flags"] & 1) == 0
+        depth_mm = held["depth_mm"][inside].astype(float)
+        assert float(rows[0]["max_depth_mm"]) == depth_mm.max()
+        volume_mm3 = depth_mm.sum() * float(held["pitch_mm"]) ** 2
+        assert float(rows[0]["volume_mm3"]) == pytest.approx(volume_mm3)
+        assert float(rows[0]["flagged_share"]) == np.mean(held["flags"][inside] != 0)
+
+
+def test_a_frame_comes_out_as_it_does_alone(
+    go, settings: BatchSettings, day: Path, tmp_path: Path
+) -> None:
+    """As ``reconstruct`` makes it, to the last bit."""
+    go(day, out=tmp_path / "out")
+    calibration = read_calibration(settings.calibration)
+    picture = read_picture(day / "left" / "a.png", response=calibration.response)
+    heightmap = Reconstructor(calibration, model="paper").depth(picture.rgb, name="a.png")
+    write_heightmap(heightmap, tmp_path / "alone", formats=["npz"])
+    made = (tmp_path / "out" / "day" / "left" / "a.npz").read_bytes()
+    assert made == (tmp_path / "alone" / "a.npz").read_bytes()
+
+
+def test_a_run_that_was_left_goes_on_without_doing_a_frame_again(
+    go, day: Path, tmp_path: Path
+) -> None:
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    left = go(day, out=out, until=2)
+    assert (left.done, left.left) == (2, 4)
+    assert not (out / "batch.csv").exists()
+    done = {name: (out / f"{name}.npz").stat().st_mtime_ns for name in FRAMES[:2]}
+    goes_on = go(day, out=out)
+    assert (goes_on.before, goes_on.done) == (2, 4)
+    assert {n: (out / f"{n}.npz").stat().st_mtime_ns for n in done} == done
+    assert len(lines(out)) == 6
+    go(day, out=whole)
+    assert results(out) == results(whole)
+
+
+def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> None:
+    """Half a line in the ledger, and half a file, are nothing."""
+    out = tmp_path / "out"
+    go(day, out=out, until=3)
+    before = results(out)
+    text = (out / LEDGER).read_bytes()
+    (out / LEDGER).write_bytes(text[: len(text) - 40])
+    part = out / "day" / "run" / ".run_000000.npz.0123abcd.part"
+    part.write_bytes(b"half")
+    assert (go(day, out=out).before, len(table(out))) == (2, 6)
+    assert not part.exists()
+    assert {name: results(out)[name] for name in before} == before
+    assert go(day, out=out).before == 6
+
+
+def test_the_table_can_be_made_again_from_the_ledger(go, day: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    go(day, out=out)
+    text = (out / "batch.csv").read_bytes()
+    (out / "batch.csv").unlink()
+    assert go(day, out=out).done == 0
+    assert (out / "batch.csv").read_bytes() == text
+
+
+def test_a_result_that_was_taken_away_is_made_again(go, day: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    go(day, out=out)
+    (out / "day" / "left" / "a.tif").unlink()
+    assert (go(day, out=out).done, len(results(out))) == (1, 12)
+
+
+def test_another_picture_of_the_same_name_is_another_frame(go, day: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    go(day, out=out)
+    picture = day / "left" / "a.png"
+    cv2.imwrite(str(picture), np.roll(cv2.imread(str(picture)), 5, axis=0))
+    assert go(day, out=out).done == 1
+    assert len(table(out)) == 6
+
+
+def test_frames_that_cannot_be_used_are_noted_and_the_others_done(
+    go, day: Path, tmp_path: Path
+) -> None:
+    """A damaged one, one of another size, a recording that is none; mended, they are done."""
+    out = tmp_path / "out"
+    good = (day / "left" / "a.png").read_bytes()
+    (day / "left" / "a.png").write_bytes(good[:-100])
+    cv2.imwrite(str(day / "left" / "small.png"), cv2.imread(str(day / "left" / "b.png"))[:50])
+    (day / "torn.gplrec").write_bytes(b"nothing")
+    data = bytearray((day / "run.gplrec").read_bytes())
+    data[-100] ^= 0xFF
+    (day / "run.gplrec").write_bytes(data)
+    progress = go(day, out=out)
+    assert (progress.done, progress.bad, progress.faults) == (4, 4, 0)
+    errors = {row["output"]: row["error"] for row in table(out) if row["error"]}
+    assert "not a whole PNG" in errors["day/left/a"]
+    assert "the calibration is for" in errors["day/left/small"]
+    assert "frame 3 is damaged" in errors["day/run/run_000003"]
+    assert "not a recording" in errors["day/torn/torn_000000"]
+    (day / "left" / "a.png").write_bytes(good)
+    again = go(day, out=out)
+    assert (again.before, again.done, again.bad) == (4, 1, 3)
+
+
+def test_a_fault_of_the_program_costs_one_frame_and_is_kept_whole(
+    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    depth = Reconstructor.depth
+
+    def faulty(self, frame, *, name="", **options):
+        if name == "b.png":
+            raise ValueError("a shape that nobody thought of")
+        return depth(self, frame, name=name, **options)
+
+    monkeypatch.setattr(Reconstructor, "depth", faulty)
+    out = tmp_path / "out"
+    progress = go(day, out=out)
+    assert (progress.done, progress.faults) == (5, 1)
+    assert table(out)[1]["error"] == "ValueError: a shape that nobody thought of"
+    assert "Traceback" in lines(out)[-1]
+
+
+def test_a_full_disk_ends_the_run_and_says_how_far_it_came(
+    go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    replace_file = os.replace
+
+    def full(source, target):
+        if "run_000003.tif" in str(target):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        replace_file(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(InputError, match=r"the disk is full; 3 of 6 frames are done") as told:
+        go(day, out=out)
+    assert "the same command goes on from here" in str(told.value)
+    monkeypatch.undo()
+    goes_on = go(day, out=out)
+    assert (goes_on.before, goes_on.done) == (3, 3)
+
+
+def test_another_model_in_the_same_folder_is_refused(
+    plan, settings: BatchSettings, go, day: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    go(day, out=out, until=1)
+    for other, words in (
+        (replace(settings, effort="fast"), "begun with effort best, and this is fast"),
+        (replace(settings, identity="B-1"), "calibration_id"),
+        (replace(settings, formats=("npz",)), "formats npz,tif, and this is npz"),
+        (replace(settings, program="9.9"), "program"),
+    ):
+        with pytest.raises(InputError, match=words):
+            run_batch(
+                plan(day, out=out),
+                other,
+                out,
+                ProcessRunner(other, out, 1),
+                tell=lambda _: None,
+                stopped=lambda: False,
+            )
+
+
+def test_a_run_that_another_program_works_at_is_left_alone(go, day: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    with RunLock(out), pytest.raises(InputError, match="is being written by"):
+        go(day, out=out)
+    assert go(day, out=out).done == 6
+
+
+def test_a_part_of_a_day_can_be_done_first(go, day: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert go(day, out=out, selection=Selection(0, None, 3)).done == 3
+    assert go(day, out=out, selection=Selection(1, 3)).done == 3
+    assert (go(day, out=out).before, len(results(out))) == (6, 12)
+
+
+def test_two_processes_give_the_same_bits_and_one_may_be_killed(
+    go, settings: BatchSettings, day: Path, tmp_path: Path
+) -> None:
+    """The frame that the killed one had is given to another."""
+    out, alone = tmp_path / "out", tmp_path / "alone"
+    go(day, out=alone)
+    killed: list[int] = []
+
+    class KillsOne(ProcessRunner):
+        def __call__(self, jobs, count, stopped):
+            for outcomes in super().__call__(jobs, count, stopped):
+                if outcomes and not killed:
+                    victim = multiprocessing.active_children()[0]
+                    os.kill(victim.pid, signal.SIGKILL)
+                    killed.append(victim.pid)
+                yield outcomes
+
+    progress = go(day, out=out, runner=KillsOne(settings, out, 2))
+    assert killed
+    assert (progress.done, progress.bad) == (6, 0)
+    assert results(out) == results(alone)
+    assert len(lines(out)) == 6
+    assert not multiprocessing.active_children()
+
+
+def test_the_frame_that_ends_every_process_is_left_out(
+    settings: BatchSettings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It does not keep the others waiting."""
+    from gelpolight_core.batch import processes
+    from gelpolight_core.batch.plan import Job
+
+    def dies(settings, out):
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=os._exit, args=(9,), daemon=True)
+        process.start()
+        theirs.close()
+        return process, ours
+
+    monkeypatch.setattr(processes, "_begin", dies)
+    job = Job(Path("a.png"), None, "a", "")
+    runner = ProcessRunner(settings, tmp_path, 1)
+    found = [row for rows in runner(iter([job]), 1, lambda: False) for row in rows]
+    assert [row.output for row in found] == ["a"]
+    assert "several processes ended" in found[0].error
+
+
+def test_a_worker_that_does_not_see_the_run_halts_it(
+    settings: BatchSettings, tmp_path: Path
+) -> None:
+    """As on a cluster whose machines have other folders."""
+    (halt,) = frame_work.work(settings, tmp_path / "elsewhere", [])
+    assert isinstance(halt, frame_work.Halt)
+    assert "cannot be read" in str(halt.error())
+
+
+def test_a_line_of_the_ledger_that_is_none_is_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / LEDGER
+    path.write_text('{"output": 3}\n[1]\nnonsense\n{"output":"a","notes":5}\n')
+    ledger = BatchLedger(path)
+    row = frame_work.FrameRow("a", "1", "a.png", notes=("näher",))
+    ledger.keep([row])
+    ledger.keep([replace(row, output="b", error="torn")])
+    for held in (ledger, BatchLedger(path)):
+        assert held.has("a", "1")
+        assert not held.has("a", "2")
+        assert not held.has("b", "1")
+        assert list(held.rows()) == [row, replace(row, output="b", error="torn")]
+
+
+def test_dask_gives_the_same_bits_and_survives_a_killed_worker(
+    go, settings: BatchSettings, day: Path, tmp_path: Path
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    from gelpolight_core.batch.cluster import ClusterRunner
+
+    out, alone = tmp_path / "out", tmp_path / "alone"
+    go(day, out=alone)
+    told: list[BatchProgress] = []
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
+        pids = [nanny.pid for nanny in cluster.workers.values()]
+
+        class KillsOne(ClusterRunner):
+            def __call__(self, jobs, count, stopped):
+                for outcomes in super().__call__(jobs, count, stopped):
+                    if outcomes and not told:
+                        os.kill(pids[0], signal.SIGKILL)
+                        told.append(BatchProgress(0, 0))
+                    yield outcomes
+
+        runner = KillsOne(settings, out, cluster.scheduler_address)
+        progress = go(day, out=out, runner=runner)
+    assert (progress.done, progress.bad) == (6, 0)
+    assert results(out) == results(alone)
+
+
+def test_a_scheduler_that_does_not_answer_is_refused(
+    settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    from gelpolight_core.batch import cluster
+
+    monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
+    with pytest.raises(InputError, match="no Dask scheduler answers"):
+        cluster.ClusterRunner(settings, tmp_path, "tcp://127.0.0.1:9")
