@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import getpass
 import os
 import socket
+import sys
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.ledger import unwritable
 from gelpolight_core.translation import tr
 
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
 FILE = ".writing"
+# Windows locks bytes, and lets nobody else read them: one far behind the name.
+_LOCKED_BYTE = 4096
 
 
 class RunLock:
@@ -39,7 +46,7 @@ class RunLock:
             raise unwritable(error, path) from error
         try:
             # The system lets go of it with the process, even a killed one.
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(self._handle)
         except OSError as error:
             who = _holder(self._handle)
             self.release()
@@ -51,7 +58,8 @@ class RunLock:
                 advice=tr("Leave the run there first, or begin another one"),
             ) from error
         os.ftruncate(self._handle, 0)
-        os.pwrite(self._handle, _name().encode(), 0)
+        os.lseek(self._handle, 0, os.SEEK_SET)
+        os.write(self._handle, _name().encode())
 
     def __enter__(self) -> RunLock:
         """Hold it for a block."""
@@ -68,10 +76,20 @@ class RunLock:
             os.close(handle)
 
 
+def _lock(handle: int) -> None:
+    """Take a file for this process; OSError where another one has it."""
+    if sys.platform == "win32":
+        os.lseek(handle, _LOCKED_BYTE, os.SEEK_SET)
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+    else:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
 def _name() -> str:
     return f"{getpass.getuser()} @ {socket.gethostname()}, process {os.getpid()}"
 
 
 def _holder(handle: int) -> str:
     """Return who wrote himself into the file."""
-    return os.pread(handle, 200, 0).decode("utf-8", "replace") or tr("another program")
+    os.lseek(handle, 0, os.SEEK_SET)
+    return os.read(handle, 200).decode("utf-8", "replace") or tr("another program")
