@@ -273,10 +273,12 @@ def _provenance(session: Session) -> Provenance:
         operator = getpass.getuser()
     except (KeyError, OSError):  # a container without a user database has no name to give
         operator = ""
+    camera = session.camera_settings
     return Provenance(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         operator=operator,
         program_version=__version__,
         session=session.folder.resolve().name,
         sources=sources,
+        camera_settings={} if camera is None else camera.as_texts(),
     )
