@@ -15,6 +15,7 @@ from app.calibrate.looking import Looking
 from app.calibrate.maps import Panel, panels_of, refraction_panels
 from app.calibrate.pictures import PICTURE, RESULT
 from app.calibrate.saving import Saving
+from app.calibrate.session_camera import SessionCamera, SetupCamera
 from app.calibrate.states import BEGUN, RUNNING, is_done, step_state
 from app.calibrate.steps import Step
 from app.calibrate.takes import takes_of
@@ -50,6 +51,8 @@ class Wizard(WizardFrame):
         self.looking = Looking(self.controller, self.pictures, self.panel, self.step)
         self.saving = Saving(self.controller, self.result, context=context)
         self.validating = Validating(self.controller, self.validation, context=context)
+        self.session_camera = SessionCamera(self.controller, context=context)
+        self.setup_camera = SetupCamera(self.setup, context=context)
         self._connect()
         self._refresh()
         self.controller.look_for_boards()
@@ -112,6 +115,7 @@ class Wizard(WizardFrame):
 
     def enter(self) -> None:
         """Look at the camera, as the wizard is shown."""
+        self.session_camera.refer()
         self.camera.enter(True)
         self.outside.watch(True)
         self._focus_on_what_comes_next()
@@ -124,6 +128,7 @@ class Wizard(WizardFrame):
     def close_session(self) -> None:
         """End all work; everything captured and decided is on disk."""
         self.context.source.changed.disconnect(self.camera.open)
+        self.setup_camera.close()
         self.leave()
         self.validating.close()
         if self.curves is not None:

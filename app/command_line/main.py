@@ -44,6 +44,7 @@ def build_parser() -> argparse.ArgumentParser:
         benchmark,
         board,
         calibrate,
+        cameras,
         design,
         drift,
         evaluate,
@@ -90,6 +91,7 @@ def build_parser() -> argparse.ArgumentParser:
         stability,
         design,
         board,
+        cameras,
     ):
         command.add_parser(commands)
     return parser

@@ -133,6 +133,7 @@ class InspectPage(QWidget):
     def enter(self) -> None:
         """Look at the source, through the calibration in use."""
         self.library.refresh()
+        self.library.refer_cameras(self._loaded[0])
         self._want()
         self.link.enter(True)
         self._words.start()
@@ -218,6 +219,8 @@ class InspectPage(QWidget):
     def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Look through the calibration in the way that is chosen."""
         self._loaded = live, best
+        if self.isVisible():
+            self.library.refer_cameras(live)
         self._advise()
 
     # The cursor
@@ -271,6 +274,8 @@ class InspectPage(QWidget):
         self._tell()
 
     def _on_said(self, sentence: str) -> None:
+        # A camera that was plugged in again may have moved.
+        self._drift_due = self._drift_due or bool(self._trouble and not sentence)
         self._trouble = sentence
         self._advise()
 

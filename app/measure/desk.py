@@ -100,6 +100,7 @@ class Desk(DeskFrame):
     def enter(self) -> None:
         """Look at the source through the calibration in use."""
         self.library.refresh()
+        self.library.refer_cameras(self._loaded[0])
         self.show_validated()
         self._want()
         self.link.enter(True)
@@ -318,6 +319,8 @@ class Desk(DeskFrame):
     def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Measure with another calibration; live only where it belongs to the pictures."""
         self._loaded = live, best
+        if self.isVisible():
+            self.library.refer_cameras(live)
         self._refused, self._shown = "", None
         self.link.use(None)
         self.work.use(best)

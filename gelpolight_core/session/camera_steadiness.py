@@ -118,9 +118,7 @@ def judge_steadiness(
             "%",
             warn=0.0,
             fail=50.0,
-            advice=tr(
-                "The camera stands still: plug it in again, at another socket or without hub"
-            ),
+            advice=tr("The camera hangs: plug it in again, at another socket or without hub"),
         ),
     ]
     if rate_hz > 0.0:

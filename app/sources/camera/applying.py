@@ -9,7 +9,7 @@ from app.sources.camera.controls import CONTROLS, MAIN, ORDER
 from app.sources.camera.driver import CameraGone, Format, OpenCamera
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
-from gelpolight_core.quality import Figure, QualityTable, Verdict, judge
+from gelpolight_core.quality import Figure, QualityTable, Verdict
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
@@ -123,34 +123,42 @@ def is_locked(controls: Iterable[Setting]) -> bool:
     return not any(CONTROLS[c.key].held is not None and c.value for c in controls)
 
 
-def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting] = ()) -> QualityTable:
-    """Return what was asked for and read back as judged figures."""
-    figures = [_figure(a) for a in applied]
-    named = {figure.key for figure in figures}
+def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> QualityTable:
+    """Return what a person should know of a lock: the four that matter, and what does not hold.
+
+    Parameters
+    ----------
+    applied : iterable of Applied
+        What was asked for.
+    controls : iterable of Setting
+        The camera's, as read back.
+    """
+    there = {control.key: control for control in controls}
+    free = [c for c in there.values() if CONTROLS[c.key].held is not None and c.value]
+    figures = [
+        Figure(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
+    ]
+    named = {control.key for control in free}
     figures += [
-        judge(c.key, c.label, c.value, fail=0.0, advice=tr("Lock the settings"))
-        for c in controls
-        if CONTROLS[c.key].held is not None and c.value and c.key not in named
+        _figure(a) for a in applied if a.key not in named and (a.key in MAIN or not a.holds)
     ]
     return QualityTable(tuple(figures))
 
 
+def _lock_advice() -> str:
+    return tr("The camera sets this by itself: press Lock")
+
+
 def _figure(applied: Applied) -> Figure:
     serious = applied.key in MAIN or CONTROLS[applied.key].held is not None
-    verdict = Verdict.FAIL if serious else Verdict.WARN
     value = float("nan") if applied.read is None else applied.read
-    advice = applied.why or applied.sentence
-    remedy = tr("choose a value that the camera takes, and lock again")
-    return Figure(
-        applied.key,
-        applied.label,
-        value,
-        applied.unit,
-        None,
-        None,
-        Verdict.PASS if applied.holds else verdict,
-        "" if applied.holds else f"{advice}: {remedy}",
-    )
+    verdict, advice = Verdict.PASS, ""
+    if not applied.holds:
+        verdict = Verdict.FAIL if serious else Verdict.WARN
+        said = ": ".join(filter(None, (applied.sentence, applied.why)))
+        advice = tr("{said}. Choose a value that the camera takes").format(said=said)
+    unit = applied.unit
+    return Figure(applied.key, applied.label, value, unit, None, None, verdict, advice)
 
 
 def differences(

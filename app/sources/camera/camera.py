@@ -111,7 +111,7 @@ class Camera:
         self._thread: threading.Thread | None = None
         self._end = threading.Event()
         self._reopen = threading.Event()
-        self._number, self._unsettled = 0, 0
+        self._number, self._unsettled, self._pending = 0, 0, 0
         self._since_s = 0.0
 
     # Any thread
@@ -127,6 +127,12 @@ class Camera:
         """How it is set whenever it is opened; None: as it comes."""
         with self._lock:
             return self._wanted
+
+    @property
+    def settling(self) -> bool:
+        """Whether it has yet to do what it was told."""
+        with self._lock:
+            return self._pending > 0 or self._reopen.is_set()
 
     def trouble(self) -> str:
         """Return why no pictures come, as a sentence; empty while all is well."""
@@ -190,6 +196,7 @@ class Camera:
         with self._lock:
             if self._state.phase == "live":
                 self._changes.append(change)
+                self._pending += 1
                 return change.future
         change.future.set_exception(self._away())
         return change.future
@@ -235,6 +242,10 @@ class Camera:
 
     def _use(self, end: threading.Event) -> None:
         """Open the camera, and hand its pictures on until it goes away or shall be reopened."""
+        with self._lock:
+            # Its sentence stays, where it was away: it is, until there is a picture.
+            self._state = replace(self._state, phase="opening")
+            self._since_s = time.monotonic()
         self._reopen.clear()
         wanted = self.wanted
         device = find_device(self._driver.devices(), self.device.identity, self.device.model)
@@ -312,6 +323,7 @@ class Camera:
                 self._state = replace(
                     self._state, controls=opened.controls(), applied=tuple(done.values())
                 )
+                self._pending -= 1
             if change.future.set_running_or_notify_cancel():
                 change.future.set_result(applied)
         if changes:
@@ -326,6 +338,7 @@ class Camera:
     def _fail_changes(self) -> None:
         with self._lock:
             changes, self._changes = self._changes, []
+            self._pending = 0
         for change in changes:
             if change.future.set_running_or_notify_cancel():
                 change.future.set_exception(self._away())
