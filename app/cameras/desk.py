@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from app.shell.settings import Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
-from app.sources.camera.applying import differences, is_locked, locked
+from app.sources.camera.applying import differences, is_locked
 from app.sources.camera.camera import Camera, CameraState
 from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.driver import (
@@ -62,6 +62,7 @@ class CameraDesk(QObject):
         self._devices: dict[str, Device] = {}
         self._cameras: dict[str, Camera] = {}
         self._known: dict[str, CameraState] = {}
+        self._kept: dict[str, CameraSettings] = {}
         self._said: dict[str, tuple[str, ...]] = {}
         self._reference: tuple[str, CameraSettings] | None = None
         # From the cameras' threads into this one; it carries nothing.
@@ -163,8 +164,7 @@ class CameraDesk(QObject):
 
     def lock(self, camera: Camera) -> None:
         """Fix everything that a camera sets by itself, at what it is now."""
-        now = camera.settings_now()
-        self._want(camera, replace(now, controls=locked(camera.state.controls)))
+        camera.lock()
 
     def restore(self, camera: Camera) -> None:
         """Set a camera as it was for the calibration or session."""
@@ -180,7 +180,14 @@ class CameraDesk(QObject):
             model=camera.device.model,
         )
         camera.want(own)
-        self._settings.keep_camera(own.identity, own.as_texts())
+        self._keep(camera)
+
+    def _keep(self, camera: Camera) -> None:
+        """Remember how a camera is set, where that is new."""
+        wanted, identity = camera.wanted, camera.device.identity
+        if wanted is not None and wanted != self._kept.get(identity):
+            self._kept[identity] = wanted
+            self._settings.keep_camera(identity, wanted.as_texts())
 
     def differs(self, camera: Camera) -> tuple[str, tuple[str, ...]]:
         """Return to what a camera is held, and a clause for everything that is not so."""
@@ -210,6 +217,7 @@ class CameraDesk(QObject):
             self._known[identity] = now
             if now.phase != "live" or camera.settling:
                 continue
+            self._keep(camera)
             if before is not None and before.phase == "away":
                 self._toasts.show(tr("{name} is back.").format(name=camera.device.name), "pass")
             what, clauses = self.differs(camera)

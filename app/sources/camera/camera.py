@@ -10,7 +10,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from app.sources.camera.applying import Applied, apply_settings
+from app.sources.camera.applying import Applied, apply_settings, locked
 from app.sources.camera.driver import (
     CameraDriver,
     CameraGone,
@@ -30,6 +30,7 @@ _LOG = logging.getLogger(__name__)
 
 SILENCE_S = 3.0
 SLOW_OPEN_S = 8.0
+CHECK_S = 5.0
 CLOSE_S = 0.5
 """A camera that is still being opened is left to its thread; who stops a stream waits a second."""
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 5.0
@@ -70,7 +71,8 @@ class CameraState:
 
 @dataclass(slots=True)
 class _Change:
-    values: Mapping[str, float]
+    values: Mapping[str, float] | None
+    """None: lock what is."""
     future: Future[tuple[Applied, ...]] = field(default_factory=Future)
 
 
@@ -89,6 +91,8 @@ class Camera:
         First pause before a camera that went away is tried again; doubles up to ten times.
     silence_s : float, optional
         Without a picture for so long it counts as away.
+    check_s : float, optional
+        So often its settings are read again: another program may change them.
     """
 
     def __init__(
@@ -99,10 +103,11 @@ class Camera:
         told: Callable[[], object] = lambda: None,
         pause_s: float = FIRST_PAUSE_S,
         silence_s: float = SILENCE_S,
+        check_s: float = CHECK_S,
     ) -> None:
         self.device = device
         self._driver, self._told = driver, told
-        self._pause_s, self._silence_s = pause_s, silence_s
+        self._pause_s, self._silence_s, self._check_s = pause_s, silence_s, check_s
         self._lock = threading.Lock()
         self._state = CameraState()
         self._wanted: CameraSettings | None = None
@@ -112,7 +117,7 @@ class Camera:
         self._end = threading.Event()
         self._reopen = threading.Event()
         self._number, self._unsettled, self._pending = 0, 0, 0
-        self._since_s = 0.0
+        self._since_s = self._checked_s = 0.0
 
     # Any thread
 
@@ -192,7 +197,16 @@ class Camera:
 
     def change(self, values: Mapping[str, float]) -> Future[tuple[Applied, ...]]:
         """Set some settings between two pictures; the future tells what became of them."""
-        change = _Change(dict(values))
+        return self._submit(_Change(dict(values)))
+
+    def lock(self) -> Future[tuple[Applied, ...]]:
+        """Fix everything that it sets by itself at what it is then, now and whenever it is opened.
+
+        The future tells what became of it.
+        """
+        return self._submit(_Change(None))
+
+    def _submit(self, change: _Change) -> Future[tuple[Applied, ...]]:
         with self._lock:
             if self._state.phase == "live":
                 self._changes.append(change)
@@ -203,15 +217,17 @@ class Camera:
 
     def settings_now(self) -> CameraSettings:
         """Return how it is set, to be stored."""
-        state, wanted = self.state, self.wanted
-        got = state.format or _format_of(wanted)
+        state = self.state
+        base = self._settings(state.format or _format_of(self.wanted))
+        return replace(base, controls={c.key: c.value for c in state.controls})
+
+    def _settings(self, got: Format | None) -> CameraSettings:
         device = self.device
         base = CameraSettings(device.name, device.identity, device.model)
-        if got is not None:
-            base = replace(
-                base, pixel_format=got.code, size=(got.width, got.height), rate_hz=got.rate_hz
-            )
-        return replace(base, controls={c.key: c.value for c in state.controls})
+        if got is None:
+            return base
+        size = got.width, got.height
+        return replace(base, pixel_format=got.code, size=size, rate_hz=got.rate_hz)
 
     # The camera's own thread
 
@@ -285,6 +301,7 @@ class Camera:
         with self._lock:
             self._state, self._since_s = state, time.monotonic()
             self._unsettled = UNSETTLED_FRAMES if applied else 0
+            self._checked_s = self._since_s
         self._told()
 
     def _picture(self, opened: OpenCamera, end: threading.Event) -> Frame | None:
@@ -316,7 +333,12 @@ class Camera:
         with self._lock:
             changes, self._changes = self._changes, []
         for change in changes:
-            applied = apply_settings(opened, change.values)
+            values = change.values
+            if values is None:
+                values = locked(opened.controls())
+                with self._lock:
+                    self._wanted = replace(self._settings(opened.format), controls=values)
+            applied = apply_settings(opened, values)
             self._unsettled = UNSETTLED_FRAMES
             done = {a.key: a for a in self.state.applied} | {a.key: a for a in applied}
             with self._lock:
@@ -327,6 +349,17 @@ class Camera:
             if change.future.set_running_or_notify_cancel():
                 change.future.set_result(applied)
         if changes:
+            self._told()
+        elif time.monotonic() - self._checked_s > self._check_s:
+            self._check(opened)
+
+    def _check(self, opened: OpenCamera) -> None:
+        """Look whether another program, or the camera by itself, has set something."""
+        self._checked_s = time.monotonic()
+        controls = opened.controls()
+        if controls != self.state.controls:
+            with self._lock:
+                self._state = replace(self._state, controls=controls)
             self._told()
 
     def _went_away(self, sentence: str) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fake_camera import C310, FORMATS, FakeCamera, FakeDriver, eventually
 
-from app.sources.camera.applying import differences
+from app.sources.camera.applying import differences, is_locked
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.driver import CameraGone, Device, Format
@@ -204,6 +204,32 @@ def test_settings_go_through_the_source_as_of_any_other(camera: Camera, stream: 
     assert "gain" in {setting.key for setting in stream.source.settings()}
     with pytest.raises(InputError, match="no setting focus"):
         stream.source.set("focus", 1.0)
+
+
+def test_a_lock_fixes_what_the_camera_has_come_to_by_then(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    stream.capture(1).result(20.0)
+    fake.settings["exposure_ms"] = replace(fake.settings["exposure_ms"], value=21.0)
+    applied = {a.key: a for a in camera.lock().result(20.0)}
+    assert applied["exposure_ms"].read == 21.0
+    assert is_locked(camera.state.controls)
+    assert camera.wanted is not None
+    assert camera.wanted.controls.items() >= {"exposure_ms": 21.0, "exposure_auto": 0.0}.items()
+    assert camera.wanted.size == (128, 96)
+
+
+def test_what_another_program_sets_is_noticed(fake: FakeCamera) -> None:
+    told = threading.Event()
+    camera = Camera(FakeDriver(fake), C310, told=told.set, check_s=0.02)
+    stream = Stream(CameraSource(camera))
+    stream.start()
+    stream.capture(1).result(20.0)
+    told.clear()
+    fake.settings["gain"] = replace(fake.settings["gain"], value=3.0)
+    assert told.wait(20.0)
+    assert values(camera)["gain"] == 3.0
+    stream.stop()
 
 
 def test_a_camera_without_settings_or_formats_still_delivers() -> None:

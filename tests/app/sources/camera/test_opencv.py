@@ -11,10 +11,15 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from fake_camera import eventually
 
 from app.sources.camera import opencv
+from app.sources.camera.camera import Camera
+from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.driver import CameraGone, Device, Format
 from app.sources.camera.opencv import OpenCvDriver
+from app.sources.source import Frame
+from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
 
 SIZE = (64, 48)
@@ -57,6 +62,26 @@ def test_a_film_is_read_as_from_a_camera_in_red_green_blue(film: Device) -> None
     with pytest.raises(InputError, match="does not take Gain"):
         camera.set("gain", 1.0)
     camera.close()
+
+
+def test_a_film_plays_the_camera_and_begins_again_where_it_ends(film: Device) -> None:
+    class Films(OpenCvDriver):
+        def devices(self) -> tuple[Device, ...]:
+            return (film,)
+
+    camera = Camera(Films(interface=cv2.CAP_FFMPEG), film, pause_s=0.3)
+    stream = Stream(CameraSource(camera))
+    seen: list[Frame] = []
+    stream.add_tap(seen.append)
+    stream.start()
+    assert "gives no more pictures" in eventually(lambda: stream.figures().lost)
+    last = seen[-1].rgb[:, 4:28].mean(axis=(0, 1))
+    assert last == pytest.approx([160, 0, 0], abs=6)
+    count = len(seen)
+    eventually(lambda: len(seen) > count)
+    stream.stop()
+    assert camera.state.format is not None
+    assert camera.state.format.code == "MJPG"
 
 
 def test_a_film_that_is_not_there_cannot_be_opened(tmp_path: Path) -> None:
