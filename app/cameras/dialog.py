@@ -12,7 +12,7 @@ from app.sources.camera.camera import Camera
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-WIDTH, HEIGHT = 860, 660
+WIDTH, HEIGHT = 860, 690
 
 
 class CameraDialog(QDialog):

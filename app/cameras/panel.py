@@ -25,15 +25,15 @@ from app.sources.camera.applying import is_locked, lock_quality
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.steadiness import SteadinessTest
-from app.sources.source import Rgb
+from app.sources.source import Rgb, Setting
 from app.sources.stream import Stream
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 LOOK_MS = 200
-PICTURE_WIDTH = 320
+PICTURE_HEIGHT = 180
 
 
 class CameraPanel(QWidget):
@@ -54,6 +54,7 @@ class CameraPanel(QWidget):
         self._stream: Stream | None = None
         self._test: SteadinessTest | None = None
         self._broken_off = False
+        self._result, self._result_of = QualityTable(), tuple[Setting, ...]()
         self._tick = QTimer(self)
         self._tick.setInterval(LOOK_MS)
         self._tick.timeout.connect(self._look)
@@ -91,7 +92,7 @@ class CameraPanel(QWidget):
         self.said.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.picture = named(QLabel(), "camera.picture", tr("The camera's picture"))
         self.picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.picture.setFixedHeight(PICTURE_WIDTH * 3 // 4)
+        self.picture.setFixedHeight(PICTURE_HEIGHT)
         self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.restore = named(
             QPushButton(tr("Set it &back")),
@@ -182,7 +183,8 @@ class CameraPanel(QWidget):
         if self._stream is not None:
             self._stream.remove_tap(test.take)
         self._test, self._broken_off = None, not done
-        self.steady.set_table(test.result() if done else QualityTable())
+        self._result = test.result() if done else QualityTable()
+        self._result_of = self.camera.state.controls
         self.bar.setValue(0)
         self._show()
 
@@ -197,6 +199,9 @@ class CameraPanel(QWidget):
         self.lock.setEnabled(live and bool(state.controls))
         self.test.setEnabled(live and self._test is None)
         self.locks.set_table(lock_quality(state.applied, state.controls))
+        if state.controls != self._result_of:
+            self._result = QualityTable()  # of a camera that was set otherwise
+        self.steady.set_table(self._result)
         differs = bool(self._desk.differs(self.camera)[1])
         self.restore.setEnabled(live and differs and self._desk.can_restore(self.camera))
         self._say()
@@ -231,7 +236,16 @@ class CameraPanel(QWidget):
             return tr("The picture is being watched: leave the sensor alone."), "text"
         if self._broken_off:
             return tr("The test was broken off, as no pictures came. Test again."), "warn"
+        if self._result.figures:
+            return self._verdict_words()
         return tr("Locked. Test whether the picture stands still, then close this."), "pass"
+
+    def _verdict_words(self) -> tuple[str, str]:
+        verdict = self._result.verdict
+        if verdict is Verdict.PASS:
+            return tr("Locked, and the picture stands still: close this and calibrate."), "pass"
+        text = tr("Not steady yet: {advice}.")
+        return text.format(advice="; ".join(self._result.advice)), verdict.value
 
 
 def _small(rgb: Rgb, height: int) -> QPixmap:

@@ -95,7 +95,7 @@ def judge_steadiness(
         ),
         judge(
             "camera_colour_drift_percent",
-            tr("Drift of one colour against the others"),
+            tr("Drift of a colour by itself"),
             float(np.abs(trend - even).max()),
             "%",
             warn=0.5,
@@ -113,7 +113,7 @@ def judge_steadiness(
         ),
         judge(
             "camera_repeated",
-            tr("Pictures that are copies of the one before"),
+            tr("Copies of the picture before"),
             100.0 * repeated / (len(levels) - 1),
             "%",
             warn=0.0,

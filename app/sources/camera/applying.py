@@ -139,8 +139,9 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
         Figure(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
     ]
     named = {control.key for control in free}
+    in_order = sorted(applied, key=lambda a: ORDER.index(a.key))
     figures += [
-        _figure(a) for a in applied if a.key not in named and (a.key in MAIN or not a.holds)
+        _figure(a) for a in in_order if a.key not in named and (a.key in MAIN or not a.holds)
     ]
     return QualityTable(tuple(figures))
 

@@ -172,6 +172,12 @@ def test_the_steadiness_test_ends_in_a_table(
     assert not panel.test.isEnabled()
     qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
     assert panel.steady._table.verdict.value == "pass"
+    assert "still sets some things by itself" in panel.said.text()  # steady by chance
+    qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: "Locked. Test" in panel.said.text(), timeout=WAIT_MS)
+    assert not panel.steady._table.figures  # it was of other settings
+    qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: "stands still: close" in panel.said.text(), timeout=WAIT_MS)
     assert "camera_flicker_percent" in {figure.key for figure in panel.steady._table.figures}
 
 
