@@ -73,7 +73,7 @@ class FakeCamera:
     hangs: threading.Event | None = None
     stops_after: int | None = None
     frozen: bool = False
-    period_s: float = 0.005
+    period_s: float = 0.01
     light: Callable[[int], float] = lambda _number: 1.0
     opened: int = 0
     closed: int = 0

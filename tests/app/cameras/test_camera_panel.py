@@ -62,10 +62,6 @@ def values(camera: Camera) -> dict[str, float]:
     return {control.key: control.value for control in camera.state.controls}
 
 
-def toasts(context: AppContext) -> str:
-    return "\n".join(toast.text for toast in context.toasts.shown())
-
-
 def test_cameras_are_chosen_by_name_and_none_is_said_in_words(
     context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
 ) -> None:
@@ -144,7 +140,7 @@ def test_exposure_is_given_back_to_the_camera_by_its_switch(
 
 
 def test_a_format_is_chosen_of_those_listed_and_compression_is_warned_of(
-    context: AppContext, panel: CameraPanel, qtbot: QtBot
+    context: AppContext, panel: CameraPanel, qtbot: QtBot, caplog: pytest.LogCaptureFixture
 ) -> None:
     code = panel.findChild(QComboBox, "camera.format")
     assert [code.itemText(n) for n in range(code.count())] == [
@@ -159,7 +155,7 @@ def test_a_format_is_chosen_of_those_listed_and_compression_is_warned_of(
     )
     qtbot.waitUntil(panel.formats.warning.isVisible, timeout=WAIT_MS)
     assert "choose an uncompressed format" in panel.formats.warning.text()
-    assert "19 grey levels" in toasts(context)
+    assert "19 grey levels" in caplog.text
 
 
 def test_the_steadiness_test_ends_in_a_table(
@@ -182,7 +178,11 @@ def test_the_steadiness_test_ends_in_a_table(
 
 
 def test_an_unplugged_camera_is_said_and_its_return_too(
-    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
+    context: AppContext,
+    panel: CameraPanel,
+    fake: FakeCamera,
+    qtbot: QtBot,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
     fake.plugged = False
@@ -190,11 +190,15 @@ def test_an_unplugged_camera_is_said_and_its_return_too(
     assert not panel.lock.isEnabled()
     fake.plugged = True
     qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
-    assert f"{C310.name} is back." in toasts(context)
+    assert f"{C310.name} is back." in caplog.text
 
 
 def test_a_camera_is_held_to_how_the_calibration_was_made(
-    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
+    context: AppContext,
+    panel: CameraPanel,
+    fake: FakeCamera,
+    qtbot: QtBot,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     fake.ignores = {"gain"}
     controls = {"exposure_auto": 0.0, "exposure_ms": 12.0, "white_balance_auto": 0.0, "gain": 9.0}
@@ -202,7 +206,7 @@ def test_a_camera_is_held_to_how_the_calibration_was_made(
     context.cameras.refer("the calibration", stored)
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 12.0, timeout=WAIT_MS)
     words = "not set as it was for the calibration: Gain is 64, not 9"
-    qtbot.waitUntil(lambda: words in toasts(context), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: words in caplog.text, timeout=WAIT_MS)
     qtbot.waitUntil(lambda: "Gain is 64, not 9" in panel.said.text(), timeout=WAIT_MS)
     assert context.status.value.camera_note == "not set as for the calibration"
     fake.ignores = set()
