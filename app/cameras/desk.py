@@ -13,8 +13,9 @@ from app.shell.settings import Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
 from app.sources.camera.applying import differences, is_locked
-from app.sources.camera.camera import Camera, CameraState
+from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
+from app.sources.camera.camera_state import CameraState
 from app.sources.camera.driver import (
     CameraDriver,
     Device,

@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 from app.sources.camera.applying import Applied, apply_settings, locked
+from app.sources.camera.camera_state import CameraState, format_of
 from app.sources.camera.driver import (
     CameraDriver,
     CameraGone,
@@ -20,7 +20,7 @@ from app.sources.camera.driver import (
     best_format,
     find_device,
 )
-from app.sources.source import Frame, Setting
+from app.sources.source import Frame
 from app.sources.stopping import join
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
@@ -37,36 +37,7 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 5.0
 UNSETTLED_FRAMES = 5
 """A driver holds four pictures that were taken before a setting changed."""
 
-Phase = Literal["closed", "opening", "live", "away"]
 Reader = Callable[[Frame], object]
-
-
-@dataclass(frozen=True, slots=True)
-class CameraState:
-    """How a camera is.
-
-    Attributes
-    ----------
-    phase : str
-        ``closed``: nobody uses it; ``opening``; ``live``; ``away``: tried again and again.
-    sentence : str
-        Why it is away.
-    format : Format or None
-        As read back; None before it was opened.
-    offered : tuple of Format
-        What it lists; empty where the system does not tell.
-    controls : tuple of Setting
-        As the camera told them last.
-    applied : tuple of Applied
-        The settings that it was asked for when it was opened or set, and what became of them.
-    """
-
-    phase: Phase = "closed"
-    sentence: str = ""
-    format: Format | None = None
-    offered: tuple[Format, ...] = ()
-    controls: tuple[Setting, ...] = ()
-    applied: tuple[Applied, ...] = ()
 
 
 @dataclass(slots=True)
@@ -190,7 +161,7 @@ class Camera:
             live = self._state.phase == "live"
         if not live or settings is None or settings == before:
             return
-        if _format_of(settings) not in (None, _format_of(before), self.state.format):
+        if format_of(settings) not in (None, format_of(before), self.state.format):
             self._reopen.set()
         else:
             self.change(settings.controls)
@@ -218,7 +189,7 @@ class Camera:
     def settings_now(self) -> CameraSettings:
         """Return how it is set, to be stored."""
         state = self.state
-        base = self._settings(state.format or _format_of(self.wanted))
+        base = self._settings(state.format or format_of(self.wanted))
         return replace(base, controls={c.key: c.value for c in state.controls})
 
     def _settings(self, got: Format | None) -> CameraSettings:
@@ -272,7 +243,7 @@ class Camera:
                 advice=tr("Plug it in; it goes on by itself"),
             )
         offered = self._driver.formats(device)
-        asked = _format_of(wanted) or best_format(offered)
+        asked = format_of(wanted) or best_format(offered)
         if end.is_set():
             return
         opened = self._driver.open(device, asked)
@@ -398,10 +369,3 @@ class Camera:
             where=self.device.name,
             advice=tr("It is tried again by itself"),
         )
-
-
-def _format_of(settings: CameraSettings | None) -> Format | None:
-    """Return the format that is stored with settings; None where it is not."""
-    if settings is None or not settings.pixel_format or settings.size == (0, 0):
-        return None
-    return Format(settings.pixel_format, *settings.size, settings.rate_hz)

@@ -1,12 +1,11 @@
 """Formats and settings of cameras on Linux, asked of the kernel (V4L2) itself.
 
 OpenCV rounds and renames what it sets (0.25 for "manual" becomes 0, which is automatic) and tells
-no ranges. Structures and numbers are those of ``linux/videodev2.h``.
+no ranges.
 """
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import os
 from collections.abc import Callable, Iterator
@@ -15,24 +14,35 @@ from typing import Any
 
 from app.sources.camera.controls import CONTROLS, ORDER
 from app.sources.camera.driver import CameraGone, Format
+from app.sources.camera.v4l2_structures import (
+    CAPTURE,
+    DISABLED,
+    DISCRETE,
+    GRABBED,
+    INACTIVE,
+    READ_ONLY,
+    VIDIOC_ENUM_FMT,
+    VIDIOC_ENUM_FRAMEINTERVALS,
+    VIDIOC_ENUM_FRAMESIZES,
+    VIDIOC_G_CTRL,
+    VIDIOC_QUERYCAP,
+    VIDIOC_QUERYCTRL,
+    VIDIOC_QUERYMENU,
+    VIDIOC_S_CTRL,
+    Capability,
+    ControlValue,
+    FormatDescription,
+    FrameInterval,
+    FrameSize,
+    QueryControl,
+    QueryMenu,
+)
 from app.sources.source import Setting
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 Ioctl = Callable[[int, int, Any], Any]
 
-VIDIOC_QUERYCAP = 0x80685600
-VIDIOC_ENUM_FMT = 0xC0405602
-VIDIOC_G_CTRL = 0xC008561B
-VIDIOC_S_CTRL = 0xC008561C
-VIDIOC_QUERYCTRL = 0xC0445624
-VIDIOC_QUERYMENU = 0xC02C5625
-VIDIOC_ENUM_FRAMESIZES = 0xC02C564A
-VIDIOC_ENUM_FRAMEINTERVALS = 0xC034564B
-
-CAPTURE = 1
-DISCRETE = 1
-DISABLED, GRABBED, READ_ONLY, INACTIVE = 0x1, 0x2, 0x4, 0x10
 MOST = 256
 """Of whatever a camera lists; one that lists without end is broken."""
 # Where a range of sizes is told in the place of sizes.
@@ -40,95 +50,6 @@ USUAL_SIZES = ((640, 480), (800, 600), (1280, 720), (1280, 960), (1600, 1200), (
 
 EXPOSURE_MANUAL, EXPOSURE_AUTO, EXPOSURE_APERTURE = 1, 0, 3
 MAINS_HZ = {0: 0.0, 1: 50.0, 2: 60.0}
-
-
-class Capability(ctypes.Structure):
-    """``struct v4l2_capability``."""
-
-    _fields_ = (
-        ("driver", ctypes.c_char * 16),
-        ("card", ctypes.c_char * 32),
-        ("bus_info", ctypes.c_char * 32),
-        ("version", ctypes.c_uint32),
-        ("capabilities", ctypes.c_uint32),
-        ("device_caps", ctypes.c_uint32),
-        ("reserved", ctypes.c_uint32 * 3),
-    )
-
-
-class FormatDescription(ctypes.Structure):
-    """``struct v4l2_fmtdesc``."""
-
-    _fields_ = (
-        ("index", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
-        ("flags", ctypes.c_uint32),
-        ("description", ctypes.c_char * 32),
-        ("pixelformat", ctypes.c_uint32),
-        ("mbus_code", ctypes.c_uint32),
-        ("reserved", ctypes.c_uint32 * 3),
-    )
-
-
-class FrameSize(ctypes.Structure):
-    """``struct v4l2_frmsizeenum``: width and height, or least, most and step of both."""
-
-    _fields_ = (
-        ("index", ctypes.c_uint32),
-        ("pixel_format", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
-        ("values", ctypes.c_uint32 * 6),
-        ("reserved", ctypes.c_uint32 * 2),
-    )
-
-
-class FrameInterval(ctypes.Structure):
-    """``struct v4l2_frmivalenum``: a fraction of a second, or least, most and step of it."""
-
-    _fields_ = (
-        ("index", ctypes.c_uint32),
-        ("pixel_format", ctypes.c_uint32),
-        ("width", ctypes.c_uint32),
-        ("height", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
-        ("values", ctypes.c_uint32 * 6),
-        ("reserved", ctypes.c_uint32 * 2),
-    )
-
-
-class QueryControl(ctypes.Structure):
-    """``struct v4l2_queryctrl``."""
-
-    _fields_ = (
-        ("id", ctypes.c_uint32),
-        ("type", ctypes.c_uint32),
-        ("name", ctypes.c_char * 32),
-        ("minimum", ctypes.c_int32),
-        ("maximum", ctypes.c_int32),
-        ("step", ctypes.c_int32),
-        ("default_value", ctypes.c_int32),
-        ("flags", ctypes.c_uint32),
-        ("reserved", ctypes.c_uint32 * 2),
-    )
-
-
-class QueryMenu(ctypes.Structure):
-    """``struct v4l2_querymenu``, packed as the kernel has it."""
-
-    _pack_ = 1
-    _layout_ = "ms"
-    _fields_ = (
-        ("id", ctypes.c_uint32),
-        ("index", ctypes.c_uint32),
-        ("name", ctypes.c_char * 32),
-        ("reserved", ctypes.c_uint32),
-    )
-
-
-class ControlValue(ctypes.Structure):
-    """``struct v4l2_control``."""
-
-    _fields_ = (("id", ctypes.c_uint32), ("value", ctypes.c_int32))
 
 
 @dataclass(frozen=True, slots=True)
