@@ -27,7 +27,7 @@ from app.inspect.views import Views
 from app.inspect.ways import WayChoice
 from app.shell.actions import make_action
 from app.shell.context import AppContext
-from app.shell.jobs import Job, Jobs
+from app.shell.jobs import Jobs
 from app.sources.listing import picture_folders
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
