@@ -16,6 +16,7 @@ from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt, QTimer
 from PySide6.QtGui import QGuiApplication, QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
+from app.cameras.desk import CameraDesk
 from app.shell import theme
 from app.shell.context import AppContext, Requests, SourceChoice
 from app.shell.faults import Faults
@@ -179,14 +180,16 @@ def make_context(
         Elsewhere than in the user's own folders.
     """
     settings = Settings(settings_file)
+    status, toasts = StatusModel(), Toasts()
     return AppContext(
         settings=settings,
         workspace=Workspace(settings.workspace_folder),
-        status=StatusModel(),
-        toasts=Toasts(),
+        status=status,
+        toasts=toasts,
         source=SourceChoice(),
         requests=Requests(),
         log=Log(log_folder),
+        cameras=CameraDesk(settings=settings, status=status, toasts=toasts),
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
+from app.calibrate.session_camera import SetupCamera
 from app.calibrate.setup_form import SetupForm, new_session
 from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
@@ -49,6 +50,7 @@ class CalibratePage(QWidget):
         self.start.demo_wanted.connect(self.begin_demo)
         self.start.recent_wanted.connect(lambda folder: self.open_path(Path(folder)))
         self.form.accepted.connect(self._create)
+        self.setup_camera = SetupCamera(self.form, context=context)
         self.start.show_recent(context.settings.recent_sessions)
 
     # What the window asks of a page

@@ -55,9 +55,12 @@ class SetupForm(QScrollArea):
     -------
     accepted(object)
         A Session with what is stated; its folder is that of the one shown last.
+    camera_wanted()
+        The camera shall be set and locked.
     """
 
     accepted = Signal(object)
+    camera_wanted = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -86,6 +89,7 @@ class SetupForm(QScrollArea):
         self.task.setWordWrap(True)
         column.addWidget(self.title)
         column.addWidget(self.task)
+        column.addWidget(self._build_camera())
         column.addWidget(self._build_sensor())
         column.addWidget(self._build_boards())
         column.addWidget(self._build_balls())
@@ -98,6 +102,31 @@ class SetupForm(QScrollArea):
         column.addWidget(self.accept)
         column.addStretch(1)
         self.show_session(self._session, new=True)
+
+    def _build_camera(self) -> QGroupBox:
+        box = QGroupBox(tr("Camera"))
+        row = QHBoxLayout(box)
+        self.camera = named(QLabel(), "setup.camera", tr("How the camera is set"))
+        self.camera.setWordWrap(True)
+        self.camera_settings = named(
+            QPushButton(tr("&Set and lock…")),
+            "setup.camera.settings",
+            tr("Set and lock the camera"),
+            tr(
+                "Format, exposure, gain, white balance, focus; and whether the picture stands still"
+            ),
+        )
+        self.camera_settings.clicked.connect(self.camera_wanted)
+        row.addWidget(self.camera, 1)
+        row.addWidget(self.camera_settings)
+        self.show_camera(tr("No camera is chosen."), "", settable=False)
+        return box
+
+    def show_camera(self, text: str, role: str, *, settable: bool) -> None:
+        """Say how the camera is set, and offer to set it where it can be set."""
+        self.camera.setText(text)
+        show_meaning(self.camera, role)
+        self.camera_settings.setEnabled(settable)
 
     def _build_sensor(self) -> QGroupBox:
         box = QGroupBox(tr("Sensor"))

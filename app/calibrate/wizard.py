@@ -9,6 +9,7 @@ from app.calibrate.looking import Looking
 from app.calibrate.maps import Panel
 from app.calibrate.pictures import PICTURE, RESULT
 from app.calibrate.saving import Saving
+from app.calibrate.session_camera import SessionCamera, SetupCamera
 from app.calibrate.standing import Standing
 from app.calibrate.taking import Taking
 from app.calibrate.trial import KnownObject
@@ -43,6 +44,8 @@ class Wizard(WizardFrame):
         self.taking = Taking(self, self.looking)
         self.standing = Standing(self, self.looking, self.validating)
         self._build_keys()
+        self.session_camera = SessionCamera(self.controller, context=context)
+        self.setup_camera = SetupCamera(self.setup, context=context)
         self._connect()
         self.standing.refresh()
         self.controller.look_for_boards()
@@ -107,6 +110,7 @@ class Wizard(WizardFrame):
 
     def enter(self) -> None:
         """Look at the camera, as the wizard is shown."""
+        self.session_camera.refer()
         self.camera.enter(True)
         self.outside.watch(True)
         self._focus_on_what_comes_next()
@@ -119,6 +123,7 @@ class Wizard(WizardFrame):
     def close_session(self) -> None:
         """End all work; everything captured and decided is on disk."""
         self.context.source.changed.disconnect(self.camera.open)
+        self.setup_camera.close()
         self.leave()
         self.validating.close()
         if self.curves is not None:

@@ -45,6 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
         benchmark,
         board,
         calibrate,
+        cameras,
         design,
         drift,
         evaluate,
@@ -92,6 +93,7 @@ def build_parser() -> argparse.ArgumentParser:
         stability,
         design,
         board,
+        cameras,
     ):
         command.add_parser(commands)
     return parser

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QSignalBlocker, Signal
 from PySide6.QtWidgets import QComboBox, QWidget
@@ -15,7 +16,11 @@ from app.shell.jobs import Job, Jobs
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 WIDTH_CHARACTERS = 22
 # From here on parts may be compiled, which takes a minute the first time.
@@ -93,6 +98,11 @@ class Library(QObject):
             self.loaded.emit(None, None)
             return
         self._read(used.path)
+
+    def refer_cameras(self, live: Reconstructor | None) -> None:
+        """Hold the cameras to how they were set for a calibration."""
+        texts = {} if live is None else live.calibration.provenance.camera_settings
+        self._context.cameras.refer(tr("the calibration"), settings_of_texts(texts))
 
     def use_what_fits(self, serial: str, size: tuple[int, int] | None) -> None:
         """Put the newest calibration for such pictures into use; empty and None fit all."""

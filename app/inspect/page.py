@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 from app.inspect.actions import Deeds
 from app.inspect.advice import Situation, advise
 from app.inspect.banner import Banner
+from app.inspect.drift_watch import DriftWatch
 from app.inspect.first_calibration import begin_first_calibration
 from app.inspect.library import CalibrationBox, Library
 from app.inspect.link import LiveLink
@@ -24,10 +25,9 @@ from app.inspect.replay_bar import ReplayBar
 from app.inspect.situation import situation_of
 from app.inspect.views import Views
 from app.inspect.ways import WayChoice
-from app.inspect.zero import drift_sentence
 from app.shell.actions import make_action
 from app.shell.context import AppContext
-from app.shell.jobs import Job, Jobs
+from app.shell.jobs import Jobs
 from app.sources.listing import picture_folders
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -66,7 +66,7 @@ class InspectPage(QWidget):
         self._places: PixelPlaces | None = None
         self._shown: Shown | None = None
         self._trouble = self._recorded = self._drift = ""
-        self._drift_due = False
+        self.drift = DriftWatch(self.jobs, self)
         self._size: tuple[int, int] | None = None
         self._loaded: tuple[Reconstructor | None, Reconstructor | None] = None, None
         self._lay_out()
@@ -116,6 +116,7 @@ class InspectPage(QWidget):
         self.views.picture_pointed.connect(self._on_picture_pointed)
         self.library.loaded.connect(self._on_loaded)
         self.ways.chosen.connect(self._use)
+        self.drift.said.connect(self._on_drift)
         self.context.source.changed.connect(self._on_source)
         self.link.said.connect(self._on_said)
         self.link.switched.connect(self._on_switched)
@@ -133,6 +134,7 @@ class InspectPage(QWidget):
     def enter(self) -> None:
         """Look at the source, through the calibration in use."""
         self.library.refresh()
+        self.library.refer_cameras(self._loaded[0])
         self._want()
         self.link.enter(True)
         self._words.start()
@@ -188,36 +190,30 @@ class InspectPage(QWidget):
         if size != self._size:
             self._size = size
             self._advise()
-        if self._drift_due and shown.frame.settled and shown.heightmap is not None:
-            self._drift_due = False
-            self._look_for_drift(shown)
+        self.drift.look(shown, self.link.reconstructor)
         self.views.show_frame(shown, still=self.link.paused)
 
-    def _look_for_drift(self, shown: Shown) -> None:
-        """Warn where the untouched sensor has moved from its calibration."""
-        reconstructor = self.link.reconstructor
-        if reconstructor is None or self.jobs.busy:
-            return
-        calibration, rgb = reconstructor.calibration, shown.frame.rgb
+    def _look_for_drift(self) -> None:
+        """Forget what was said of the background, and look at it again."""
+        self._drift = ""
+        self.drift.again()
 
-        def tell(sentence: str) -> None:
-            self._drift = sentence
-            self._advise()
-
-        self.jobs.submit(
-            Job(tr("Looking at the background"), lambda _: drift_sentence(rgb, calibration), tell)
-        )
+    def _on_drift(self, sentence: str) -> None:
+        self._drift = sentence
+        self._advise()
 
     def _on_loaded(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Look through another calibration, where it belongs to the pictures."""
         self._loaded = None, None
-        self._drift, self._drift_due = "", True
+        self._look_for_drift()
         self.link.use(None)
         self.ways.take(live, best)
 
     def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Look through the calibration in the way that is chosen."""
         self._loaded = live, best
+        if self.isVisible():
+            self.library.refer_cameras(live)
         self._advise()
 
     # The cursor
@@ -258,7 +254,8 @@ class InspectPage(QWidget):
 
     def _on_source(self) -> None:
         self.recorder.stop()
-        self._size, self._drift, self._drift_due = None, "", True
+        self._size = None
+        self._look_for_drift()
         self.link.open()
         self._advise()
 
@@ -271,6 +268,9 @@ class InspectPage(QWidget):
         self._tell()
 
     def _on_said(self, sentence: str) -> None:
+        # A camera that was plugged in again may have moved.
+        if self._trouble and not sentence:
+            self._look_for_drift()
         self._trouble = sentence
         self._advise()
 

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.inspect.advice import Situation
+from app.inspect.drift_watch import DriftWatch
 from app.inspect.link import LiveLink
 from app.inspect.look import Look
 from app.inspect.products import Shown, Wanted
@@ -59,6 +60,7 @@ class Desk(DeskFrame):
         super().__init__(jobs, context=context)
         self.link = LiveLink(self._on_live, context=context, parent=self)
         self._steady = SteadyPress()
+        self.drift = DriftWatch(jobs, self)
         self._loaded: tuple[Reconstructor | None, Reconstructor | None] = (None, None)
         self._size: tuple[int, int] | None = None
         self._shown: Shown | None = None
@@ -74,6 +76,7 @@ class Desk(DeskFrame):
         self.library.loaded.connect(self._use)
         self.context.source.changed.connect(self._on_source)
         self.link.said.connect(self._on_said)
+        self.drift.said.connect(self._on_drift)
         self.banner.act_wanted.connect(self._on_act)
         self.work.changed.connect(self._refresh)
         self.work.picture_changed.connect(self._refresh)
@@ -100,6 +103,7 @@ class Desk(DeskFrame):
     def enter(self) -> None:
         """Look at the source through the calibration in use."""
         self.library.refresh()
+        self.library.refer_cameras(self._loaded[0])
         self.show_validated()
         self._want()
         self.link.enter(True)
@@ -222,6 +226,7 @@ class Desk(DeskFrame):
             self._refresh()
         if heightmap is None:
             return
+        self.drift.look(shown, self.link.reconstructor)
         frame = shown.frame
         steady = self._steady.update(heightmap.depth_mm, frame.time_s, settled=frame.settled)
         if steady and self.auto.isChecked():
@@ -318,7 +323,10 @@ class Desk(DeskFrame):
     def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Measure with another calibration; live only where it belongs to the pictures."""
         self._loaded = live, best
+        if self.isVisible():
+            self.library.refer_cameras(live)
         self._refused, self._shown = "", None
+        self.drift.again()
         self.link.use(None)
         self.work.use(best)
         self.details.use(None if best is None else best.calibration)
@@ -329,6 +337,7 @@ class Desk(DeskFrame):
 
     def _on_source(self) -> None:
         self._shown = self._size = None
+        self.drift.again()
         self.link.open()
         self.follow_bench()
         if self.work.taken is None:
@@ -338,8 +347,14 @@ class Desk(DeskFrame):
     # What to do next
 
     def _on_said(self, sentence: str) -> None:
+        if self._trouble and not sentence:
+            self.drift.again()
         self._trouble = sentence
         self._advise()
+
+    def _on_drift(self, sentence: str) -> None:
+        if sentence:
+            self.context.toasts.show(sentence, "warn")
 
     def _situation(self) -> Situation:
         return situation_of(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, Signal
 
 if TYPE_CHECKING:
+    from app.cameras.desk import CameraDesk
     from app.shell.log import Log
     from app.shell.settings import Settings
     from app.shell.status import StatusModel
@@ -107,3 +108,4 @@ class AppContext:
     source: SourceChoice
     requests: Requests
     log: Log
+    cameras: CameraDesk

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from app.workspace.workspace import default_folder
 APPLICATION = "gelpolight"
 THEMES = ("system", "light", "dark")
 RECENT = 8
+CAMERAS = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +140,24 @@ class Settings:
     @reconstruction.setter
     def reconstruction(self, way: tuple[str, str]) -> None:
         self._store.setValue("reconstruction", "/".join(way))
+
+    def _cameras(self) -> dict[str, dict[str, str]]:
+        try:
+            stored = json.loads(self._text("cameras", "{}"))
+        except (ValueError, RecursionError):  # edited by hand: as if nothing were known
+            return {}
+        return stored if isinstance(stored, dict) else {}
+
+    def camera(self, identity: str) -> dict[str, str]:
+        """Return how a camera was set last, as texts; empty where it is not known."""
+        stored = self._cameras().get(identity, {})
+        return stored if isinstance(stored, dict) else {}
+
+    def keep_camera(self, identity: str, texts: Mapping[str, str]) -> None:
+        """Remember how a camera is set; those set longest ago are forgotten."""
+        others = {key: value for key, value in self._cameras().items() if key != identity}
+        kept = [*others.items(), (identity, dict(texts))][-CAMERAS:]
+        self._store.setValue("cameras", json.dumps(dict(kept)))
 
     def window_state(self) -> tuple[QByteArray, QByteArray]:
         """Return geometry and state of the main window; empty at first."""

@@ -25,6 +25,8 @@ class Status:
     ----------
     camera : str or None
         Name of the open source.
+    camera_note : str
+        A word beside it, such as "not locked".
     rate_hz : float or None
         Frames a second.
     processing_ms : float or None
@@ -46,6 +48,7 @@ class Status:
     skipped_hz: float = 0.0
     calibration: str | None = None
     calibration_note: str = ""
+    camera_note: str = ""
 
 
 class Skipped:
@@ -148,6 +151,8 @@ def status_texts(status: Status) -> dict[str, str]:
         if status.calibration is None
         else status.calibration,
     }
+    if status.camera is not None and status.camera_note:
+        texts["camera"] += f" ({status.camera_note})"
     if status.calibration is not None and status.calibration_note:
         texts["calibration"] += f" ({status.calibration_note})"
     return texts

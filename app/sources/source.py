@@ -85,6 +85,10 @@ class SourceLost(InputError):
     """A source that gives no more pictures: it stopped, was unplugged, or came to its end."""
 
 
+class SourceAway(Exception):
+    """No pictures for now: the source tries by itself to go on. Its text is a whole sentence."""
+
+
 class Source(Protocol):
     """A source of pictures.
 
@@ -118,6 +122,8 @@ class Source(Protocol):
 
         Raises
         ------
+        SourceAway
+            If there are none for now; after `timeout_s`, so that it can be asked at once again.
         SourceLost
             If there will be no more frames.
         InputError

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 
 from app.sources.mailbox import Mailbox
-from app.sources.source import Frame, Source, SourceLost
+from app.sources.source import Frame, Source, SourceAway, SourceLost
 from app.sources.stopping import join
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -39,7 +39,8 @@ class StreamFigures:
     unseen : int
         Those that arrived and were replaced in `Stream.newest` before anybody took them.
     lost : str or None
-        Why there are no more frames, as a sentence; None while all is well.
+        Why there are no frames, as a sentence; None while all is well, and again when a source
+        that was away is back.
     """
 
     rate_hz: float = 0.0
@@ -184,7 +185,12 @@ class Stream:
     def _deliver(self, end: threading.Event) -> None:
         heard_s: float | None = None
         while not end.is_set():
-            frame = self.source.frame(_POLL_S)
+            try:
+                frame = self.source.frame(_POLL_S)
+            except SourceAway as error:
+                heard_s = None
+                self._wait_for_return(error)
+                continue
             now = time.monotonic()
             if frame is not None:
                 heard_s = now
@@ -196,9 +202,18 @@ class Stream:
                     advice=tr("Check the camera and its cable, then open it again"),
                 )
 
+    def _wait_for_return(self, away: SourceAway) -> None:
+        """Say that the source is away, and let nobody wait for frames that may never come."""
+        reason = _Away(str(away), where=self.source.name, advice="")
+        with self._lock:
+            self._lost = reason
+            captures, self._captures = self._captures, []
+        _fail(captures, reason)
+
     def _hand_on(self, frame: Frame) -> None:
         unseen = self.newest.put(frame)
         with self._lock:
+            self._lost = None
             self._times.append(time.monotonic())
             self._last_number = max(self._last_number, frame.number)
             self._received += 1
@@ -227,9 +242,7 @@ class Stream:
         with self._lock:
             end.set()
             captures, self._captures = self._captures, []
-        for capture in captures:
-            if capture.future.set_running_or_notify_cancel():
-                capture.future.set_exception(reason)
+        _fail(captures, reason)
 
     def _stopped(self) -> SourceLost:
         return SourceLost(
@@ -237,3 +250,16 @@ class Stream:
             where=self.source.name,
             advice=tr("Start them and capture again"),
         )
+
+
+class _Away(SourceLost):
+    """A loss that the source has put into a whole sentence already."""
+
+    def __str__(self) -> str:
+        return self.found
+
+
+def _fail(captures: list[_Capture], reason: InputError) -> None:
+    for capture in captures:
+        if capture.future.set_running_or_notify_cancel():
+            capture.future.set_exception(reason)

@@ -19,6 +19,7 @@ from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.intake import read_bytes, refuse_other_size, refuse_unfit
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.session.capture import average_frames, write_picture
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
 from gelpolight_core.session.decisions import (
@@ -208,10 +209,23 @@ class KeptSession:
     def describe(self, session: Session) -> None:
         """Take what is stated of the sensor, its boards and the usual ball, on disk first.
 
-        Folder, decisions and the radii stated for single presses stay.
+        Folder, decisions, the radii stated for single presses and the camera's settings stay.
         """
         with self._lock:
-            self._describe(replace(session, ball_radii_mm=self._session.ball_radii_mm))
+            kept = self._session
+            self._describe(
+                replace(
+                    session,
+                    ball_radii_mm=kept.ball_radii_mm,
+                    camera_settings=kept.camera_settings,
+                )
+            )
+
+    def set_camera(self, settings: CameraSettings | None) -> None:
+        """Note how the camera is set that takes the pictures, on disk first."""
+        with self._lock:
+            if settings != self._session.camera_settings:
+                self._describe(replace(self._session, camera_settings=settings))
 
     def set_ball_radius(self, name: str, radius_mm: float | None) -> None:
         """State the radius of the ball in one picture; None goes back to the usual one."""

@@ -273,6 +273,7 @@ def _provenance(session: Session) -> Provenance:
         operator = getpass.getuser()
     except (KeyError, OSError):  # a container without a user database has no name to give
         operator = ""
+    camera = session.camera_settings
     return Provenance(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         operator=operator,
@@ -280,4 +281,5 @@ def _provenance(session: Session) -> Provenance:
         session=session.folder.resolve().name,
         sources=sources,
         inputs=all_inputs(session),
+        camera_settings={} if camera is None else camera.as_texts(),
     )

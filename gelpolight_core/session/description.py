@@ -36,10 +36,8 @@ def write_description(session: Session) -> None:
         "top_pose": _board(session.top_pose),
         "balls": radii,
     }
-    if isinstance(session.declared_response, str):
-        content["camera"] = {"response": session.declared_response}
-    elif session.declared_response is not None:
-        content["camera"] = {"gamma": session.declared_response}
+    if camera := _camera(session):
+        content["camera"] = camera
     if session.exposures_ms:
         content["response"] = dict(session.exposures_ms)
 
@@ -66,6 +64,14 @@ def create_session(session: Session) -> None:
         )
     make_folder(session.folder)
     write_description(session)
+
+
+def _camera(session: Session) -> dict[str, Any]:
+    stored, response = session.camera_settings, session.declared_response
+    camera = {} if stored is None else stored.as_table()
+    if response is not None:
+        camera["response" if isinstance(response, str) else "gamma"] = response
+    return camera
 
 
 def _board(board: BoardSpec) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.response.curve import CameraResponse, declared_response
+from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.picture import Picture, linear_picture
 from gelpolight_core.session.table import Table
@@ -62,6 +63,9 @@ class Session:
         Undone as the stages' pictures are read; as declared until it is measured.
     decisions : Decisions
         Of ``decisions.toml``.
+    camera_settings : CameraSettings or None
+        Of ``[camera.device]`` and ``[camera.controls]``: the camera that took the pictures, as it
+        was set; None where that is not known.
     """
 
     folder: Path
@@ -74,6 +78,7 @@ class Session:
     exposures_ms: Mapping[str, float] = field(default_factory=dict)
     response: CameraResponse | None = None
     decisions: Decisions = field(default_factory=Decisions)
+    camera_settings: CameraSettings | None = None
 
     @property
     def optional_stages(self) -> tuple[str, ...]:
@@ -289,8 +294,9 @@ def read_session(folder: Path) -> Session:
     """Read and check ``session.toml`` of a session folder.
 
     Beside what every session states it may have ``[camera]`` with either ``response = "linear"``
-    (as without it) or ``"srgb"``, or ``gamma = 2.2``; and ``[response]`` with the exposure time in
-    ms of each picture in the folder ``response``, such as ``"exp_01.png" = 2.0``.
+    (as without it) or ``"srgb"``, or ``gamma = 2.2``, and with the camera's name, format and
+    settings in ``[camera.device]`` and ``[camera.controls]``; and ``[response]`` with the exposure
+    time in ms of each picture in the folder ``response``, such as ``"exp_01.png" = 2.0``.
 
     Raises
     ------
@@ -349,7 +355,8 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
     pose = _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard
     balls = top.table("balls")
     radii = {str(name): balls.number(str(name), 0.05, 500.0) for name in balls.content}
-    declared = _parse_camera(top.table("camera")) if "camera" in content else None
+    camera = top.table("camera") if "camera" in content else Table({}, "camera", path)
+    declared = _parse_response(camera) if "camera" in content else None
     series = top.table("response") if "response" in content else Table({}, "response", path)
     times = {str(name): series.number(str(name), 1e-4, 1e6) for name in series.content}
     top.no_more(
@@ -367,12 +374,15 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         times,
         declared_response(declared),
         read_decisions(path.parent),
+        parse_settings(camera) if "device" in camera.content else None,
     )
 
 
-def _parse_camera(table: Table) -> str | float:
+def _parse_response(table: Table) -> str | float | None:
     """Return the declared response: one of two names, or a gamma in the place of a name."""
-    table.no_more("response", "gamma")
+    table.no_more("response", "gamma", "device", "controls")
+    if "device" in table.content and not {"response", "gamma"} & set(table.content):
+        return None
     if "gamma" not in table.content:
         response = table.text("response")
         if response not in ("linear", "srgb"):

@@ -1,0 +1,64 @@
+"""The window in which a camera is set, beside the page that shows its picture."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+
+from app.cameras.desk import CameraDesk
+from app.cameras.panel import CameraPanel
+from app.sources.camera.camera import Camera
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+WIDTH, HEIGHT = 860, 690
+
+
+class CameraDialog(QDialog):
+    """Shows the panel of one camera.
+
+    Parameters
+    ----------
+    desk : CameraDesk
+        Sets cameras and remembers it.
+    camera : Camera
+        The one that is shown.
+    """
+
+    def __init__(self, desk: CameraDesk, camera: Camera, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "camera", tr("Camera settings"))
+        self.setWindowTitle(tr("Camera settings: {name}").format(name=camera.device.name))
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.panel = CameraPanel(desk, camera)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        close = buttons.button(QDialogButtonBox.StandardButton.Close)
+        named(close, "camera.close", tr("Close the camera settings"))
+        buttons.rejected.connect(self.close)
+        column = QVBoxLayout(self)
+        column.addWidget(self.panel, 1)
+        column.addWidget(buttons)
+        self.resize(WIDTH, HEIGHT)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Open the camera."""
+        super().showEvent(event)
+        self.panel.watch(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Let the camera go."""
+        self.panel.watch(False)
+        super().hideEvent(event)
+
+
+def show_camera_dialog(desk: CameraDesk, camera: Camera, parent: QWidget) -> CameraDialog:
+    """Show the window of a camera beside the work, not in its way; return it."""
+    for other in parent.window().findChildren(CameraDialog):
+        if other.panel.camera is camera and other.isVisible():
+            other.raise_()
+            other.activateWindow()
+            return other
+    dialog = CameraDialog(desk, camera, parent.window())
+    dialog.show()
+    return dialog

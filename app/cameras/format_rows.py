@@ -1,0 +1,101 @@
+"""The choice of a camera's format, size and rate, of those that it lists."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QWidget
+
+from app.shell import theme
+from app.sources.camera.driver import Format, compression_warning
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+
+class FormatRows(QWidget):
+    """Three choices, each of what the ones before leave.
+
+    Signals
+    -------
+    chosen(object)
+        A person chose a Format.
+    """
+
+    chosen = Signal(object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "camera.formats", tr("Format of the pictures"))
+        form = QFormLayout(self)
+        form.setContentsMargins(0, 0, 0, 0)
+        self._offered: tuple[Format, ...] = ()
+        self._code = named(QComboBox(), "camera.format", tr("Format"))
+        self._size = named(QComboBox(), "camera.size", tr("Size of the pictures"))
+        self._rate = named(QComboBox(), "camera.rate", tr("Pictures per second"))
+        for label, box in (
+            (tr("Format"), self._code),
+            (tr("Size"), self._size),
+            (tr("Rate"), self._rate),
+        ):
+            form.addRow(label, box)
+            box.activated.connect(lambda _, box=box: self._on_chosen(box))
+        self.warning = named(QLabel(), "camera.compressed", tr("What speaks against the format"))
+        self.warning.setWordWrap(True)
+        form.addRow(self.warning)
+        self.show_format(None, ())
+
+    def show_format(self, got: Format | None, offered: tuple[Format, ...]) -> None:
+        """Show the format in use among those that the camera lists."""
+        self._offered = offered or (() if got is None else (got,))
+        self.setEnabled(got is not None)
+        if got is not None:
+            self._fill(got)
+        warning = "" if got is None else compression_warning(got, offered)
+        if got is not None and not offered:
+            warning = tr("The system does not tell which formats this camera has. {more}").format(
+                more=warning
+            )
+        self.warning.setText(warning.strip())
+        self.warning.setStyleSheet(f"color: {theme.colour('warn').name()};")
+        self.warning.setVisible(bool(warning))
+
+    def _fill(self, got: Format) -> None:
+        codes = dict.fromkeys(f.code for f in (*self._offered, got))
+        sizes = sorted(
+            {(f.width, f.height) for f in self._of(got.code)} | {(got.width, got.height)}
+        )
+        rates = sorted({f.rate_hz for f in self._of(got.code, got.width)} | {got.rate_hz})
+        kinds = {code: Format(code, 0, 0, 0.0).compressed for code in codes}
+        words = {True: tr("compressed"), False: tr("uncompressed")}
+        _fill(self._code, {f"{c} ({words[kinds[c]]})": c for c in codes}, got.code)
+        _fill(
+            self._size,
+            {tr("{w} x {h} pixels").format(w=w, h=h): (w, h) for w, h in sizes},
+            (got.width, got.height),
+        )
+        _fill(self._rate, {tr("{hz:g} per second").format(hz=hz): hz for hz in rates}, got.rate_hz)
+
+    def _of(self, code: str, width: int = 0) -> list[Format]:
+        return [f for f in self._offered if f.code == code and width in (0, f.width)]
+
+    def _on_chosen(self, box: QComboBox) -> None:
+        """Choose the format nearest to what the three say; the one changed last is kept."""
+        code, (width, height), rate = (
+            b.currentData() for b in (self._code, self._size, self._rate)
+        )
+        order = {
+            self._code: lambda f: (f.code == code, (f.width, f.height) == (width, height)),
+            self._size: lambda f: ((f.width, f.height) == (width, height), f.code == code),
+            self._rate: lambda f: (f.code == code, (f.width, f.height) == (width, height)),
+        }[box]
+        best = max(self._offered, key=lambda f: (*order(f), -abs(f.rate_hz - rate)))
+        self.chosen.emit(best)
+
+
+def _fill(box: QComboBox, items: dict[str, object], chosen: object) -> None:
+    """Offer items and show the one in use, which is no choice of the person's."""
+    if [box.itemText(row) for row in range(box.count())] != list(items):
+        box.clear()
+        for text, value in items.items():
+            box.addItem(text, value)
+    box.setCurrentIndex(list(items.values()).index(chosen))
+    box.setEnabled(len(items) > 1)

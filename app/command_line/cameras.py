@@ -1,0 +1,115 @@
+"""``gelpolight cameras``: which cameras are plugged in, and what they offer."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from app.command_line.common import write_json
+from app.sources.camera.applying import is_locked
+from app.sources.camera.driver import CameraDriver, Device, Format, best_format, compression_warning
+from app.sources.source import Setting
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "cameras", help=tr("list the cameras that are plugged in, their formats and settings")
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """List what is plugged in."""
+    from app.sources.camera.opencv import OpenCvDriver  # heavy
+
+    return report(OpenCvDriver(), options.json)
+
+
+def report(driver: CameraDriver, json: Path | None) -> int:
+    """Print every camera of a driver, and write the same as JSON where that is asked for."""
+    found = []
+    for device in driver.devices():
+        formats, controls, trouble = _ask(driver, device)
+        print("\n".join(_lines(device, formats, controls, trouble)))
+        found.append(_entry(device, formats, controls, trouble))
+    if not found:
+        print(
+            tr(
+                "No camera is plugged in, or this user may not see it. Plug one in; on Linux, look"
+                " for /dev/video0 and add the user to the group video."
+            )
+        )
+    if json is not None:
+        write_json({"cameras": found}, json)
+    return 0
+
+
+def _ask(
+    driver: CameraDriver, device: Device
+) -> tuple[tuple[Format, ...], tuple[Setting, ...], str]:
+    """Return formats and settings of a camera, and why they are not known."""
+    try:
+        formats = driver.formats(device)
+        camera = driver.open(device, None)
+    except InputError as error:
+        return (), (), str(error)
+    try:
+        return formats or (camera.format,), camera.controls(), ""
+    except InputError as error:
+        return formats, (), str(error)
+    finally:
+        camera.close()
+
+
+def _lines(
+    device: Device, formats: tuple[Format, ...], controls: tuple[Setting, ...], trouble: str
+) -> list[str]:
+    lines = [f"{device.name}  [{device.identity}]  {device.place}"]
+    if trouble:
+        return [*lines, f"  {trouble}"]
+    best = best_format(formats)
+    for f in formats:
+        lines.append(f"  {'*' if f == best else ' '} {f}{tr(', compressed') * f.compressed}")
+    if best is not None and (warning := compression_warning(best, formats)):
+        lines.append(f"  {warning}")
+    for c in controls:
+        extent = tr("{low:g} to {high:g}").format(low=c.low, high=c.high)
+        held = "" if c.writable else tr("  (set by the camera)")
+        value = f"{c.value:g} {c.unit}".rstrip()
+        lines.append(f"    {c.key:<22}{c.label:<30}{value:>10}  {extent}{held}".rstrip())
+    if not controls:
+        lines.append(tr("    The system lets no program set this camera."))
+    elif not is_locked(controls):
+        lines.append(tr("    Not locked: the camera still sets some things by itself."))
+    return lines
+
+
+def _entry(
+    device: Device, formats: tuple[Format, ...], controls: tuple[Setting, ...], trouble: str
+) -> dict[str, Any]:
+    return {
+        "name": device.name,
+        "identity": device.identity,
+        "model": device.model,
+        "place": device.place,
+        "trouble": trouble or None,
+        "formats": [
+            {
+                "code": f.code,
+                "width": f.width,
+                "height": f.height,
+                "rate_hz": f.rate_hz,
+                "compressed": f.compressed,
+            }
+            for f in formats
+        ],
+        "controls": {
+            c.key: {"value": c.value, "low": c.low, "high": c.high, "step": c.step, "unit": c.unit}
+            for c in controls
+        },
+    }

@@ -1,0 +1,189 @@
+"""Set a camera's settings, read them back, and say which of them hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from app.sources.camera.controls import CONTROLS, MAIN, ORDER
+from app.sources.camera.driver import CameraGone, Format, OpenCamera
+from app.sources.source import Setting
+from gelpolight_core.errors import InputError
+from gelpolight_core.quality import Figure, QualityTable, Verdict
+from gelpolight_core.session.camera_settings import CameraSettings
+from gelpolight_core.translation import tr
+
+TRIES = 2
+"""Some cameras take a value only once the one before has gone through."""
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """A setting that was asked for, and what became of it.
+
+    Attributes
+    ----------
+    key, label, unit : str
+        Which it is.
+    wanted : float
+        What was asked for.
+    read : float or None
+        What was read back; None where the camera has no such setting.
+    step : float
+        The step that the camera can make.
+    why : str
+        What the camera said; empty where it said nothing.
+    """
+
+    key: str
+    label: str
+    unit: str
+    wanted: float
+    read: float | None
+    step: float = 0.0
+    why: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the camera has what was asked for, to half a step."""
+        if self.read is None:
+            return False
+        return abs(self.read - self.wanted) <= max(0.5 * self.step, 0.005 * abs(self.wanted)) + 1e-6
+
+    @property
+    def sentence(self) -> str:
+        """What people read where it does not hold."""
+        if self.read is None:
+            return tr("{what}: the camera has no such setting").format(what=self.label)
+        return tr("{what} is {read}, not {wanted}").format(
+            what=self.label, read=self._words(self.read), wanted=self._words(self.wanted)
+        )
+
+    def _words(self, value: float) -> str:
+        if CONTROLS[self.key].switch:
+            return tr("on") if value else tr("off")
+        return f"{value:g} {self.unit}".rstrip()
+
+
+def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
+    """Set a camera's settings in the order in which they release each other, and read them back.
+
+    Parameters
+    ----------
+    camera : OpenCamera
+        Is delivering; many cameras forget what they were told before.
+    wanted : mapping
+        Value of each setting.
+
+    Raises
+    ------
+    CameraGone
+        If it is unplugged meanwhile.
+    """
+    refusals: dict[str, str] = {}
+    for _ in range(TRIES):
+        due = [a.key for a in _compare(camera.controls(), wanted, refusals) if not a.holds]
+        for key in due:
+            refusals.pop(key, None)
+            try:
+                camera.set(key, wanted[key])
+            except CameraGone:
+                raise
+            except InputError as error:
+                refusals[key] = error.found
+    return _compare(camera.controls(), wanted, refusals)
+
+
+def _compare(
+    controls: Iterable[Setting], wanted: Mapping[str, float], refusals: Mapping[str, str]
+) -> tuple[Applied, ...]:
+    there = {control.key: control for control in controls}
+    found = []
+    for key in (key for key in ORDER if key in wanted):
+        kind, control = CONTROLS[key], there.get(key)
+        if kind.automatic and wanted.get(kind.automatic):
+            continue  # the camera sets it as it likes
+        read, step = (None, 0.0) if control is None else (control.value, control.step)
+        label, why = kind.label(), refusals.get(key, "")
+        found.append(Applied(key, label, kind.unit, wanted[key], read, step, why))
+    return tuple(found)
+
+
+def locked(controls: Iterable[Setting]) -> dict[str, float]:
+    """Return the settings as they are now, with everything fixed that the camera sets by itself."""
+    values = {}
+    for control in controls:
+        held = CONTROLS[control.key].held
+        values[control.key] = control.value if held is None else held
+    return values
+
+
+def is_locked(controls: Iterable[Setting]) -> bool:
+    """Whether the camera sets nothing by itself, as far as it tells."""
+    return not any(CONTROLS[c.key].held is not None and c.value for c in controls)
+
+
+def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> QualityTable:
+    """Return what a person should know of a lock: the four that matter, and what does not hold.
+
+    Parameters
+    ----------
+    applied : iterable of Applied
+        What was asked for.
+    controls : iterable of Setting
+        The camera's, as read back.
+    """
+    there = {control.key: control for control in controls}
+    free = [c for c in there.values() if CONTROLS[c.key].held is not None and c.value]
+    figures = [
+        Figure(c.key, c.label, c.value, "", None, None, Verdict.FAIL, _lock_advice()) for c in free
+    ]
+    named = {control.key for control in free}
+    in_order = sorted(applied, key=lambda a: ORDER.index(a.key))
+    figures += [
+        _figure(a) for a in in_order if a.key not in named and (a.key in MAIN or not a.holds)
+    ]
+    return QualityTable(tuple(figures))
+
+
+def _lock_advice() -> str:
+    return tr("The camera sets this by itself: press Lock")
+
+
+def _figure(applied: Applied) -> Figure:
+    serious = applied.key in MAIN or CONTROLS[applied.key].held is not None
+    value = float("nan") if applied.read is None else applied.read
+    verdict, advice = Verdict.PASS, ""
+    if not applied.holds:
+        verdict = Verdict.FAIL if serious else Verdict.WARN
+        said = ": ".join(filter(None, (applied.sentence, applied.why)))
+        advice = tr("{said}. Choose a value that the camera takes").format(said=said)
+    unit = applied.unit
+    return Figure(applied.key, applied.label, value, unit, None, None, verdict, advice)
+
+
+def differences(
+    stored: CameraSettings, got: Format | None, controls: Iterable[Setting]
+) -> tuple[str, ...]:
+    """Return a clause for everything that is not as it was when the settings were stored.
+
+    Parameters
+    ----------
+    stored : CameraSettings
+        Of a session or a calibration.
+    got : Format or None
+        The camera's, as read back; None where it is not known.
+    controls : iterable of Setting
+        The camera's, as read back.
+    """
+    found = []
+    if got is not None and stored.size != (0, 0) and (got.width, got.height) != stored.size:
+        found.append(
+            tr("the pictures are {a}, not {b} pixels").format(
+                a=f"{got.width}x{got.height}", b="x".join(map(str, stored.size))
+            )
+        )
+    if got is not None and stored.pixel_format and got.code != stored.pixel_format:
+        found.append(tr("the format is {a}, not {b}").format(a=got.code, b=stored.pixel_format))
+    compared = _compare(controls, stored.controls, {})
+    return (*found, *(a.sentence for a in compared if not a.holds))

@@ -1,0 +1,371 @@
+"""A camera that is used by several at once, keeps its settings, and survives being unplugged."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass, field, replace
+
+from app.sources.camera.applying import Applied, apply_settings, locked
+from app.sources.camera.camera_state import CameraState, format_of
+from app.sources.camera.driver import (
+    CameraDriver,
+    CameraGone,
+    Device,
+    Format,
+    OpenCamera,
+    best_format,
+    find_device,
+)
+from app.sources.source import Frame
+from app.sources.stopping import join
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.camera_settings import CameraSettings
+from gelpolight_core.translation import tr
+
+_LOG = logging.getLogger(__name__)
+
+SILENCE_S = 3.0
+SLOW_OPEN_S = 8.0
+CHECK_S = 5.0
+CLOSE_S = 0.5
+"""A camera that is still being opened is left to its thread; who stops a stream waits a second."""
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 5.0
+UNSETTLED_FRAMES = 5
+"""A driver holds four pictures that were taken before a setting changed."""
+
+Reader = Callable[[Frame], object]
+
+
+@dataclass(slots=True)
+class _Change:
+    values: Mapping[str, float] | None
+    """None: lock what is."""
+    future: Future[tuple[Applied, ...]] = field(default_factory=Future)
+
+
+class Camera:
+    """A camera and the one thread that opens, reads, sets and closes it.
+
+    Parameters
+    ----------
+    driver : CameraDriver
+        Opens it.
+    device : Device
+        Which it is; found again by its identity when it was plugged in elsewhere.
+    told : callable, optional
+        Called without argument, in the camera's thread, when :attr:`state` has changed.
+    pause_s : float, optional
+        First pause before a camera that went away is tried again; doubles up to ten times.
+    silence_s : float, optional
+        Without a picture for so long it counts as away.
+    check_s : float, optional
+        So often its settings are read again: another program may change them.
+    """
+
+    def __init__(
+        self,
+        driver: CameraDriver,
+        device: Device,
+        *,
+        told: Callable[[], object] = lambda: None,
+        pause_s: float = FIRST_PAUSE_S,
+        silence_s: float = SILENCE_S,
+        check_s: float = CHECK_S,
+    ) -> None:
+        self.device = device
+        self._driver, self._told = driver, told
+        self._pause_s, self._silence_s, self._check_s = pause_s, silence_s, check_s
+        self._lock = threading.Lock()
+        self._state = CameraState()
+        self._wanted: CameraSettings | None = None
+        self._readers: list[Reader] = []
+        self._changes: list[_Change] = []
+        self._thread: threading.Thread | None = None
+        self._end = threading.Event()
+        self._reopen = threading.Event()
+        self._number, self._unsettled, self._pending = 0, 0, 0
+        self._since_s = self._checked_s = 0.0
+
+    # Any thread
+
+    @property
+    def state(self) -> CameraState:
+        """How it is now."""
+        with self._lock:
+            return self._state
+
+    @property
+    def wanted(self) -> CameraSettings | None:
+        """How it is set whenever it is opened; None: as it comes."""
+        with self._lock:
+            return self._wanted
+
+    @property
+    def settling(self) -> bool:
+        """Whether it has yet to do what it was told."""
+        with self._lock:
+            return self._pending > 0 or self._reopen.is_set()
+
+    def trouble(self) -> str:
+        """Return why no pictures come, as a sentence; empty while all is well."""
+        with self._lock:
+            state, silent_s = self._state, time.monotonic() - self._since_s
+        if state.phase == "away":
+            return state.sentence
+        if state.phase == "opening" and state.sentence:
+            return state.sentence
+        late = state.phase == "opening" and silent_s > SLOW_OPEN_S
+        if late or (state.phase == "live" and silent_s > self._silence_s):
+            return str(self._silent(silent_s))
+        return ""
+
+    def attach(self, reader: Reader) -> None:
+        """Hand every frame to `reader`, in the camera's thread; the first one opens the camera."""
+        with self._lock:
+            self._readers.append(reader)
+            if len(self._readers) > 1:
+                return
+            before, self._end = self._thread, threading.Event()
+            self._since_s = time.monotonic()
+            self._state = replace(self._state, phase="opening", sentence="")
+            self._thread = threading.Thread(
+                target=self._run,
+                args=(self._end, before),
+                name=f"camera {self.device.name}",
+                daemon=True,
+            )
+            self._thread.start()
+
+    def detach(self, reader: Reader) -> None:
+        """Hand no more frames to `reader`; the last one closes the camera, without a long wait."""
+        with self._lock:
+            if reader not in self._readers:
+                return
+            self._readers.remove(reader)
+            if self._readers:
+                return
+            thread = self._thread
+            self._end.set()
+            self._reopen.set()
+        if thread is not None:
+            join(thread, CLOSE_S)
+
+    def want(self, settings: CameraSettings | None) -> None:
+        """Set it so whenever it is opened, and now; another format opens it anew."""
+        with self._lock:
+            before, self._wanted = self._wanted, settings
+            live = self._state.phase == "live"
+        if not live or settings is None or settings == before:
+            return
+        if format_of(settings) not in (None, format_of(before), self.state.format):
+            self._reopen.set()
+        else:
+            self.change(settings.controls)
+
+    def change(self, values: Mapping[str, float]) -> Future[tuple[Applied, ...]]:
+        """Set some settings between two pictures; the future tells what became of them."""
+        return self._submit(_Change(dict(values)))
+
+    def lock(self) -> Future[tuple[Applied, ...]]:
+        """Fix everything that it sets by itself at what it is then, now and whenever it is opened.
+
+        The future tells what became of it.
+        """
+        return self._submit(_Change(None))
+
+    def _submit(self, change: _Change) -> Future[tuple[Applied, ...]]:
+        with self._lock:
+            if self._state.phase == "live":
+                self._changes.append(change)
+                self._pending += 1
+                return change.future
+        change.future.set_exception(self._away())
+        return change.future
+
+    def settings_now(self) -> CameraSettings:
+        """Return how it is set, to be stored."""
+        state = self.state
+        base = self._settings(state.format or format_of(self.wanted))
+        return replace(base, controls={c.key: c.value for c in state.controls})
+
+    def _settings(self, got: Format | None) -> CameraSettings:
+        device = self.device
+        base = CameraSettings(device.name, device.identity, device.model)
+        if got is None:
+            return base
+        size = got.width, got.height
+        return replace(base, pixel_format=got.code, size=size, rate_hz=got.rate_hz)
+
+    # The camera's own thread
+
+    def _run(self, end: threading.Event, before: threading.Thread | None) -> None:
+        # A driver that still hangs from the last time has the camera; two would not get it.
+        while before is not None and before.is_alive():
+            if end.wait(0.05):
+                return
+        pause_s = self._pause_s
+        while not end.is_set():
+            number = self._number
+            try:
+                self._use(end)
+            except CameraGone as error:
+                self._went_away(str(error))
+            except Exception as error:
+                _LOG.exception("The camera %s failed", self.device.name)
+                self._went_away(str(self._fault(error)))
+            if self._number > number:
+                pause_s = self._pause_s
+            if not self._reopen.is_set():
+                end.wait(pause_s)
+                pause_s = min(2.0 * pause_s, max(LONGEST_PAUSE_S, self._pause_s))
+        with self._lock:
+            if self._end is end:
+                self._state = replace(self._state, phase="closed", sentence="")
+        self._fail_changes()
+
+    def _use(self, end: threading.Event) -> None:
+        """Open the camera, and hand its pictures on until it goes away or shall be reopened."""
+        with self._lock:
+            # Its sentence stays, where it was away: it is, until there is a picture.
+            self._state = replace(self._state, phase="opening")
+            self._since_s = time.monotonic()
+        self._reopen.clear()
+        wanted = self.wanted
+        device = find_device(self._driver.devices(), self.device.identity, self.device.model)
+        if device is None:
+            raise CameraGone(
+                tr("the camera is not plugged in"),
+                where=self.device.name,
+                advice=tr("Plug it in; it goes on by itself"),
+            )
+        offered = self._driver.formats(device)
+        asked = format_of(wanted) or best_format(offered)
+        if end.is_set():
+            return
+        opened = self._driver.open(device, asked)
+        try:
+            if not end.is_set():
+                self._first_picture(opened, end, offered, wanted)
+            while not end.is_set() and not self._reopen.is_set():
+                self._next_picture(opened, end)
+                self._carry_out_changes(opened)
+        finally:
+            self._fail_changes()
+            opened.close()
+
+    def _first_picture(
+        self,
+        opened: OpenCamera,
+        end: threading.Event,
+        offered: tuple[Format, ...],
+        wanted: CameraSettings | None,
+    ) -> None:
+        """Wait for the camera to deliver, then set it: many forget what they were told before."""
+        self._picture(opened, end)
+        applied = apply_settings(opened, {} if wanted is None else wanted.controls)
+        got = opened.format
+        state = CameraState("live", "", got, offered, opened.controls(), applied)
+        with self._lock:
+            self._state, self._since_s = state, time.monotonic()
+            self._unsettled = UNSETTLED_FRAMES if applied else 0
+            self._checked_s = self._since_s
+        self._told()
+
+    def _picture(self, opened: OpenCamera, end: threading.Event) -> Frame | None:
+        """Wait for a picture as long as a camera may be silent; None when it shall end."""
+        until_s = time.monotonic() + self._silence_s
+        while not (end.is_set() or self._reopen.is_set()):
+            read = opened.read()
+            if read is not None:
+                rgb, came_s = read
+                settled = self._unsettled <= 0
+                self._unsettled -= 1
+                self._number += 1
+                return Frame(rgb, self._number - 1, came_s, settled)
+            if time.monotonic() > until_s:
+                raise self._silent(self._silence_s)
+        return None
+
+    def _next_picture(self, opened: OpenCamera, end: threading.Event) -> None:
+        frame = self._picture(opened, end)
+        if frame is None:
+            return
+        with self._lock:
+            self._since_s = frame.time_s
+            readers = tuple(self._readers)
+        for reader in readers:
+            reader(frame)
+
+    def _carry_out_changes(self, opened: OpenCamera) -> None:
+        with self._lock:
+            changes, self._changes = self._changes, []
+        for change in changes:
+            values = change.values
+            if values is None:
+                values = locked(opened.controls())
+                with self._lock:
+                    self._wanted = replace(self._settings(opened.format), controls=values)
+            applied = apply_settings(opened, values)
+            self._unsettled = UNSETTLED_FRAMES
+            done = {a.key: a for a in self.state.applied} | {a.key: a for a in applied}
+            with self._lock:
+                self._state = replace(
+                    self._state, controls=opened.controls(), applied=tuple(done.values())
+                )
+                self._pending -= 1
+            if change.future.set_running_or_notify_cancel():
+                change.future.set_result(applied)
+        if changes:
+            self._told()
+        elif time.monotonic() - self._checked_s > self._check_s:
+            self._check(opened)
+
+    def _check(self, opened: OpenCamera) -> None:
+        """Look whether another program, or the camera by itself, has set something."""
+        self._checked_s = time.monotonic()
+        controls = opened.controls()
+        if controls != self.state.controls:
+            with self._lock:
+                self._state = replace(self._state, controls=controls)
+            self._told()
+
+    def _went_away(self, sentence: str) -> None:
+        with self._lock:
+            self._state = replace(self._state, phase="away", sentence=sentence)
+        self._fail_changes()
+        self._told()
+
+    def _fail_changes(self) -> None:
+        with self._lock:
+            changes, self._changes = self._changes, []
+            self._pending = 0
+        for change in changes:
+            if change.future.set_running_or_notify_cancel():
+                change.future.set_exception(self._away())
+
+    def _away(self) -> InputError:
+        return CameraGone(
+            tr("the camera gives no pictures now, so that it cannot be set"),
+            where=self.device.name,
+            advice=tr("Wait until its picture is there"),
+        )
+
+    def _silent(self, silent_s: float) -> CameraGone:
+        return CameraGone(
+            tr("no picture has come for {s:.0f} seconds").format(s=silent_s),
+            where=self.device.name,
+            advice=tr("Check the camera and its cable; it is tried again by itself"),
+        )
+
+    def _fault(self, error: Exception) -> CameraGone:
+        return CameraGone(
+            tr("a fault of this program stopped the pictures ({kind}); the log has it").format(
+                kind=type(error).__name__
+            ),
+            where=self.device.name,
+            advice=tr("It is tried again by itself"),
+        )

@@ -1,0 +1,186 @@
+"""Cameras through OpenCV, with what it cannot do asked of the system: names, formats, settings."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.sources.camera.driver import COMPRESSED, UNCOMPRESSED, CameraGone, Device, Format
+from app.sources.camera.properties import Properties
+from app.sources.camera.v4l2 import V4l2
+from app.sources.source import Setting
+from gelpolight_core.translation import tr
+
+SLOW_READ_S = 2.5
+"""OpenCV answers a time-out with the picture before, and says that all is well."""
+LINUX = sys.platform.startswith("linux")
+
+
+def camera_interface() -> int:
+    """Return OpenCV's number of this system's own camera interface."""
+    if LINUX:
+        return cv2.CAP_V4L2
+    # DirectShow opens in a fraction of the time that Media Foundation takes, and sets more.
+    return cv2.CAP_DSHOW if sys.platform == "win32" else cv2.CAP_AVFOUNDATION
+
+
+class OpenCvDriver:
+    """The cameras of this machine.
+
+    Parameters
+    ----------
+    capture : callable, optional
+        What opens: ``cv2.VideoCapture``, given a place and an interface.
+    interface : int, optional
+        OpenCV's number of it; that of this system without it.
+    """
+
+    def __init__(
+        self, capture: Callable[[Any, int], Any] = cv2.VideoCapture, *, interface: int | None = None
+    ) -> None:
+        self._capture = capture
+        self._interface = camera_interface() if interface is None else interface
+
+    def devices(self) -> tuple[Device, ...]:
+        """Return the cameras that are plugged in."""
+        from cv2_enumerate_cameras import enumerate_cameras  # asks the system as it is loaded
+
+        return tuple(_device(found) for found in enumerate_cameras(self._interface))
+
+    def formats(self, device: Device) -> tuple[Format, ...]:
+        """Return the formats that a camera lists, those that OpenCV can read."""
+        if not self._is_v4l2:
+            return ()
+        found = V4l2(device.place)
+        try:
+            known = UNCOMPRESSED + COMPRESSED
+            return tuple(f for f in found.formats() if f.code in known)
+        finally:
+            found.close()
+
+    def open(self, device: Device, wanted: Format | None) -> OpenCvCamera:
+        """Open a camera, which may take seconds."""
+        controls: V4l2 | None = V4l2(device.place) if self._is_v4l2 else None
+        place = device.place if not device.place.isdigit() else int(device.place)
+        capture = self._capture(place, self._interface)
+        if not capture.isOpened():
+            if controls is not None:
+                controls.close()
+            raise CameraGone(
+                tr("the camera cannot be opened"),
+                where=device.name,
+                advice=tr("Close every other program that shows its picture, or plug it in again"),
+            )
+        if wanted is not None:
+            _ask_for(capture, wanted)
+        return OpenCvCamera(device, capture, controls or Properties(capture, self._interface))
+
+    @property
+    def _is_v4l2(self) -> bool:
+        return self._interface == cv2.CAP_V4L2
+
+
+class OpenCvCamera:
+    """A capture of OpenCV that is open.
+
+    Parameters
+    ----------
+    device : Device
+        Whose it is.
+    capture : cv2.VideoCapture
+        Belongs to this from now on.
+    controls : V4l2 or Properties
+        What sets it.
+    """
+
+    def __init__(self, device: Device, capture: Any, controls: V4l2 | Properties) -> None:
+        self._device, self._capture, self._controls = device, capture, controls
+
+    @property
+    def format(self) -> Format:
+        """The format as read back."""
+        get = self._capture.get
+        code = int(get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
+        letters = bytes((code >> shift) & 0xFF for shift in (0, 8, 16, 24)).decode("latin-1")
+        return Format(
+            letters.strip("\0 ") or "?",
+            int(get(cv2.CAP_PROP_FRAME_WIDTH)),
+            int(get(cv2.CAP_PROP_FRAME_HEIGHT)),
+            max(float(get(cv2.CAP_PROP_FPS)), 0.0),
+        )
+
+    def read(self) -> tuple[NDArray[np.uint8], float] | None:
+        """Wait for the next picture, RGB; None where none has come in OpenCV's own time."""
+        began_s = time.monotonic()
+        good = self._capture.grab()
+        came_s = time.monotonic()
+        if good and came_s - began_s > SLOW_READ_S:
+            return None
+        good, bgr = self._capture.retrieve() if good else (False, None)
+        if not good or bgr is None or not bgr.size:
+            raise CameraGone(
+                tr("the camera gives no more pictures"),
+                where=self._device.name,
+                advice=tr("Check its cable"),
+            )
+        return _rgb(bgr), came_s
+
+    def controls(self) -> tuple[Setting, ...]:
+        """Return what can be set."""
+        return self._controls.controls()
+
+    def set(self, key: str, value: float) -> None:
+        """Ask for a value."""
+        self._controls.set(key, value)
+
+    def close(self) -> None:
+        """Give the camera back."""
+        self._capture.release()
+        self._controls.close()
+
+
+def _ask_for(capture: Any, wanted: Format) -> None:
+    """Ask for a format in the order in which drivers take it; what came of it is read back."""
+    capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*wanted.code.ljust(4)))
+    capture.set(cv2.CAP_PROP_FRAME_WIDTH, wanted.width)
+    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, wanted.height)
+    capture.set(cv2.CAP_PROP_FPS, wanted.rate_hz)
+
+
+def _rgb(picture: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return OpenCV's blue, green, red (or grey) as red, green, blue in memory of its own."""
+    bits = picture if picture.dtype == np.uint8 else (picture >> 8).astype(np.uint8)
+    if bits.ndim == 2 or bits.shape[2] == 1:
+        return np.asarray(cv2.cvtColor(bits, cv2.COLOR_GRAY2RGB), np.uint8)
+    return np.asarray(cv2.cvtColor(bits, cv2.COLOR_BGR2RGB), np.uint8)
+
+
+def _device(found: Any) -> Device:
+    """Return a camera as cv2-enumerate-cameras tells it."""
+    known = found.vid is not None and found.pid is not None
+    model = f"{found.vid:04x}:{found.pid:04x}" if known else ""
+    path = str(found.path or "")
+    where = _linux_port(path) if LINUX else path
+    place = path if LINUX else str(found.index)
+    identity = f"{model or found.name}@{where or found.index}"
+    return Device(identity, str(found.name or path), model, place)
+
+
+def _linux_port(path: str, folder: Path = Path("/sys/class/video4linux")) -> str:
+    """Return the serial number of the camera, or else the socket that it is plugged into."""
+    try:
+        interface = (folder / Path(path).name / "device").resolve(strict=True)
+        serial = interface.parent / "serial"
+        if serial.is_file() and re.search(r"[1-9A-Za-z]", text := serial.read_text().strip()):
+            return f"{text}/{interface.name.rpartition(':')[2]}"
+    except OSError:  # no such folder in a container: the device's own name has to do
+        return path
+    return interface.name

@@ -1,0 +1,288 @@
+"""Formats and settings of cameras on Linux, asked of the kernel (V4L2) itself.
+
+OpenCV rounds and renames what it sets (0.25 for "manual" becomes 0, which is automatic) and tells
+no ranges.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from app.sources.camera.controls import CONTROLS, ORDER
+from app.sources.camera.driver import CameraGone, Format
+from app.sources.camera.v4l2_structures import (
+    CAPTURE,
+    DISABLED,
+    DISCRETE,
+    GRABBED,
+    INACTIVE,
+    READ_ONLY,
+    VIDIOC_ENUM_FMT,
+    VIDIOC_ENUM_FRAMEINTERVALS,
+    VIDIOC_ENUM_FRAMESIZES,
+    VIDIOC_G_CTRL,
+    VIDIOC_QUERYCAP,
+    VIDIOC_QUERYCTRL,
+    VIDIOC_QUERYMENU,
+    VIDIOC_S_CTRL,
+    Capability,
+    ControlValue,
+    FormatDescription,
+    FrameInterval,
+    FrameSize,
+    QueryControl,
+    QueryMenu,
+)
+from app.sources.source import Setting
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+Ioctl = Callable[[int, int, Any], Any]
+
+MOST = 256
+"""Of whatever a camera lists; one that lists without end is broken."""
+# Where a range of sizes is told in the place of sizes.
+USUAL_SIZES = ((640, 480), (800, 600), (1280, 720), (1280, 960), (1600, 1200), (1920, 1080))
+
+EXPOSURE_MANUAL, EXPOSURE_AUTO, EXPOSURE_APERTURE = 1, 0, 3
+MAINS_HZ = {0: 0.0, 1: 50.0, 2: 60.0}
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A control's number, and its value's size in our unit."""
+
+    number: int
+    scale: float = 1.0
+
+
+_KNOWN = {
+    "exposure_auto": _Known(0x9A0901),
+    "exposure_ms": _Known(0x9A0902, 0.1),  # the kernel counts in 100 us
+    "rate_follows_exposure": _Known(0x9A0903),
+    "focus": _Known(0x9A090A),
+    "focus_auto": _Known(0x9A090C),
+    "brightness": _Known(0x980900),
+    "contrast": _Known(0x980901),
+    "saturation": _Known(0x980902),
+    "white_balance_auto": _Known(0x98090C),
+    "gamma": _Known(0x980910),
+    "gain_auto": _Known(0x980912),
+    "gain": _Known(0x980913),
+    "power_line_hz": _Known(0x980918),
+    "white_balance_k": _Known(0x98091A),
+    "sharpness": _Known(0x98091B),
+    "backlight": _Known(0x98091C),
+}
+
+
+class V4l2:
+    """A video device, held open beside whoever takes its pictures.
+
+    Parameters
+    ----------
+    path : str
+        Such as ``/dev/video0``.
+    ioctl : callable, optional
+        Asks the kernel; ``fcntl.ioctl`` without it.
+
+    Raises
+    ------
+    CameraGone
+        If it cannot be opened.
+    """
+
+    def __init__(self, path: str, *, ioctl: Ioctl | None = None) -> None:
+        if ioctl is None:
+            from fcntl import ioctl as kernel  # no such module on Windows
+
+            ioctl = kernel
+        self.path, self._ioctl = path, ioctl
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK)
+        except OSError as error:
+            raise gone(path, error) from error
+
+    def close(self) -> None:
+        """Let it go; harmless when that is done."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+    def name(self) -> str:
+        """Return what the camera calls itself."""
+        found = Capability()
+        self._ask(VIDIOC_QUERYCAP, found)
+        return bytes(found.card).decode("utf-8", "replace").strip()
+
+    # Formats
+
+    def formats(self) -> tuple[Format, ...]:
+        """Return every format, size and rate that the camera lists."""
+        return tuple(
+            Format(_letters(code), width, height, rate)
+            for code in self._codes()
+            for width, height in self._sizes(code)
+            for rate in self._rates(code, width, height)
+        )
+
+    def _codes(self) -> list[int]:
+        found = self._list(VIDIOC_ENUM_FMT, lambda n: FormatDescription(index=n, type=CAPTURE))
+        return [description.pixelformat for description in found]
+
+    def _sizes(self, code: int) -> list[tuple[int, int]]:
+        sizes = []
+        for size in self._list(
+            VIDIOC_ENUM_FRAMESIZES, lambda n: FrameSize(index=n, pixel_format=code)
+        ):
+            if size.type == DISCRETE:
+                sizes.append((size.values[0], size.values[1]))
+                continue
+            low_w, high_w, _, low_h, high_h, _ = size.values
+            sizes += [
+                (w, h) for w, h in USUAL_SIZES if low_w <= w <= high_w and low_h <= h <= high_h
+            ]
+            break
+        return sizes
+
+    def _rates(self, code: int, width: int, height: int) -> list[float]:
+        def query(n: int) -> FrameInterval:
+            return FrameInterval(index=n, pixel_format=code, width=width, height=height)
+
+        rates = []
+        for interval in self._list(VIDIOC_ENUM_FRAMEINTERVALS, query):
+            seconds, parts = interval.values[0], interval.values[1]
+            if seconds and parts:
+                rates.append(round(parts / seconds, 3))
+            if interval.type != DISCRETE:
+                break
+        return rates
+
+    # Settings
+
+    def controls(self) -> tuple[Setting, ...]:
+        """Return the settings that the camera has, in the order in which they are applied."""
+        return tuple(filter(None, (self._control(key) for key in ORDER if key in _KNOWN)))
+
+    def set(self, key: str, value: float) -> None:
+        """Ask for a value, within what the camera tells of its range.
+
+        Raises
+        ------
+        InputError
+            If there is no such control or the camera refuses.
+        CameraGone
+            If it is gone.
+        """
+        query = self._query(key)
+        if query is None:
+            raise InputError(
+                tr("the camera has no {what}").format(what=_label(key)),
+                where=self.path,
+                advice=tr("Leave it as it is"),
+            )
+        number = self._number_of(key, value, query)
+        try:
+            self._ask(VIDIOC_S_CTRL, ControlValue(query.id, number))
+        except OSError as error:
+            raise InputError(
+                tr("the camera refuses {what} {value:g} ({why})").format(
+                    what=_label(key), value=value, why=error.strerror
+                ),
+                where=self.path,
+                advice=tr("Switch off what the camera does by itself, and lock again"),
+            ) from error
+
+    def _control(self, key: str) -> Setting | None:
+        query = self._query(key)
+        if query is None:
+            return None
+        try:
+            held = ControlValue(query.id, 0)
+            self._ask(VIDIOC_G_CTRL, held)
+        except OSError:
+            return None  # listed, and not to be read: cameras do that
+        kind, scale = CONTROLS[key], _KNOWN[key].scale
+        writable = not query.flags & (READ_ONLY | GRABBED | INACTIVE)
+        low, high, step, value = 0.0, 1.0, 1.0, float(held.value != 0)
+        if key == "exposure_auto":
+            value = float(held.value != EXPOSURE_MANUAL)
+        elif key == "power_line_hz":
+            high, step = 60.0, 10.0
+            value = MAINS_HZ.get(held.value, 0.0)
+        elif not kind.switch:
+            low, high = query.minimum * scale, query.maximum * scale
+            step, value = max(query.step, 1) * scale, held.value * scale
+        rounded = (round(x, 6) for x in (low, high, step, value))
+        return Setting(key, kind.label(), kind.unit, *rounded, writable)
+
+    def _query(self, key: str) -> QueryControl | None:
+        query = QueryControl(id=_KNOWN[key].number) if key in _KNOWN else None
+        if query is None:
+            return None
+        try:
+            self._ask(VIDIOC_QUERYCTRL, query)
+        except OSError:
+            return None
+        return None if query.flags & DISABLED else query
+
+    def _number_of(self, key: str, value: float, query: QueryControl) -> int:
+        """Return a value in the kernel's units."""
+        if key == "exposure_auto":
+            return self._automatic_exposure(query) if value else EXPOSURE_MANUAL
+        if key == "power_line_hz":
+            return min(MAINS_HZ, key=lambda number: abs(MAINS_HZ[number] - value))
+        number = round(value / _KNOWN[key].scale)
+        return min(max(number, query.minimum), query.maximum)
+
+    def _automatic_exposure(self, query: QueryControl) -> int:
+        """Return the way of automatic exposure that the camera has; most have only one."""
+        for number in (EXPOSURE_APERTURE, EXPOSURE_AUTO):
+            try:
+                self._ask(VIDIOC_QUERYMENU, QueryMenu(id=query.id, index=number))
+            except OSError:
+                continue
+            return number
+        return EXPOSURE_APERTURE
+
+    # The kernel
+
+    def _list(self, request: int, make: Callable[[int], Any]) -> Iterator[Any]:
+        for index in range(MOST):
+            item = make(index)
+            try:
+                self._ask(request, item)
+            except OSError:
+                return
+            yield item
+
+    def _ask(self, request: int, argument: Any) -> None:
+        try:
+            self._ioctl(self._file, request, argument)
+        except OSError as error:
+            if error.errno in (errno.ENODEV, errno.ENXIO, errno.EBADF):
+                raise gone(self.path, error) from error
+            raise
+
+
+def gone(place: str, error: OSError) -> CameraGone:
+    """Return why a camera cannot be used, from what the system says."""
+    found, advice = tr("the camera is not there"), tr("Plug it in")
+    if error.errno in (errno.EBUSY, errno.EAGAIN):
+        found, advice = tr("another program uses the camera"), tr("Close that program")
+    elif error.errno in (errno.EACCES, errno.EPERM):
+        found = tr("this user may not use the camera")
+        advice = tr("Add the user to the group video, and log in again")
+    return CameraGone(found, where=place, advice=advice)
+
+
+def _letters(code: int) -> str:
+    return bytes((code >> shift) & 0xFF for shift in (0, 8, 16, 24)).decode("latin-1").strip()
+
+
+def _label(key: str) -> str:
+    return CONTROLS[key].label() if key in CONTROLS else key

@@ -1,0 +1,107 @@
+"""Structures and request numbers of V4L2, as ``linux/videodev2.h`` has them."""
+
+from __future__ import annotations
+
+import ctypes
+
+VIDIOC_QUERYCAP = 0x80685600
+VIDIOC_ENUM_FMT = 0xC0405602
+VIDIOC_G_CTRL = 0xC008561B
+VIDIOC_S_CTRL = 0xC008561C
+VIDIOC_QUERYCTRL = 0xC0445624
+VIDIOC_QUERYMENU = 0xC02C5625
+VIDIOC_ENUM_FRAMESIZES = 0xC02C564A
+VIDIOC_ENUM_FRAMEINTERVALS = 0xC034564B
+
+CAPTURE = 1
+DISCRETE = 1
+DISABLED, GRABBED, READ_ONLY, INACTIVE = 0x1, 0x2, 0x4, 0x10
+
+
+class Capability(ctypes.Structure):
+    """``struct v4l2_capability``."""
+
+    _fields_ = (
+        ("driver", ctypes.c_char * 16),
+        ("card", ctypes.c_char * 32),
+        ("bus_info", ctypes.c_char * 32),
+        ("version", ctypes.c_uint32),
+        ("capabilities", ctypes.c_uint32),
+        ("device_caps", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32 * 3),
+    )
+
+
+class FormatDescription(ctypes.Structure):
+    """``struct v4l2_fmtdesc``."""
+
+    _fields_ = (
+        ("index", ctypes.c_uint32),
+        ("type", ctypes.c_uint32),
+        ("flags", ctypes.c_uint32),
+        ("description", ctypes.c_char * 32),
+        ("pixelformat", ctypes.c_uint32),
+        ("mbus_code", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32 * 3),
+    )
+
+
+class FrameSize(ctypes.Structure):
+    """``struct v4l2_frmsizeenum``: width and height, or least, most and step of both."""
+
+    _fields_ = (
+        ("index", ctypes.c_uint32),
+        ("pixel_format", ctypes.c_uint32),
+        ("type", ctypes.c_uint32),
+        ("values", ctypes.c_uint32 * 6),
+        ("reserved", ctypes.c_uint32 * 2),
+    )
+
+
+class FrameInterval(ctypes.Structure):
+    """``struct v4l2_frmivalenum``: a fraction of a second, or least, most and step of it."""
+
+    _fields_ = (
+        ("index", ctypes.c_uint32),
+        ("pixel_format", ctypes.c_uint32),
+        ("width", ctypes.c_uint32),
+        ("height", ctypes.c_uint32),
+        ("type", ctypes.c_uint32),
+        ("values", ctypes.c_uint32 * 6),
+        ("reserved", ctypes.c_uint32 * 2),
+    )
+
+
+class QueryControl(ctypes.Structure):
+    """``struct v4l2_queryctrl``."""
+
+    _fields_ = (
+        ("id", ctypes.c_uint32),
+        ("type", ctypes.c_uint32),
+        ("name", ctypes.c_char * 32),
+        ("minimum", ctypes.c_int32),
+        ("maximum", ctypes.c_int32),
+        ("step", ctypes.c_int32),
+        ("default_value", ctypes.c_int32),
+        ("flags", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32 * 2),
+    )
+
+
+class QueryMenu(ctypes.Structure):
+    """``struct v4l2_querymenu``, packed as the kernel has it."""
+
+    _pack_ = 1
+    _layout_ = "ms"
+    _fields_ = (
+        ("id", ctypes.c_uint32),
+        ("index", ctypes.c_uint32),
+        ("name", ctypes.c_char * 32),
+        ("reserved", ctypes.c_uint32),
+    )
+
+
+class ControlValue(ctypes.Structure):
+    """``struct v4l2_control``."""
+
+    _fields_ = (("id", ctypes.c_uint32), ("value", ctypes.c_int32))

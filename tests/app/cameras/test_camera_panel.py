@@ -1,0 +1,258 @@
+"""A technician chooses a camera, locks it, and is told when it is not as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+from fake_camera import C310, FORMATS, FakeCamera, FakeDriver
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDoubleSpinBox, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.cameras import panel as panel_module
+from app.cameras.dialog import CameraDialog
+from app.cameras.panel import CameraPanel
+from app.shell.context import AppContext
+from app.sources.camera.camera import Camera
+from app.sources.camera.driver import Device, Format
+from app.sources.camera.steadiness import SteadinessTest
+from app.sources.stream import Stream
+from app.widgets.source_button import SourceButton
+from gelpolight_core.session.camera_settings import CameraSettings
+
+WAIT_MS = 20_000
+
+
+@pytest.fixture
+def fake() -> FakeCamera:
+    return FakeCamera()
+
+
+@pytest.fixture
+def host(context: AppContext, fake: FakeCamera, qtbot: QtBot) -> Iterator[QWidget]:
+    """Return a window over which messages are shown, with the fake camera plugged in."""
+    context.cameras.driver = FakeDriver(fake)
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.resize(900, 700)
+    context.toasts.attach(window, lambda: None)
+    window.show()
+    yield window
+    context.toasts.clear()
+
+
+@pytest.fixture
+def panel(context: AppContext, host: QWidget, qtbot: QtBot) -> Iterator[CameraPanel]:
+    context.source.choose(context.cameras.infos()[0])
+    camera = context.cameras.of(context.source.info)
+    assert camera is not None
+    shown = CameraPanel(context.cameras, camera, host)
+    shown.resize(host.size())
+    shown.show()
+    shown.watch(True)
+    qtbot.waitUntil(lambda: shown.lock.isEnabled(), timeout=WAIT_MS)
+    yield shown
+    shown.watch(False)
+
+
+def values(camera: Camera) -> dict[str, float]:
+    return {control.key: control.value for control in camera.state.controls}
+
+
+def test_cameras_are_chosen_by_name_and_none_is_said_in_words(
+    context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
+) -> None:
+    twin = Device("046d:081b@SN2", C310.name, C310.model, "/dev/video2")
+    context.cameras.driver = FakeDriver(fake, FakeCamera(device=twin))
+    button = SourceButton(context=context, page="calibrate", none="No camera")
+    qtbot.addWidget(button)
+    button.list_cameras()
+    texts = [button.findChild(QAction, f"calibrate.source.camera.{n}").text() for n in (0, 1)]
+    assert texts == [f"{C310.name} (/dev/video0)", f"{C310.name} (/dev/video2)"]
+    assert not button.findChild(QAction, "calibrate.source.settings").isEnabled()
+    button.findChild(QAction, "calibrate.source.camera.1").trigger()
+    assert context.source.info is not None
+    assert context.source.info.detail == twin.identity
+    assert button.findChild(QAction, "calibrate.source.settings").isEnabled()
+    fake.plugged = False
+    context.cameras.driver = FakeDriver(fake)
+    button.list_cameras()
+    (none,) = [action for action in button.menu().actions() if ".camera." in action.objectName()]
+    assert (none.text(), none.isEnabled()) == ("No camera is plugged in", False)
+
+
+def test_the_dialog_opens_from_the_source_button_once_and_lets_the_camera_go(
+    context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
+) -> None:
+    button = SourceButton(context=context, page="inspect", none="No camera", parent=host)
+    button.list_cameras()
+    button.findChild(QAction, "inspect.source.camera.0").trigger()
+    button.findChild(QAction, "inspect.source.settings").trigger()
+    button.show_settings()
+    (dialog,) = host.findChildren(CameraDialog)
+    qtbot.waitUntil(lambda: dialog.panel.lock.isEnabled(), timeout=WAIT_MS)
+    dialog.close()
+    qtbot.waitUntil(lambda: fake.closed == 1, timeout=WAIT_MS)
+    assert fake.opened == 1
+
+
+def test_locking_fixes_what_the_camera_sets_by_itself(
+    context: AppContext, panel: CameraPanel, qtbot: QtBot
+) -> None:
+    assert "still sets some things by itself" in panel.said.text()
+    assert context.status.value.camera_note == "not locked"
+    assert not panel.findChild(QDoubleSpinBox, "camera.exposure_ms").isEnabled()
+    qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: "Locked" in panel.said.text(), timeout=WAIT_MS)
+    now = values(panel.camera)
+    assert (now["exposure_auto"], now["white_balance_auto"]) == (0.0, 0.0)
+    assert now["exposure_ms"] == 33.3  # what the camera had come to by itself
+    assert panel.findChild(QDoubleSpinBox, "camera.exposure_ms").isEnabled()
+    assert context.status.value.camera_note == ""
+
+
+def test_a_value_that_the_camera_does_not_take_is_shown_as_it_is(
+    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
+) -> None:
+    qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: "Locked" in panel.said.text(), timeout=WAIT_MS)
+    fake.ignores = {"gain"}
+    gain = panel.findChild(QDoubleSpinBox, "camera.gain")
+    gain.setValue(90.0)
+    qtbot.waitUntil(lambda: gain.value() == 64.0, timeout=WAIT_MS)
+    table = panel.locks._table["gain"]
+    assert (table.verdict.value, table.value) == ("fail", 64.0)
+    assert "Gain is 64, not 90" in table.advice
+
+
+def test_exposure_is_given_back_to_the_camera_by_its_switch(
+    panel: CameraPanel, qtbot: QtBot
+) -> None:
+    qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: values(panel.camera)["exposure_auto"] == 0.0, timeout=WAIT_MS)
+    automatic = panel.findChild(QCheckBox, "camera.exposure_auto")
+    qtbot.waitUntil(lambda: not automatic.isChecked(), timeout=WAIT_MS)
+    automatic.click()
+    qtbot.waitUntil(lambda: values(panel.camera)["exposure_auto"] == 1.0, timeout=WAIT_MS)
+
+
+def test_a_format_is_chosen_of_those_listed_and_compression_is_warned_of(
+    context: AppContext, panel: CameraPanel, qtbot: QtBot, caplog: pytest.LogCaptureFixture
+) -> None:
+    code = panel.findChild(QComboBox, "camera.format")
+    assert [code.itemText(n) for n in range(code.count())] == [
+        "MJPG (compressed)",
+        "YUYV (uncompressed)",
+    ]
+    assert not panel.formats.warning.isVisible()
+    code.setCurrentIndex(0)
+    code.activated.emit(0)
+    qtbot.waitUntil(
+        lambda: panel.camera.state.format == Format("MJPG", 128, 96, 30.0), timeout=WAIT_MS
+    )
+    qtbot.waitUntil(panel.formats.warning.isVisible, timeout=WAIT_MS)
+    assert "choose an uncompressed format" in panel.formats.warning.text()
+    assert "19 grey levels" in caplog.text
+
+
+def test_the_steadiness_test_ends_in_a_table(
+    panel: CameraPanel, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        panel_module, "SteadinessTest", lambda rate_hz: SteadinessTest(0.0, span_s=0.1)
+    )
+    qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
+    assert not panel.test.isEnabled()
+    qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
+    assert panel.steady._table.verdict.value == "pass"
+    assert "still sets some things by itself" in panel.said.text()  # steady by chance
+    qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: "Locked. Test" in panel.said.text(), timeout=WAIT_MS)
+    assert not panel.steady._table.figures  # it was of other settings
+    qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: "stands still: close" in panel.said.text(), timeout=WAIT_MS)
+    assert "camera_flicker_percent" in {figure.key for figure in panel.steady._table.figures}
+
+
+def test_an_unplugged_camera_is_said_and_its_return_too(
+    context: AppContext,
+    panel: CameraPanel,
+    fake: FakeCamera,
+    qtbot: QtBot,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
+    fake.plugged = False
+    qtbot.waitUntil(lambda: "not plugged in" in panel.said.text(), timeout=WAIT_MS)
+    assert not panel.lock.isEnabled()
+    fake.plugged = True
+    qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
+    assert f"{C310.name} is back." in caplog.text
+
+
+def test_a_camera_is_held_to_how_the_calibration_was_made(
+    context: AppContext,
+    panel: CameraPanel,
+    fake: FakeCamera,
+    qtbot: QtBot,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    fake.ignores = {"gain"}
+    controls = {"exposure_auto": 0.0, "exposure_ms": 12.0, "white_balance_auto": 0.0, "gain": 9.0}
+    stored = CameraSettings(C310.name, C310.identity, C310.model, "YUYV", (128, 96), 7.5, controls)
+    context.cameras.refer("the calibration", stored)
+    qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 12.0, timeout=WAIT_MS)
+    words = "not set as it was for the calibration: Gain is 64, not 9"
+    qtbot.waitUntil(lambda: words in caplog.text, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "Gain is 64, not 9" in panel.said.text(), timeout=WAIT_MS)
+    assert context.status.value.camera_note == "not set as for the calibration"
+    fake.ignores = set()
+    qtbot.waitUntil(panel.restore.isEnabled, timeout=WAIT_MS)
+    qtbot.mouseClick(panel.restore, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: values(panel.camera)["gain"] == 9.0, timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: not panel.restore.isEnabled(), timeout=WAIT_MS)
+    other = replace(stored, identity="1:2@x", model="0001:0002", name="Other")
+    context.cameras.refer("the calibration", other)
+    qtbot.waitUntil(lambda: "another camera than Other" in panel.said.text(), timeout=WAIT_MS)
+    assert not panel.restore.isEnabled()
+
+
+def test_how_a_camera_was_set_is_remembered_without_a_session(
+    context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
+) -> None:
+    context.cameras.set(panel.camera, {"exposure_auto": 0.0, "exposure_ms": 8.0})
+    qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 8.0, timeout=WAIT_MS)
+    panel.watch(False)
+    fake.forgets = True
+    context.cameras.driver = FakeDriver(fake)  # as after a new start
+    info = context.cameras.infos()[0]
+    stream = Stream(info.open())
+    stream.start()
+    stream.capture(1).result(20.0)
+    stream.stop()
+    assert fake.settings["exposure_ms"].value == 8.0
+
+
+def test_a_camera_that_nothing_can_set_is_said_to_be_one(
+    context: AppContext, host: QWidget, qtbot: QtBot
+) -> None:
+    context.cameras.driver = FakeDriver(FakeCamera(settings={}, formats=()))
+    camera = context.cameras.of(context.cameras.infos()[0])
+    assert camera is not None
+    shown = CameraPanel(context.cameras, camera, host)
+    shown.watch(True)
+    qtbot.waitUntil(lambda: "its maker's program" in shown.said.text(), timeout=WAIT_MS)
+    assert not shown.lock.isEnabled()
+    assert "does not tell which formats" in shown.formats.warning.text()
+    shown.watch(False)
+
+
+def test_every_control_has_a_name_for_those_who_cannot_see_it(panel: CameraPanel) -> None:
+    for kind in (QPushButton, QCheckBox, QComboBox, QDoubleSpinBox):
+        for widget in panel.findChildren(kind):
+            assert widget.objectName().startswith("camera."), widget
+            assert widget.accessibleName(), widget.objectName()
+    assert {f.code for f in FORMATS} == {"MJPG", "YUYV"}

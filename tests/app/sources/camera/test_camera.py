@@ -1,0 +1,265 @@
+"""A camera is opened slowly, set, lost and found again, and never holds anybody up."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_camera import C310, FORMATS, FakeCamera, FakeDriver, eventually
+
+from app.sources.camera.applying import differences, is_locked
+from app.sources.camera.camera import Camera
+from app.sources.camera.camera_source import CameraSource
+from app.sources.camera.driver import CameraGone, Device, Format
+from app.sources.source import SourceLost
+from app.sources.stopping import join_left_behind
+from app.sources.stream import Stream
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.camera_settings import CameraSettings
+
+LOCKED = {"exposure_auto": 0.0, "exposure_ms": 20.0, "white_balance_auto": 0.0}
+LOCKED |= {"white_balance_k": 5000.0, "gain": 30.0, "rate_follows_exposure": 0.0}
+STORED = CameraSettings(C310.name, C310.identity, C310.model, "YUYV", (64, 48), 30.0, LOCKED)
+
+
+@pytest.fixture
+def fake() -> FakeCamera:
+    return FakeCamera()
+
+
+@pytest.fixture
+def camera(fake: FakeCamera) -> Camera:
+    return Camera(FakeDriver(fake), C310, pause_s=0.02, silence_s=0.3)
+
+
+@pytest.fixture
+def stream(camera: Camera) -> Iterator[Stream]:
+    stream = Stream(CameraSource(camera))
+    stream.start()
+    yield stream
+    stream.stop()
+
+
+def values(camera: Camera) -> dict[str, float]:
+    return {control.key: control.value for control in camera.state.controls}
+
+
+def test_pictures_come_in_the_best_format_with_their_times(camera: Camera, stream: Stream) -> None:
+    frames = stream.capture(3).result(20.0)
+    assert frames[0].rgb.shape == (96, 128, 3)
+    assert frames[0].time_s < frames[1].time_s < frames[2].time_s <= time.monotonic()
+    red, _, blue = frames[0].rgb.mean(axis=(0, 1))
+    assert red > blue
+    assert camera.state.format == Format("YUYV", 128, 96, 7.5)
+    assert camera.state.offered == FORMATS
+    assert stream.source.size == (128, 96)
+
+
+def test_stored_settings_are_set_when_it_is_opened_and_read_back(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    stream.stop()
+    camera.want(STORED)
+    fake.calls.clear()
+    stream.start()
+    stream.capture(1).result(20.0)
+    assert values(camera).items() >= LOCKED.items()
+    assert all(applied.holds for applied in camera.state.applied)
+    assert camera.state.format == Format("YUYV", 64, 48, 30.0)
+    keys = [key for key, _ in fake.calls]
+    assert keys.index("exposure_auto") < keys.index("exposure_ms")
+    assert keys.index("white_balance_auto") < keys.index("white_balance_k")
+
+
+def test_what_a_camera_ignores_refuses_or_has_not_is_said(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    stream.capture(1).result(20.0)
+    fake.ignores, fake.refuses, fake.reads_back = {"gain"}, {"white_balance_k"}, {"sharpness": 9.0}
+    wanted = {**LOCKED, "exposure_ms": 9000.0, "sharpness": 20.0, "focus": 3.0}
+    applied = {a.key: a for a in camera.change(wanted).result(20.0)}
+    assert {key for key, a in applied.items() if not a.holds} == {
+        *("gain", "white_balance_k", "sharpness", "exposure_ms", "focus")
+    }
+    assert applied["exposure_ms"].sentence == "Exposure is 500 ms, not 9000 ms"
+    assert applied["white_balance_k"].why == "the camera refuses"
+    assert applied["focus"].sentence == "Focus: the camera has no such setting"
+    assert applied["sharpness"].read == 9.0
+
+
+def test_pictures_from_before_a_change_are_not_captured(camera: Camera, stream: Stream) -> None:
+    stream.capture(1).result(20.0)
+    camera.change({"exposure_auto": 0.0, "exposure_ms": 10.0}).result(20.0)
+    frames = stream.capture(2).result(20.0)
+    assert all(frame.settled for frame in frames)
+    assert frames[0].rgb[..., 0].mean() == pytest.approx(30.0, abs=2.0)
+
+
+def test_an_unplugged_camera_is_said_to_be_gone_and_goes_on_with_its_settings(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    camera.want(STORED)
+    stream.capture(1).result(20.0)
+    waiting = stream.capture(10_000)
+    fake.plugged, fake.forgets = False, True
+    assert "not plugged in" in eventually(
+        lambda: (lost := stream.figures().lost) and "plugged" in lost and lost
+    )
+    with pytest.raises(SourceLost):
+        waiting.result(20.0)
+    with pytest.raises(SourceLost, match="not plugged in"):
+        stream.capture(1).result(20.0)
+    with pytest.raises(CameraGone, match="cannot be set"):
+        camera.change({"gain": 1.0}).result(20.0)
+    fake.plugged = True
+    eventually(lambda: stream.figures().lost is None)
+    assert len(stream.capture(2).result(20.0)) == 2
+    assert values(camera).items() >= LOCKED.items()
+    assert fake.opened == 2
+
+
+def test_a_camera_that_comes_back_at_another_socket_goes_on(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    stream.capture(1).result(20.0)
+    fake.plugged = False
+    eventually(lambda: stream.figures().lost)
+    fake.device = Device("046d:081b@1-9:1.0", C310.name, C310.model, "/dev/video5")
+    fake.plugged = True
+    eventually(lambda: stream.figures().lost is None)
+
+
+def test_a_camera_that_goes_silent_is_opened_anew(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    fake.stops_after = 20
+    eventually(lambda: "no picture has come" in (stream.figures().lost or ""))
+    fake.stops_after = None
+    eventually(lambda: stream.figures().lost is None)
+    assert fake.opened >= 2
+    assert fake.closed == fake.opened - 1
+
+
+def test_a_camera_that_another_program_uses_is_waited_for(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    eventually(lambda: camera.state.phase == "live")
+    stream.stop()
+    fake.in_use = True
+    stream.start()
+    assert "cannot be opened" in eventually(lambda: stream.figures().lost)
+    fake.in_use = False
+    eventually(lambda: stream.figures().lost is None)
+
+
+def test_closing_while_it_is_being_opened_holds_nobody_up(fake: FakeCamera, camera: Camera) -> None:
+    fake.hangs = threading.Event()
+    stream = Stream(CameraSource(camera))
+    stream.start()
+    eventually(lambda: camera.state.phase == "opening")
+    stream.stop()
+    assert [thread.name for thread in threading.enumerate()].count(f"capture {C310.name}") == 0
+    stream.start()  # the driver still hangs in the first opening
+    fake.hangs.set()
+    assert len(stream.capture(1).result(20.0)) == 1
+    stream.stop()
+    assert join_left_behind(20.0)
+    assert fake.opened == fake.closed
+    assert camera.state.phase == "closed"
+
+
+def test_two_users_share_a_camera_and_the_last_one_closes_it(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    stream.capture(1).result(20.0)
+    other = Stream(CameraSource(camera))
+    other.start()
+    assert len(other.capture(2).result(20.0)) == 2
+    stream.stop()
+    assert len(other.capture(2).result(20.0)) == 2
+    other.stop()
+    assert (fake.opened, fake.closed) == (1, 1)
+
+
+def test_another_format_opens_the_camera_anew(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    stream.capture(1).result(20.0)
+    camera.want(STORED)
+    eventually(lambda: camera.state.format == Format("YUYV", 64, 48, 30.0))
+    eventually(lambda: values(camera).items() >= LOCKED.items())
+    camera.want(replace(STORED, controls={**LOCKED, "gain": 99.0}))
+    eventually(lambda: values(camera)["gain"] == 99.0)
+    assert fake.opened == 2  # a setting alone needs no new opening
+
+
+def test_settings_go_through_the_source_as_of_any_other(camera: Camera, stream: Stream) -> None:
+    stream.capture(1).result(20.0)
+    assert stream.source.set("exposure_auto", 0.0) == 0.0
+    assert stream.source.set("exposure_ms", 12.34) == 12.3  # the nearest that it can make
+    assert "gain" in {setting.key for setting in stream.source.settings()}
+    with pytest.raises(InputError, match="no setting focus"):
+        stream.source.set("focus", 1.0)
+
+
+def test_a_lock_fixes_what_the_camera_has_come_to_by_then(
+    camera: Camera, stream: Stream, fake: FakeCamera
+) -> None:
+    stream.capture(1).result(20.0)
+    fake.settings["exposure_ms"] = replace(fake.settings["exposure_ms"], value=21.0)
+    applied = {a.key: a for a in camera.lock().result(20.0)}
+    assert applied["exposure_ms"].read == 21.0
+    assert is_locked(camera.state.controls)
+    assert camera.wanted is not None
+    assert camera.wanted.controls.items() >= {"exposure_ms": 21.0, "exposure_auto": 0.0}.items()
+    assert camera.wanted.size == (128, 96)
+
+
+def test_what_another_program_sets_is_noticed(fake: FakeCamera) -> None:
+    told = threading.Event()
+    camera = Camera(FakeDriver(fake), C310, told=told.set, check_s=0.02)
+    stream = Stream(CameraSource(camera))
+    stream.start()
+    stream.capture(1).result(20.0)
+    told.clear()
+    fake.settings["gain"] = replace(fake.settings["gain"], value=3.0)
+    assert told.wait(20.0)
+    assert values(camera)["gain"] == 3.0
+    stream.stop()
+
+
+def test_a_camera_without_settings_or_formats_still_delivers() -> None:
+    fake = FakeCamera(formats=(), settings={})
+    stream = Stream(CameraSource(Camera(FakeDriver(fake), C310, pause_s=0.02)))
+    stream.start()
+    (frame,) = stream.capture(1).result(20.0)
+    assert frame.rgb.dtype == np.uint8
+    stream.stop()
+
+
+def test_a_fault_in_a_driver_is_logged_and_tried_again(
+    camera: Camera, stream: Stream, fake: FakeCamera, caplog: pytest.LogCaptureFixture
+) -> None:
+    stream.capture(1).result(20.0)
+    real, fake.light = fake.light, lambda number: 1 // 0
+    assert "fault of this program" in eventually(lambda: stream.figures().lost)
+    fake.light = real
+    eventually(lambda: stream.figures().lost is None)
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_what_is_not_as_it_was_stored_is_told(camera: Camera, stream: Stream) -> None:
+    stream.capture(1).result(20.0)
+    state = camera.state
+    assert differences(camera.settings_now(), state.format, state.controls) == ()
+    stored = replace(STORED, pixel_format="MJPG", controls={"gain": 10.0, "exposure_auto": 0.0})
+    assert differences(stored, state.format, state.controls) == (
+        "the pictures are 128x96, not 64x48 pixels",
+        "the format is YUYV, not MJPG",
+        "Exposure by the camera is on, not off",
+        "Gain is 64, not 10",
+    )

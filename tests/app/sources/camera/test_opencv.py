@@ -1,0 +1,189 @@
+"""Pictures through OpenCV: from a file as from a camera, with what OpenCV is known to do wrong."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from fake_camera import eventually
+
+from app.sources.camera import opencv
+from app.sources.camera.camera import Camera
+from app.sources.camera.camera_source import CameraSource
+from app.sources.camera.driver import CameraGone, Device, Format
+from app.sources.camera.opencv import OpenCvDriver
+from app.sources.source import Frame
+from app.sources.stream import Stream
+from gelpolight_core.errors import InputError
+
+SIZE = (64, 48)
+
+
+@pytest.fixture
+def film(tmp_path: Path) -> Device:
+    """Return a film of five pictures as a device: red at the left, blue at the right."""
+    path = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(
+        str(path), cv2.CAP_OPENCV_MJPEG, cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE
+    )
+    assert writer.isOpened()
+    for number in range(5):
+        bgr = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+        bgr[:, :32, 2] = 200 - 10 * number
+        bgr[:, 32:, 0] = 200
+        writer.write(bgr)
+    writer.release()
+    return Device("film", "film.avi", "", str(path))
+
+
+def test_a_film_is_read_as_from_a_camera_in_red_green_blue(film: Device) -> None:
+    driver = OpenCvDriver(interface=cv2.CAP_FFMPEG)
+    assert driver.formats(film) == ()
+    camera = driver.open(film, None)
+    before = time.monotonic()
+    pictures = [camera.read() for _ in range(5)]
+    got = camera.format
+    assert (got.code, got.width, got.height, got.rate_hz) == ("MJPG", 64, 48, 25.0)
+    assert got.compressed
+    for number, (rgb, came_s) in enumerate(filter(None, pictures)):
+        assert before <= came_s <= time.monotonic()
+        left, right = rgb[:, 4:28].mean(axis=(0, 1)), rgb[:, 36:60].mean(axis=(0, 1))
+        assert left == pytest.approx([200 - 10 * number, 0, 0], abs=6)
+        assert right == pytest.approx([0, 0, 200], abs=6)
+    with pytest.raises(CameraGone, match="no more pictures"):
+        camera.read()
+    assert camera.controls() == ()
+    with pytest.raises(InputError, match="does not take Gain"):
+        camera.set("gain", 1.0)
+    camera.close()
+
+
+def test_a_film_plays_the_camera_and_begins_again_where_it_ends(film: Device) -> None:
+    class Films(OpenCvDriver):
+        def devices(self) -> tuple[Device, ...]:
+            return (film,)
+
+    camera = Camera(Films(interface=cv2.CAP_FFMPEG), film, pause_s=0.3)
+    stream = Stream(CameraSource(camera))
+    seen: list[Frame] = []
+    stream.add_tap(seen.append)
+    stream.start()
+    assert "gives no more pictures" in eventually(lambda: stream.figures().lost)
+    last = seen[-1].rgb[:, 4:28].mean(axis=(0, 1))
+    assert last == pytest.approx([160, 0, 0], abs=6)
+    count = len(seen)
+    eventually(lambda: len(seen) > count)
+    stream.stop()
+    assert camera.state.format is not None
+    assert camera.state.format.code == "MJPG"
+
+
+def test_a_film_that_is_not_there_cannot_be_opened(tmp_path: Path) -> None:
+    absent = Device("film", "absent.avi", "", str(tmp_path / "absent.avi"))
+    with pytest.raises(CameraGone, match="cannot be opened"):
+        OpenCvDriver(interface=cv2.CAP_FFMPEG).open(absent, None)
+
+
+class Capture:
+    """A VideoCapture of Windows: takes everything, does what it likes."""
+
+    def __init__(self, place: Any, interface: int) -> None:
+        self.place, self.interface = place, interface
+        self.asked: list[tuple[int, float]] = []
+        self.values = {cv2.CAP_PROP_EXPOSURE: -6.0, cv2.CAP_PROP_GAIN: 10.0}
+        self.answers: list[Any] = []
+
+    def isOpened(self) -> bool:
+        return True
+
+    def set(self, number: int, value: float) -> bool:
+        self.asked.append((number, value))
+        self.values[number] = value
+        return True
+
+    def get(self, number: int) -> float:
+        return self.values.get(number, -1.0)
+
+    def grab(self) -> bool:
+        time.sleep(self.answers[0][0])
+        return self.answers[0][1] is not None
+
+    def retrieve(self) -> tuple[bool, Any]:
+        return True, self.answers.pop(0)[1]
+
+    def release(self) -> None:
+        self.values.clear()
+
+
+def test_a_format_is_asked_for_in_the_order_that_drivers_need() -> None:
+    made: list[Capture] = []
+
+    def capture(place: Any, interface: int) -> Capture:
+        made.append(Capture(place, interface))
+        return made[0]
+
+    device = Device("046d:081b@usb", "C310", "046d:081b", "2")
+    driver = OpenCvDriver(capture, interface=cv2.CAP_DSHOW)
+    camera = driver.open(device, Format("YUYV", 1280, 960, 7.5))
+    assert (made[0].place, made[0].interface) == (2, cv2.CAP_DSHOW)
+    assert [number for number, _ in made[0].asked] == [
+        cv2.CAP_PROP_FOURCC,
+        cv2.CAP_PROP_FRAME_WIDTH,
+        cv2.CAP_PROP_FRAME_HEIGHT,
+        cv2.CAP_PROP_FPS,
+    ]
+    assert camera.format == Format("YUYV", 1280, 960, 7.5)
+    exposure = {s.key: s for s in camera.controls()}["exposure_ms"]
+    assert exposure.value == pytest.approx(1000 / 64)
+    camera.set("exposure_ms", 8.0)  # the nearest power of two is 1/128 s
+    assert made[0].asked[-1] == (cv2.CAP_PROP_EXPOSURE, -7.0)
+
+
+def test_the_picture_that_a_timeout_repeats_is_not_taken_for_a_new_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(opencv, "SLOW_READ_S", 0.02)
+    capture = Capture(0, 0)
+    device = Device("a", "camera", "", "0")
+    camera = OpenCvDriver(lambda *_: capture, interface=cv2.CAP_DSHOW).open(device, None)
+    grey = np.full((4, 6), 3, np.uint8)
+    capture.answers = [(0.05, grey), (0.0, grey), (0.0, None)]
+    assert camera.read() is None
+    capture.answers.pop(0)
+    read = camera.read()
+    assert read is not None
+    assert read[0].shape == (4, 6, 3)
+    with pytest.raises(CameraGone):
+        camera.read()
+
+
+def test_cameras_are_told_apart_by_what_they_are_not_by_their_number(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    port = tmp_path / "devices" / "usb1" / "1-2" / "1-2:1.0"
+    port.mkdir(parents=True)
+    (tmp_path / "video3").mkdir()
+    (tmp_path / "video3" / "device").symlink_to(port)
+    assert opencv._linux_port("/dev/video3", tmp_path) == "1-2:1.0"
+    (port.parent / "serial").write_text("5A1F33B0\n")
+    assert opencv._linux_port("/dev/video3", tmp_path) == "5A1F33B0/1.0"
+    (port.parent / "serial").write_text("00000000\n")  # what cheap cameras all have
+    assert opencv._linux_port("/dev/video3", tmp_path) == "1-2:1.0"
+    assert opencv._linux_port("/dev/video9", tmp_path) == "/dev/video9"
+
+    found = SimpleNamespace(name="UVC Camera", path="/dev/video3", vid=0x46D, pid=0x81B, index=3)
+    module = ModuleType("cv2_enumerate_cameras")
+    module.enumerate_cameras = lambda interface: [found]  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "cv2_enumerate_cameras", module)
+    (device,) = OpenCvDriver().devices()
+    assert device.identity.startswith("046d:081b@")
+    assert device.name == "UVC Camera"
+    monkeypatch.setattr(opencv, "LINUX", False)
+    (device,) = OpenCvDriver(interface=cv2.CAP_DSHOW).devices()
+    assert device.place == "3"

@@ -1,0 +1,227 @@
+"""What Linux tells of a camera, and what is asked of it, in the kernel's own structures."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.sources.camera import v4l2
+from app.sources.camera import v4l2_structures as kernel_side
+from app.sources.camera.driver import CameraGone, Format
+from app.sources.camera.v4l2 import V4l2
+from gelpolight_core.errors import InputError
+
+EXPOSURE_AUTO, EXPOSURE, FRAME_RATE = 0x9A0901, 0x9A0902, 0x9A0903
+WHITE_AUTO, WHITE, GAIN, MAINS = 0x98090C, 0x98091A, 0x980913, 0x980918
+
+
+def code_of(letters: str) -> int:
+    return int.from_bytes(letters.encode(), "little")
+
+
+class Kernel:
+    """Answers as the driver of a UVC camera does: a menu of two ways of exposure, 100 us units."""
+
+    def __init__(self) -> None:
+        self.values = {EXPOSURE_AUTO: 3, EXPOSURE: 156, FRAME_RATE: 1, WHITE_AUTO: 1}
+        self.values |= {WHITE: 4600, GAIN: 0, MAINS: 2}
+        self.ranges = {
+            EXPOSURE_AUTO: (0, 3, 1),
+            EXPOSURE: (1, 10000, 1),
+            FRAME_RATE: (0, 1, 1),
+            WHITE_AUTO: (0, 1, 1),
+            WHITE: (2800, 6500, 10),
+            GAIN: (0, 255, 1),
+            MAINS: (0, 2, 1),
+        }
+        self.sizes = {"YUYV": [(640, 480), (1280, 960)], "MJPG": [(1280, 960)]}
+        self.error = 0
+        self.asked: list[tuple[int, int]] = []
+
+    def __call__(self, _file: int, request: int, argument: Any) -> int:
+        if self.error:
+            raise OSError(self.error, "broken")
+        {
+            kernel_side.VIDIOC_QUERYCAP: self._capability,
+            kernel_side.VIDIOC_ENUM_FMT: self._format,
+            kernel_side.VIDIOC_ENUM_FRAMESIZES: self._size,
+            kernel_side.VIDIOC_ENUM_FRAMEINTERVALS: self._interval,
+            kernel_side.VIDIOC_QUERYCTRL: self._query,
+            kernel_side.VIDIOC_QUERYMENU: self._menu,
+            kernel_side.VIDIOC_G_CTRL: self._get,
+            kernel_side.VIDIOC_S_CTRL: self._set,
+        }[request](argument)
+        return 0
+
+    def _capability(self, a: Any) -> None:
+        a.card = b"UVC Camera (046d:081b)"
+
+    def _format(self, a: Any) -> None:
+        assert a.type == 1
+        a.pixelformat = code_of(_at(list(self.sizes), a.index))
+
+    def _size(self, a: Any) -> None:
+        sizes = next(sizes for name, sizes in self.sizes.items() if code_of(name) == a.pixel_format)
+        a.type = 1
+        a.values[0], a.values[1] = _at(sizes, a.index)
+
+    def _interval(self, a: Any) -> None:
+        a.type = 1
+        seconds, parts = _at([(1, 30), (2, 15)], a.index)
+        a.values[0], a.values[1] = seconds, parts
+
+    def _query(self, a: Any) -> None:
+        if a.id not in self.ranges:
+            raise OSError(errno.EINVAL, "no such control")
+        a.minimum, a.maximum, a.step = self.ranges[a.id]
+        held_by = {EXPOSURE: (EXPOSURE_AUTO, 3), WHITE: (WHITE_AUTO, 1)}.get(a.id)
+        if held_by and self.values[held_by[0]] == held_by[1]:
+            a.flags = kernel_side.INACTIVE
+
+    def _menu(self, a: Any) -> None:
+        if a.id != EXPOSURE_AUTO or a.index not in (1, 3):
+            raise OSError(errno.EINVAL, "no such item")
+
+    def _get(self, a: Any) -> None:
+        a.value = self.values[a.id]
+
+    def _set(self, a: Any) -> None:
+        self.asked.append((a.id, a.value))
+        if a.id == EXPOSURE_AUTO and a.value not in (1, 3):
+            raise OSError(errno.EINVAL, "Invalid argument")
+        low, high, _ = self.ranges[a.id]
+        self.values[a.id] = min(max(a.value, low), high)
+
+
+def _at(items: list[Any], index: int) -> Any:
+    if index >= len(items):
+        raise OSError(errno.EINVAL, "the end")
+    return items[index]
+
+
+@pytest.fixture
+def kernel() -> Kernel:
+    return Kernel()
+
+
+@pytest.fixture
+def camera(kernel: Kernel, tmp_path: Path) -> Iterator[V4l2]:
+    (tmp_path / "video0").touch()
+    opened = V4l2(str(tmp_path / "video0"), ioctl=kernel)
+    yield opened
+    opened.close()
+
+
+def values(camera: V4l2) -> dict[str, float]:
+    return {setting.key: setting.value for setting in camera.controls()}
+
+
+def test_the_requests_are_those_of_the_kernels_header() -> None:
+    """Size and direction are parts of the numbers, so a wrong structure would not fit its own."""
+    for request, structure in (
+        (kernel_side.VIDIOC_QUERYCAP, kernel_side.Capability),
+        (kernel_side.VIDIOC_ENUM_FMT, kernel_side.FormatDescription),
+        (kernel_side.VIDIOC_ENUM_FRAMESIZES, kernel_side.FrameSize),
+        (kernel_side.VIDIOC_ENUM_FRAMEINTERVALS, kernel_side.FrameInterval),
+        (kernel_side.VIDIOC_QUERYCTRL, kernel_side.QueryControl),
+        (kernel_side.VIDIOC_QUERYMENU, kernel_side.QueryMenu),
+        (kernel_side.VIDIOC_G_CTRL, kernel_side.ControlValue),
+        (kernel_side.VIDIOC_S_CTRL, kernel_side.ControlValue),
+    ):
+        assert (request >> 16) & 0x3FFF == ctypes.sizeof(structure), structure.__name__
+
+
+def test_every_format_size_and_rate_is_listed(camera: V4l2) -> None:
+    assert camera.name() == "UVC Camera (046d:081b)"
+    assert camera.formats() == (
+        Format("YUYV", 640, 480, 30.0),
+        Format("YUYV", 640, 480, 7.5),
+        Format("YUYV", 1280, 960, 30.0),
+        Format("YUYV", 1280, 960, 7.5),
+        Format("MJPG", 1280, 960, 30.0),
+        Format("MJPG", 1280, 960, 7.5),
+    )
+
+
+def test_settings_are_told_in_units_that_people_know(camera: V4l2) -> None:
+    found = {setting.key: setting for setting in camera.controls()}
+    exposure = found["exposure_ms"]
+    assert (exposure.value, exposure.low, exposure.high, exposure.step) == (15.6, 0.1, 1000.0, 0.1)
+    assert not exposure.writable  # the camera exposes by itself
+    assert found["exposure_auto"].value == 1.0
+    assert found["power_line_hz"].value == 60.0
+    assert "focus" not in found
+
+
+def test_exposure_is_set_once_the_camera_leaves_it_alone(camera: V4l2, kernel: Kernel) -> None:
+    camera.set("exposure_auto", 0.0)
+    camera.set("exposure_ms", 9.5)
+    camera.set("white_balance_auto", 0.0)
+    camera.set("white_balance_k", 5000.0)
+    camera.set("power_line_hz", 50.0)
+    assert kernel.values[EXPOSURE_AUTO] == 1  # manual, where folk says 0.25
+    assert kernel.values[EXPOSURE] == 95
+    assert values(camera) | {"exposure_ms": 9.5, "white_balance_k": 5000.0} == values(camera)
+    assert {s.key: s.writable for s in camera.controls()}["exposure_ms"]
+    assert kernel.values[MAINS] == 1
+
+
+def test_automatic_exposure_is_the_kind_that_the_camera_has(camera: V4l2, kernel: Kernel) -> None:
+    camera.set("exposure_auto", 0.0)
+    camera.set("exposure_auto", 1.0)
+    assert kernel.values[EXPOSURE_AUTO] == 3
+
+
+def test_a_value_out_of_range_is_taken_into_it(camera: V4l2, kernel: Kernel) -> None:
+    camera.set("gain", 1e6)
+    assert kernel.values[GAIN] == 255
+
+
+def test_what_the_camera_has_not_or_refuses_is_said(camera: V4l2, kernel: Kernel) -> None:
+    with pytest.raises(InputError, match="the camera has no Focus"):
+        camera.set("focus", 1.0)
+    kernel.ranges[EXPOSURE_AUTO] = (0, 0, 1)
+    kernel._menu = lambda a: _at([], a.index)  # type: ignore[method-assign]
+
+    def refuse(a: Any) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    kernel._set = refuse  # type: ignore[method-assign]
+    with pytest.raises(InputError, match=r"refuses Gain 3 \(Input/output error\)"):
+        camera.set("gain", 3.0)
+
+
+def test_an_unplugged_camera_is_gone_not_without_settings(camera: V4l2, kernel: Kernel) -> None:
+    kernel.error = errno.ENODEV
+    with pytest.raises(CameraGone, match="not there"):
+        camera.controls()
+    with pytest.raises(CameraGone):
+        camera.set("gain", 1.0)
+
+
+def test_a_range_of_sizes_offers_the_usual_ones(camera: V4l2, kernel: Kernel) -> None:
+    def stepwise(a: Any) -> None:
+        a.type = 3
+        a.values[:] = [32, 1280, 2, 32, 720, 2]
+
+    kernel._size = stepwise  # type: ignore[method-assign]
+    sizes = {(f.width, f.height) for f in camera.formats()}
+    assert sizes == {(640, 480), (800, 600), (1280, 720)}
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [(errno.ENOENT, "not there"), (errno.EBUSY, "another program"), (errno.EACCES, "group video")],
+)
+def test_why_a_camera_cannot_be_used_is_said(number: int, words: str) -> None:
+    assert words in str(v4l2.gone("/dev/video9", OSError(number, "no")))
+
+
+def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CameraGone, match="Plug it in"):
+        V4l2(str(tmp_path / "video7"))

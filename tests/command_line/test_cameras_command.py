@@ -1,0 +1,43 @@
+"""Which cameras are there, in words and as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from fake_camera import C310, FORMATS, Device, FakeCamera, FakeDriver
+
+from app.command_line.cameras import report
+from app.command_line.main import main
+
+
+def test_without_a_camera_it_is_said_what_to_do(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = ModuleType("cv2_enumerate_cameras")
+    module.enumerate_cameras = lambda interface: []  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "cv2_enumerate_cameras", module)
+    assert main(["cameras"]) == 0
+    assert "No camera is plugged in" in capsys.readouterr().out
+
+
+def test_formats_and_settings_are_listed_and_the_best_format_is_marked(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    busy = FakeCamera(device=Device("1:2@x", "Other", "0001:0002", "/dev/video2"), in_use=True)
+    fake = FakeCamera()
+    assert report(FakeDriver(fake, busy), tmp_path / "cameras.json") == 0
+    said = capsys.readouterr().out
+    assert f"{C310.name}  [046d:081b@SN1]  /dev/video0" in said
+    assert "* YUYV 128 x 96 at 7.5 pictures/s\n" in said
+    assert "  MJPG 64 x 48 at 30 pictures/s, compressed" in said
+    assert "Not locked" in said
+    assert "Other: the camera cannot be opened" in said
+    first, second = json.loads((tmp_path / "cameras.json").read_text())["cameras"]
+    assert len(first["formats"]) == len(FORMATS)
+    assert first["controls"]["exposure_ms"]["unit"] == "ms"
+    assert second["trouble"].startswith("Other: ")
+    assert (fake.opened, fake.closed) == (1, 1)

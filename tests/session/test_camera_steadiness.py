@@ -1,0 +1,91 @@
+"""A camera that still moves after it was locked is found out by its own pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gelpolight_core.quality import QualityTable, Verdict
+from gelpolight_core.session.camera_steadiness import BANDS, band_levels, judge_steadiness
+
+TIMES = np.arange(60) / 20.0
+SCENE = np.array([0.35, 0.30, 0.25])
+
+
+def judged(gain: NDArray[np.float64], **options: float) -> QualityTable:
+    """Judge pictures of one scene whose light is multiplied, per frame, band and channel."""
+    rng = np.random.default_rng(1)
+    levels = SCENE * np.broadcast_to(gain, (len(TIMES), BANDS, 3))
+    return judge_steadiness(levels + rng.normal(0.0, 5e-5, levels.shape), TIMES, **options)
+
+
+def failing(table: QualityTable) -> set[str]:
+    return {figure.key for figure in table.figures if figure.verdict is not Verdict.PASS}
+
+
+def test_a_camera_that_stands_still_passes() -> None:
+    table = judged(np.ones((1, 1, 1)), rate_hz=20.0)
+    assert failing(table) == set()
+    assert table["camera_rate_percent"].value == pytest.approx(100.0)
+
+
+def test_exposure_that_the_camera_still_sets_is_a_drift() -> None:
+    table = judged(1.0 + 0.03 * (TIMES / TIMES[-1])[:, None, None])
+    assert failing(table) == {"camera_drift_percent"}
+    assert table["camera_drift_percent"].value == pytest.approx(3.0, rel=0.03)
+
+
+def test_white_balance_that_the_camera_still_sets_is_a_drift_of_colour() -> None:
+    gain = np.ones((len(TIMES), 1, 3))
+    gain[:, 0, 0] += 0.012 * TIMES / TIMES[-1]
+    gain[:, 0, 2] -= 0.012 * TIMES / TIMES[-1]
+    table = judged(gain)
+    assert failing(table) == {"camera_colour_drift_percent"}
+    assert table["camera_colour_drift_percent"].value == pytest.approx(1.2, rel=0.05)
+
+
+def test_lamps_flicker_in_stripes_that_the_whole_picture_hides() -> None:
+    phase = 2.0 * np.pi * (np.arange(BANDS)[None, :] / BANDS + 0.37 * np.arange(60)[:, None])
+    table = judged(1.0 + 0.03 * np.sin(phase)[..., None])
+    assert failing(table) == {"camera_flicker_percent"}
+    assert table["camera_flicker_percent"].value == pytest.approx(3.0 / np.sqrt(2.0), rel=0.05)
+
+
+def test_a_picture_that_is_repeated_or_late_is_found() -> None:
+    table = judged(np.ones((1, 1, 1)), rate_hz=40.0, repeated=40)
+    assert failing(table) == {"camera_repeated", "camera_rate_percent"}
+    assert table["camera_repeated"].verdict is Verdict.FAIL
+
+
+def test_in_the_dark_nothing_can_be_said() -> None:
+    table = judged(np.full((1, 1, 1), 0.005))
+    assert table["camera_level"].verdict is Verdict.FAIL
+    assert "LEDs" in table["camera_level"].advice
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("rows", [7, 96, 101])
+def test_bands_are_the_means_of_rows(kind: type, rows: int) -> None:
+    full = np.iinfo(kind).max
+    rgb = np.random.default_rng(2).integers(0, full, (rows, 40, 3), endpoint=True).astype(kind)
+    bands = band_levels(rgb)
+    assert bands.shape == (BANDS, 3)
+    if rows == 96:
+        expected = rgb.reshape(BANDS, 6, 40, 3).mean(axis=(1, 2)) / full
+        assert bands == pytest.approx(expected, abs=1e-9)
+
+
+@given(st.floats(0.9, 1.1), st.floats(0.05, 2.5))
+def test_a_steady_camera_passes_at_any_brightness(gain: float, brightness: float) -> None:
+    levels = np.broadcast_to(SCENE * gain * brightness, (30, BANDS, 3))
+    assert failing(judge_steadiness(levels, np.arange(30) / 30.0)) <= {"camera_level"}
+
+
+def test_too_few_pictures_are_refused() -> None:
+    with pytest.raises(ValueError, match="levels"):
+        judge_steadiness(np.ones((2, BANDS, 3)), np.arange(2.0))
+    with pytest.raises(ValueError, match="times"):
+        judge_steadiness(np.ones((4, BANDS, 3)), np.arange(3.0))
