@@ -180,6 +180,8 @@ def main() -> None:
             settings_file=Path(folder) / "desktop.ini", log_folder=Path(folder) / "log"
         )
         context.workspace.folder = Path(folder) / "workspace"
+        # As a person would have chosen it.
+        context.settings.reconstruction = (options.model or "full", options.effort)
         measurement = Measurement(options, context)
         measurement.start()
         QTimer.singleShot(int(1e3 * options.warm_up), measurement.begin)

@@ -132,7 +132,7 @@ class Library(QObject):
             from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
             calibration = read_calibration(path)
-            live = Reconstructor(calibration, effort="balanced")
+            live = Reconstructor(calibration, effort="fast")
             tell(WARM_FROM)
             live.warm_up()
             warm_up()

@@ -134,7 +134,7 @@ class Settings:
     @property
     def reconstruction(self) -> tuple[str, str]:
         """Model and effort of the live depth; whether there are such is for who uses them."""
-        model, _, effort = self._text("reconstruction", "full/balanced").partition("/")
+        model, _, effort = self._text("reconstruction", "full/fast").partition("/")
         return model, effort
 
     @reconstruction.setter

@@ -25,7 +25,7 @@ class Way:
     """
 
     model: str = FULL
-    effort: str = "balanced"
+    effort: str = "fast"
 
     @property
     def label(self) -> str:

@@ -49,7 +49,7 @@ def test_every_way_is_offered_with_the_errors_that_were_measured(
     choice.take(full, full)
     texts = [choice.box.itemText(k) for k in range(choice.box.count())]
     assert len(texts) == len(WAYS) == 4
-    assert "balanced   0.44 / 0.22 %" in choice.box.currentText()
+    assert "fast   0.84 / 0.40 %" in choice.box.currentText()
     assert "2.0 / 2.6 %" in texts[-1]
     errors = [FOUND[way] for way in WAYS[:3]]
     assert errors == sorted(errors, key=lambda e: e.height_percent, reverse=True)
@@ -110,5 +110,5 @@ def test_settings_that_name_no_way_count_as_the_usual_one(
     choice: WayChoice, context: AppContext
 ) -> None:
     context.settings.reconstruction = ("full", "heroic")
-    assert choice.way == Way("full", "balanced")
+    assert choice.way == Way("full", "fast")
     assert "2 ms" in way_text(choice.way, 2.0)
