@@ -31,6 +31,7 @@ from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.reading import open_file, parse_json, read_file
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 ENDING = ".gplcal"
 STATE = "workspace.json"
 COPY_BYTES = 1 << 20
+NAME_BYTES = 160
+DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{n}{k}" for n in ("COM", "LPT") for k in range(10))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,11 +184,12 @@ class Workspace:
     def in_use(self) -> Path | None:
         """The calibration in use; None where none was chosen or it is gone."""
         try:
-            stored = json.loads((self.folder / STATE).read_text("utf-8"))["in_use"]
+            stored = parse_json(read_file(self.folder / STATE))["in_use"]
             path = self.folder / stored
-        except (OSError, ValueError, TypeError, KeyError):
+            inside = ".." not in path.parts and path.is_relative_to(self.sensors_folder)
+            return path if inside and path.is_file() else None
+        except (InputError, OSError, ValueError, TypeError, KeyError):
             return None  # a lost choice is made again by a click
-        return path if path.is_file() else None
 
     def use(self, path: Path | None) -> None:
         """Choose the calibration that is measured with, or none.
@@ -302,6 +306,10 @@ def default_folder() -> Path:
 def folder_name(text: str) -> str:
     """Return a name that every file system takes, for any text."""
     name = re.sub(r"[^\w.+-]+", "_", text).strip("._ ")[:80]
+    # A letter may take four bytes, and names end at 255; Windows keeps some names for devices.
+    name = name.encode("utf-8", "ignore")[:NAME_BYTES].decode("utf-8", "ignore").rstrip("._ ")
+    if name.split(".")[0].upper() in DEVICES:
+        name = f"{name}_" if "." not in name else f"_{name}"
     return name or "unnamed"
 
 
@@ -329,7 +337,7 @@ def _write_bytes(path: Path, data: bytes) -> None:
 
 def _copy(source: Path, target: Path) -> None:
     try:
-        stream = source.open("rb")
+        stream = open_file(source)
     except OSError as error:
         raise _refused(error, source) from error
     with stream:

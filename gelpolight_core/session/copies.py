@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.wholeness import unreadable
+from gelpolight_core.reading import unreadable
 from gelpolight_core.translation import tr
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import NAME_LIMIT, brief, is_file_name, plain_text
 from gelpolight_core.translation import tr
 
 
@@ -19,7 +20,7 @@ class Table:
     path: Path
 
     def _key(self, key: str) -> str:
-        return f"[{self.name}] {key}" if self.name else key
+        return f"[{self.name}] {brief(key)}" if self.name else brief(key)
 
     def wrong(self, key: str, what: str) -> InputError:
         """Return the error about a key; that it is missing goes before what else is said."""
@@ -36,7 +37,12 @@ class Table:
         value = self.content.get(key)
         if not isinstance(value, str) or not value.strip():
             raise self.wrong(key, tr("is not a text"))
-        return value
+        try:
+            return plain_text(value, NAME_LIMIT)
+        except ValueError as error:
+            raise self.wrong(
+                key, tr("is not a plain text of at most {n} characters").format(n=NAME_LIMIT)
+            ) from error
 
     def whole(self, key: str) -> int:
         """Return a whole number."""
@@ -51,7 +57,7 @@ class Table:
         good = isinstance(value, int | float) and not isinstance(value, bool)
         if not good or not low <= value <= high:  # type: ignore[operator]
             text = tr("is {value}, not a number from {low} to {high}")
-            raise self.wrong(key, text.format(value=str(value)[:40], low=low, high=high))
+            raise self.wrong(key, text.format(value=brief(value, 40), low=low, high=high))
         return float(value)  # type: ignore[arg-type]
 
     def table(self, key: str) -> Table:
@@ -60,6 +66,13 @@ class Table:
         if not isinstance(value, dict):
             raise self.wrong(key, tr("is not a table"))
         return Table(value, key, self.path)
+
+    def file_names(self) -> tuple[str, ...]:
+        """Return the keys, each of which is to name a file in a stage's folder."""
+        for key in self.content:
+            if not is_file_name(key):
+                raise self.wrong(key, tr("is not the name of a picture in the stage's folder"))
+        return tuple(self.content)
 
     def no_more(self, *known: str) -> None:
         """Refuse keys other than those known."""
