@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import stat
 import tomllib
 from pathlib import Path
@@ -19,8 +20,11 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 TEXT_LIMIT = 1_000_000
-# A key of TOML stands on one line, and one of n parts costs n squared.
-LINE_LIMIT = 20_000
+# A key of n parts costs n squared, and nobody writes one of more than three.
+MOST_PARTS = 20
+_LONG_TEXT = re.compile(r'"""|\'\'\'')
+_TEXT = re.compile(r""""(?:[^"\\\n]|\\.)*"?|'[^'\n]*'?""")
+_BETWEEN = re.compile(r"[\n,=\[\]{}]")
 NAME_LIMIT = 200
 LINES = "\n\t"
 
@@ -83,8 +87,12 @@ def parse_toml(data: bytes) -> dict[str, Any]:
         If it is none, or nobody would write it so.
     """
     text = data.decode("utf-8-sig")
-    if max(map(len, text.splitlines()), default=0) > LINE_LIMIT:
-        raise ValueError(f"a line has more than {LINE_LIMIT} characters")
+    if _LONG_TEXT.search(text):
+        raise ValueError("it holds a text of several lines")
+    # What is left between these has no dots but those of one number or of one key.
+    for part in _BETWEEN.split(_TEXT.sub("", text)):
+        if part.partition("#")[0].count(".") > MOST_PARTS:
+            raise ValueError(f"a key has more than {MOST_PARTS} parts")
     try:
         return tomllib.loads(text)
     except RecursionError as error:

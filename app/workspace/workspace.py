@@ -30,11 +30,12 @@ from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.export.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.reading import open_file, parse_json, read_file
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
+    from gelpolight_core.calibration.calibration import Calibration
     from gelpolight_core.records.records import Records
 
 ENDING = ".gplcal"
@@ -150,6 +151,26 @@ class Workspace:
         make_folder(folder)
         return _free(folder / f"{folder_name(name)}{ENDING}")
 
+    def keep_calibration(self, calibration: Calibration, name: str) -> Path:
+        """Write a new calibration into the library, whole or not at all; return its place.
+
+        Another program that uses the workspace may take a name at this moment.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        from gelpolight_core.calibration.file import write_calibration
+
+        while True:
+            path = self.calibration_path(calibration.sensor.serial, name)
+            try:
+                write_calibration(calibration, path, new=True)
+            except NameTakenError:
+                continue
+            return path
+
     def entries(self) -> tuple[Entry, ...]:
         """Return every calibration, by sensor, newest first; broken ones too.
 
@@ -229,8 +250,7 @@ class Workspace:
             if entry.summary is not None and entry.summary.identity == summary.identity:
                 return known
         refuse_damaged_arrays(source)
-        target = _free(folder / f"{folder_name(source.stem)}{ENDING}")
-        _copy(source, target)
+        target = _copy_new(source, folder / f"{folder_name(source.stem)}{ENDING}")
         beside = validation_path(source)
         if beside.is_file():
             _copy(beside, validation_path(target))
@@ -335,13 +355,24 @@ def _write_bytes(path: Path, data: bytes) -> None:
     write_atomically(path, write)
 
 
-def _copy(source: Path, target: Path) -> None:
+def _copy_new(source: Path, wanted: Path) -> Path:
+    """Copy a file to a place that no other has, and return that."""
+    while True:
+        target = _free(wanted)
+        try:
+            _copy(source, target, new=True)
+        except NameTakenError:
+            continue
+        return target
+
+
+def _copy(source: Path, target: Path, *, new: bool = False) -> None:
     try:
         stream = open_file(source)
     except OSError as error:
         raise _refused(error, source) from error
     with stream:
-        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, COPY_BYTES))
+        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, COPY_BYTES), new=new)
 
 
 def _move(source: Path, target: Path) -> None:

@@ -52,11 +52,22 @@ MOST_CROSSTALK = 100.0
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
 
-def write_calibration(calibration: Calibration, path: Path) -> None:
+def write_calibration(calibration: Calibration, path: Path, *, new: bool = False) -> None:
     """Write a calibration file, whole or not at all.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        To be written.
+    path : Path
+        Where.
+    new : bool, optional
+        Whether it never takes the place of another file.
 
     Raises
     ------
+    NameTakenError
+        If it is to be new and there is a file of its name.
     InputError
         If the file cannot be written.
     """
@@ -83,7 +94,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
             ):
                 archive.writestr(zipfile.ZipInfo(name, ZIP_TIME), data, zipfile.ZIP_DEFLATED)
 
-    write_atomically(path, write)
+    write_atomically(path, write, new=new)
 
 
 def read_calibration(path: Path) -> Calibration:

@@ -142,7 +142,7 @@ def _texts(table: Table, key: str) -> tuple[str, ...]:
     value: Any = table.content.get(key)
     if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
         raise table.wrong(key, tr("is not a list of texts"))
-    return tuple(value)
+    return tuple(brief(text) for text in value)
 
 
 def _lengths(table: Table, key: str) -> tuple[float, ...]:

@@ -157,8 +157,10 @@ class ProtocolRun:
         InputError
             If ``truth.csv`` cannot be written.
         """
-        rows = {**self._rows, press.file: _row(press)}
         order = {wanted.file: k for k, wanted in enumerate(self.wanted)}
+        # What another program has added to the same run meanwhile stays.
+        there = {row[0]: row for row in _read_rows(self.presses / TRUTH) if row[0] in order}
+        rows = {**self._rows, **there, press.file: _row(press)}
         _write_rows([rows[file] for file in sorted(rows, key=order.__getitem__)], self.presses)
         self._rows = rows
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import brief
 from gelpolight_core.translation import tr
 
 DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
@@ -53,6 +54,6 @@ def _plain_words(error: sqlite3.Error) -> tuple[str, str]:
             return tr("the records are damaged"), tr(
                 "Start the program again: it keeps the damaged file aside and begins a new one"
             )
-    return tr("the records cannot be used ({reason})").format(reason=error), tr(
+    return tr("the records cannot be used ({reason})").format(reason=brief(str(error))), tr(
         "Check the disk, and try again"
     )

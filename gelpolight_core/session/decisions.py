@@ -123,7 +123,7 @@ def write_decisions(decisions: Decisions, folder: Path) -> None:
     def write(stream: BinaryIO) -> None:
         tomli_w.dump(content, stream)
 
-    write_atomically(folder / FILE_NAME, write)
+    write_atomically(folder / FILE_NAME, write, inside=folder)
 
 
 def _parse(content: Mapping[str, Any]) -> Decisions:

@@ -44,7 +44,7 @@ class KnownFiles:
             raise InputError(
                 tr("the file was changed by something else since it was read; nothing was written"),
                 where=str(path),
-                advice=tr("Reload the session, then correct it again"),
+                advice=tr("Read it again, then make your change again"),
             )
 
     def _is_changed(self, path: Path) -> bool:
