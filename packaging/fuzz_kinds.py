@@ -185,9 +185,7 @@ def _pngs() -> tuple[bytes, ...]:
 def _tiffs() -> tuple[bytes, ...]:
     light = np.random.default_rng(0).integers(0, 255, (10, 12, 3))
     return tuple(
-        cv2.imencode(".tif", light.astype(kind), [cv2.IMWRITE_TIFF_COMPRESSION, packing])[
-            1
-        ].tobytes()
+        cv2.imencode(".tif", light.astype(kind), [cv2.IMWRITE_TIFF_COMPRESSION, way])[1].tobytes()
         for kind in (np.uint8, np.uint16, np.float32)
         for way in (1, 5, 8)
     )
