@@ -91,7 +91,7 @@ class Records:
         """
         try:
             return cls(path, connect(path, busy_s))
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             if not is_damage(error):
                 with in_plain_words(path):
                     raise

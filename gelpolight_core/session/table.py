@@ -10,6 +10,8 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.reading import NAME_LIMIT, brief, is_file_name, plain_text
 from gelpolight_core.translation import tr
 
+MOST_WHOLE = 2**53
+
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -47,7 +49,7 @@ class Table:
     def whole(self, key: str) -> int:
         """Return a whole number."""
         value = self.content.get(key)
-        if type(value) is not int:
+        if type(value) is not int or abs(value) > MOST_WHOLE:
             raise self.wrong(key, tr("is not a whole number"))
         return value
 
