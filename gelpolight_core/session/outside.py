@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import open_file
 from gelpolight_core.translation import tr
 
 _Mark = tuple[int, int]
@@ -70,6 +71,7 @@ def _mark(path: Path) -> _Mark | None:
 def _digest(path: Path) -> bytes | None:
     """Return a hash of what a file holds; None where there is no file that can be read."""
     try:
-        return hashlib.sha256(path.read_bytes()).digest()
-    except OSError:
+        with open_file(path) as stream:
+            return hashlib.file_digest(stream, "sha256").digest()
+    except (OSError, InputError):
         return None

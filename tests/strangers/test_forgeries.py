@@ -26,6 +26,7 @@ from app.workspace.validation import read_validation
 from app.workspace.workspace import Workspace, folder_name
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.design.sensor_design import read_design
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.npy import array_of
@@ -416,3 +417,14 @@ def test_a_protocol_of_a_number_of_thousands_of_digits_is_refused(tmp_path: Path
     (tmp_path / "protocol.toml").write_text(many)
     with pytest.raises(InputError, match="repeats is not a whole number"):
         read_protocol_file(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["decisions.toml", "balls/ball_01.png", "mirror/m.png"])
+def test_a_pipe_in_a_session_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    (tmp_path / "session.toml").write_text(sessions_toml(""))
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    os.mkfifo(tmp_path / name)
+    project = CalibrationProject(tmp_path)
+    if name != "decisions.toml":
+        with pytest.raises(InputError):
+            project.statuses()
