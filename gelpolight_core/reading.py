@@ -13,8 +13,9 @@ import os
 import re
 import stat
 import tomllib
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -29,7 +30,7 @@ NAME_LIMIT = 200
 LINES = "\n\t"
 
 
-def open_file(path: Path) -> BinaryIO:
+def open_file(path: Path) -> BufferedReader:
     """Open an ordinary file for reading.
 
     Raises
