@@ -27,6 +27,8 @@ _LONG_TEXT = re.compile(r'"""|\'\'\'')
 _TEXT = re.compile(r""""(?:[^"\\\n]|\\.)*"?|'[^'\n]*'?""")
 _BETWEEN = re.compile(r"[\n,=\[\]{}]")
 NAME_LIMIT = 200
+# Versions that may come; a number beyond them is damage.
+NEWEST = 1_000_000
 LINES = "\n\t"
 
 
@@ -115,7 +117,7 @@ def parse_json(data: bytes | str) -> Any:
 
 
 def plain_text(value: Any, most: int = 10_000) -> str:
-    """Return a value that is a text which can be shown, printed and written to a file.
+    """Return a value that is a name: a text that can be shown, printed and written to a file.
 
     Raises
     ------
@@ -123,12 +125,24 @@ def plain_text(value: Any, most: int = 10_000) -> str:
         If it is no text, is longer than `most` characters, or holds characters that command a
         terminal or that are none.
     """
+    text = written_text(value, most)
+    if any((c < " " and c not in LINES) or "\x7f" <= c <= "\x9f" for c in text):
+        raise ValueError(f"{brief(text)} holds control characters")
+    return text
+
+
+def written_text(value: Any, most: int = 1_000_000) -> str:
+    """Return a value that is a text as a person may have pasted it: what was kept is given back.
+
+    Raises
+    ------
+    ValueError
+        If it is no text, is longer than `most` characters, or cannot be written to a file.
+    """
     if not isinstance(value, str):
         raise ValueError(f"{brief(value)} is no text")
     if len(value) > most:
         raise ValueError(f"a text has {len(value)} characters")
-    if any((c < " " and c not in LINES) or "\x7f" <= c <= "\x9f" for c in value):
-        raise ValueError(f"{brief(value)} holds control characters")
     value.encode()  # half of a pair of surrogates cannot be written
     return value
 

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.measurement.measure import SHAPES
-from gelpolight_core.reading import NAME_LIMIT, brief, parse_json, plain_text, read_file
+from gelpolight_core.reading import NAME_LIMIT, NEWEST, brief, parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 FILE = "indenters.json"
@@ -154,7 +154,7 @@ def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ValueError("it is no list of indenters")
     version = content["version"]
-    if type(version) is int and version > VERSION:
+    if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
             tr("the list of indenters has version {v} and this program knows version {k}").format(
                 v=version, k=VERSION

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.reading import brief, parse_json, plain_text, read_file
+from gelpolight_core.reading import NEWEST, brief, parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
@@ -140,7 +140,7 @@ def _parse(content: Any, path: Path) -> Validation:
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ValueError("it is not a validation")
     version = content["version"]
-    if type(version) is int and version > VERSION:
+    if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
             tr("the validation has version {v} and this program knows version {k}").format(
                 v=version, k=VERSION

@@ -39,7 +39,7 @@ from gelpolight_core.export.npy import array_of
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import MembraneGrid, visible_grid
-from gelpolight_core.reading import brief, plain_text
+from gelpolight_core.reading import brief, plain_text, written_text
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.response.curve import CameraResponse
 from gelpolight_core.session.session import SENSOR_RANGES, SensorData
@@ -272,18 +272,18 @@ def _read_provenance(entry: dict[str, Any]) -> Provenance:
     edits = tuple(_read_edit(edit) for edit in entry.get("edits", ()))
     provenance = Provenance(**{**entry, "edits": edits})
     for name in ("created", "operator", "program_version", "session"):
-        plain_text(getattr(provenance, name))
+        written_text(getattr(provenance, name))
     for table in (provenance.sources, provenance.camera_settings):
         for key, value in table.items():
-            plain_text(key)
+            written_text(key)
             if isinstance(value, str):
-                plain_text(value)
+                written_text(value)
     return provenance
 
 
 def _read_edit(entry: dict[str, Any]) -> HandEdit:
-    channels = tuple(plain_text(name) for name in entry["channels"])
-    texts = {key: plain_text(value) for key, value in entry.items() if key != "channels"}
+    channels = tuple(written_text(name) for name in entry["channels"])
+    texts = {key: written_text(value) for key, value in entry.items() if key != "channels"}
     return HandEdit(**texts, channels=channels)
 
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.quality import Figure, QualityTable, Verdict
-from gelpolight_core.reading import brief, open_file, parse_json, plain_text
+from gelpolight_core.reading import NEWEST, brief, open_file, parse_json, written_text
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-calibration"
@@ -139,7 +139,7 @@ def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
         "inputs": provenance.get("inputs", ""),
     }
     return CalibrationSummary(
-        **{key: plain_text(text) for key, text in texts.items()},
+        **{key: written_text(text) for key, text in texts.items()},
         picture_size=(int(camera["width"]), int(camera["height"])),
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
     )
@@ -152,7 +152,7 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise ValueError("no calibration manifest")
     version = manifest.get("version")
-    if type(version) is int and version > VERSION:
+    if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
             tr("the calibration has version {v} and this program knows version {k}").format(
                 v=version, k=VERSION
@@ -189,7 +189,7 @@ def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
 
 
 def _figure(row: dict[str, Any]) -> Figure:
-    texts = {key: plain_text(row[key]) for key in ("key", "label", "unit", "advice")}
+    texts = {key: written_text(row[key]) for key in ("key", "label", "unit", "advice")}
     limits = {key: None if row[key] is None else _number(row[key]) for key in _LIMITS}
     return Figure(**{
         **row, **texts, **limits, "value": _number(row["value"]), "verdict": Verdict(row["verdict"])

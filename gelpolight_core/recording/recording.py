@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.reading import plain_text
+from gelpolight_core.reading import written_text
 
 ENDING = ".gplrec"
 FORMAT = "gelpolight-recording"
@@ -119,13 +119,13 @@ class RecordingHeader:
         settings = content.get("settings")
         texts: dict[str, Any] = {name: content.get(name) for name in _TEXTS}
         for text in texts.values():
-            plain_text(text)
+            written_text(text)
         if not isinstance(settings, dict):
             raise ValueError("the settings are missing")
         for key, value in settings.items():
-            plain_text(key)
+            written_text(key)
             if isinstance(value, str):
-                plain_text(value)
+                written_text(value)
             elif not isinstance(value, float | int) or not abs(value) < MOST_SETTING:
                 raise ValueError("a setting is neither a number nor a text")
         return cls(settings=settings, **texts)

@@ -21,7 +21,7 @@ from types import TracebackType
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.reading import brief, plain_text
+from gelpolight_core.reading import brief, written_text
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.faults import in_plain_words, is_damage
 from gelpolight_core.records.opening import connect, keep_aside
@@ -277,7 +277,7 @@ class Records:
         with self._reading() as connection:
             rows = connection.execute("SELECT serial FROM sensors ORDER BY serial").fetchall()
         try:
-            return tuple(plain_text(row["serial"]) for row in rows)
+            return tuple(written_text(row["serial"]) for row in rows)
         except ValueError as error:
             raise self._no_measurement(error) from error
 

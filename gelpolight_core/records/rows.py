@@ -7,12 +7,11 @@ import sqlite3
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
-from gelpolight_core.reading import parse_json, plain_text
+from gelpolight_core.reading import parse_json, written_text
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
-MOST_TEXT = 1_000_000
-# No length or angle is larger; squares of it are numbers still.
-MOST = 1e15
+# As much as one value of the database may hold.
+MOST_TEXT = 10_000_000
 
 
 def text_of(time: datetime) -> str:
@@ -63,9 +62,7 @@ def records_of(
 
 def _quantity(row: sqlite3.Row) -> Quantity:
     numbers = (row["value"], row["sd"], row["truth"], row["limit_percent"])
-    if not all(number is None or abs(number) < MOST for number in numbers):
-        raise ValueError("a measured value is no length or angle")
-    return Quantity(plain_text(row["name"]), *numbers)
+    return Quantity(written_text(row["name"]), *numbers)
 
 
 _TEXTS = ("serial", "shape", "verdict", "reason", "operator", "picture", "note")
@@ -75,10 +72,10 @@ def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRe
     settings, details = parse_json(row["settings"]), parse_json(row["details"])
     if not isinstance(settings, dict) or not isinstance(details, dict):
         raise ValueError("the settings of a measurement are no table")
-    texts = {name: plain_text(row[name], MOST_TEXT) for name in _TEXTS}
+    texts = {name: written_text(row[name], MOST_TEXT) for name in _TEXTS}
     return MeasurementRecord(
         **texts,
-        calibration_id=plain_text(row["calibration_id"] or ""),
+        calibration_id=written_text(row["calibration_id"] or ""),
         quantities=quantities,
         settings=settings,
         details=details,

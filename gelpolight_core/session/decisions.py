@@ -18,7 +18,7 @@ import tomli_w
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.reading import brief, parse_toml, read_file
+from gelpolight_core.reading import NEWEST, brief, parse_toml, read_file
 from gelpolight_core.translation import tr
 
 FILE_NAME = "decisions.toml"
@@ -74,7 +74,7 @@ def read_decisions(folder: Path) -> Decisions:
     try:
         content = parse_toml(read_file(path, SIZE_LIMIT))
         version = content.get("version")
-        if content.get("format") == FORMAT and type(version) is int and version > VERSION:
+        if content.get("format") == FORMAT and type(version) is int and VERSION < version < NEWEST:
             raise InputError(
                 tr("the decisions have version {v} and this program knows version {k}").format(
                     v=version, k=VERSION

@@ -276,7 +276,7 @@ def recording(tmp_path: Path) -> Path:
     return tmp_path / "r.gplrec"
 
 
-@pytest.mark.parametrize("note", ["[" * 10**5, '"\\ud800"', '"\\u001b[2J"'])
+@pytest.mark.parametrize("note", ["[" * 10**5, '"\\ud800"', "3"])
 def test_a_recordings_description_is_plain(recording: Path, note: str) -> None:
     data = recording.read_bytes()
     text = b'{"format": "gelpolight-recording", "note": ' + note.encode() + b"}"
@@ -321,7 +321,7 @@ def test_records_with_more_than_our_tables_are_refused(tmp_path: Path, statement
 
 
 @pytest.mark.parametrize("change", [
-    "settings = '" + "[" * 5000 + "'", "settings = '[]'", "note = char(27)", "time = x'00'",
+    "settings = '" + "[" * 5000 + "'", "settings = '[]'", "time = x'00'",
     "serial = x'ff'", "note = CAST(x'ff' AS TEXT)",
 ])  # fmt: skip
 def test_records_of_what_no_measurement_is_are_refused(tmp_path: Path, change: str) -> None:
@@ -428,3 +428,15 @@ def test_a_pipe_in_a_session_is_not_waited_for(tmp_path: Path, name: str) -> Non
     if name != "decisions.toml":
         with pytest.raises(InputError):
             project.statuses()
+
+
+@pytest.mark.parametrize("version", ["0x" + "f" * 5000, "9" * 4000])
+def test_a_version_of_thousands_of_digits_is_not_read_out(tmp_path: Path, version: str) -> None:
+    (tmp_path / "decisions.toml").write_text(
+        f'format = "gelpolight-decisions"\nversion = {version}'
+    )
+    (tmp_path / "session.toml").write_text(f'format = "gelpolight-session"\nversion = {version}')
+    for read in (read_decisions, read_session):
+        with pytest.raises(InputError) as refusal:
+            read(tmp_path)
+        assert len(str(refusal.value)) < 1000
