@@ -200,7 +200,8 @@ class MeasurePage(QWidget):
         self, indenters: tuple[Indenter, ...], before: KnownFiles, list_file: Path
     ) -> None:
         try:
-            before.refuse_changed(list_file)
+            again = tr("Open the list again, then make your change again")
+            before.refuse_changed(list_file, advice=again)
             write_indenters(indenters, self.context.workspace.folder)
         except InputError as error:
             self.context.toasts.show(str(error), "fail")

@@ -135,7 +135,7 @@ class Records:
         *,
         removed: bool = False,
     ) -> tuple[MeasurementRecord, ...]:
-        """Return measurements, oldest first.
+        """Return measurements in the order in which they were kept, whatever the clock said.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class Records:
         return statistics_of(values)
 
     def drift(self, serial: str, quantity: str | None = None) -> Drift:
-        """Return the errors of a sensor's measurements that have a truth, oldest first.
+        """Return the errors of a sensor's measurements that have a truth, in that order.
 
         Parameters
         ----------

@@ -33,8 +33,15 @@ class KnownFiles:
         """Take what a file holds now as known."""
         self._known[path] = _mark(path), _digest(path)
 
-    def refuse_changed(self, path: Path) -> None:
+    def refuse_changed(self, path: Path, *, advice: str = "") -> None:
         """Refuse to write over what somebody else has put into a file.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        advice : str, optional
+            What to do then, where it is no session's.
 
         Raises
         ------
@@ -45,7 +52,7 @@ class KnownFiles:
             raise InputError(
                 tr("the file was changed by something else since it was read; nothing was written"),
                 where=str(path),
-                advice=tr("Read it again, then make your change again"),
+                advice=advice or tr("Reload the session, then correct it again"),
             )
 
     def _is_changed(self, path: Path) -> bool:

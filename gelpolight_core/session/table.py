@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.reading import NAME_LIMIT, brief, is_file_name, plain_text
+from gelpolight_core.reading import brief, is_file_name, plain_text
 from gelpolight_core.translation import tr
 
 MOST_WHOLE = 2**53
+TEXT_LENGTH = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +41,10 @@ class Table:
         if not isinstance(value, str) or not value.strip():
             raise self.wrong(key, tr("is not a text"))
         try:
-            return plain_text(value, NAME_LIMIT)
+            return plain_text(value, TEXT_LENGTH)
         except ValueError as error:
             raise self.wrong(
-                key, tr("is not a plain text of at most {n} characters").format(n=NAME_LIMIT)
+                key, tr("is not a plain text of at most {n} characters").format(n=TEXT_LENGTH)
             ) from error
 
     def whole(self, key: str) -> int:
