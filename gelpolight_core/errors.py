@@ -24,4 +24,8 @@ class InputError(Exception):
 
     def __str__(self) -> str:
         """Return the one sentence that a person reads."""
-        return f"{self.where}: {self.found}. {self.advice}."
+        said = f"{self.where}: {self.found}. {self.advice}."
+        if said.isprintable():
+            return said
+        # A name from elsewhere may hold what commands a terminal.
+        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in said)

@@ -15,6 +15,8 @@ from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu, QW
 from app.calibrate.states import state_icon, state_word
 from app.shell import theme
 from app.widgets.naming import named
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.wholeness import decode_picture
 from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
@@ -175,7 +177,10 @@ class FilmStrip(QListWidget):
 
 def thumbnail(path: Path) -> QPixmap:
     """Return a small picture of a file; an empty one where it cannot be read."""
-    raw = cv2.imread(str(path), cv2.IMREAD_REDUCED_COLOR_8)
+    try:
+        raw = decode_picture(path, cv2.IMREAD_REDUCED_COLOR_8)
+    except InputError:  # told where the picture is used
+        raw = None
     if raw is None:
         empty = QPixmap(THUMB)
         empty.fill(Qt.GlobalColor.darkGray)

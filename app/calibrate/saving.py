@@ -14,7 +14,6 @@ from app.calibrate.controller import CalibrationController
 from app.calibrate.result_view import ResultView
 from app.shell.context import AppContext
 from app.shell.jobs import Job
-from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.translation import tr
 
@@ -45,8 +44,7 @@ class Saving(QObject):
         def work(_tell: object) -> Path:
             calibration = project.finish().calibration
             name = f"{calibration.sensor.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
-            path = workspace.calibration_path(calibration.sensor.serial, name)
-            write_calibration(calibration, path)
+            path = workspace.keep_calibration(calibration, name)
             workspace.use(path)
             return path
 

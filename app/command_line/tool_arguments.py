@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,10 @@ from app.command_line.common import numbers, points
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.outline_tools import EDGES
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
+from gelpolight_core.reading import parse_json, read_file
 from gelpolight_core.translation import tr
+
+JSON_LIMIT = 50_000_000
 
 # How many places each tool takes; None: any number from there on.
 PLACES: dict[str, tuple[int, int | None]] = {
@@ -152,8 +154,8 @@ def _refuse_rest(options: argparse.Namespace, taken: set[str], name: str) -> Non
 def _read(path: Path) -> Any:
     """Read a JSON file."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return parse_json(read_file(path, JSON_LIMIT))
+    except (FileNotFoundError, ValueError) as error:
         raise InputError(
             tr("the file cannot be read as JSON"),
             where=str(path),

@@ -56,7 +56,6 @@ def calibrate_virtual_sensor(
     path : Path
         The calibration.
     """
-    from gelpolight_core.calibration.file import write_calibration
     from gelpolight_core.calibration.pipeline import calibrate_session
     from gelpolight_core.session.session import read_session
     from gelpolight_core.simulation.session import simulate_session
@@ -72,8 +71,7 @@ def calibrate_virtual_sensor(
             read_session(folder),
             progress=lambda _stage, share: tell(PICTURES_SHARE + (1.0 - PICTURES_SHARE) * share),
         )
-        path = workspace.calibration_path(design.serial, name)
-        write_calibration(run.calibration, path)
+        path = workspace.keep_calibration(run.calibration, name)
         folder.rename(sessions / name)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)

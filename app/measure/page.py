@@ -22,9 +22,11 @@ from app.shell.dropping import dropped_paths
 from app.shell.jobs import Jobs
 from app.shell.settings import Limits
 from app.widgets.naming import named
+from app.workspace.indenters import FILE as INDENTERS
 from app.workspace.indenters import Indenter, read_indenters, write_indenters
 from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord
+from gelpolight_core.session.outside import KnownFiles
 from gelpolight_core.translation import tr
 
 
@@ -171,24 +173,35 @@ class MeasurePage(QWidget):
 
     # Lists and limits
 
-    def _read_indenters(self) -> tuple[Indenter, ...]:
+    def _read_indenters(self) -> tuple[Indenter, ...] | None:
+        """Show the known indenters and return them; None where they cannot be read."""
         try:
             known = read_indenters(self.context.workspace.folder)
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
-            known = ()
+            self.desk.panel.truth.show_indenters(())
+            return None
         self.desk.panel.truth.show_indenters(known)
         return known
 
     def edit_indenters(self) -> None:
         """Edit the known indenters."""
-        dialog = IndentersDialog(self._read_indenters(), self)
+        list_file = self.context.workspace.folder / INDENTERS
+        before = KnownFiles([list_file])
+        known = self._read_indenters()
+        if known is None:
+            return  # what is damaged is not written over
+        dialog = IndentersDialog(known, self)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.accepted.connect(lambda: self._keep_indenters(dialog.indenters))
+        dialog.accepted.connect(lambda: self._keep_indenters(dialog.indenters, before, list_file))
         dialog.open()
 
-    def _keep_indenters(self, indenters: tuple[Indenter, ...]) -> None:
+    def _keep_indenters(
+        self, indenters: tuple[Indenter, ...], before: KnownFiles, list_file: Path
+    ) -> None:
         try:
+            again = tr("Open the list again, then make your change again")
+            before.refuse_changed(list_file, advice=again)
             write_indenters(indenters, self.context.workspace.folder)
         except InputError as error:
             self.context.toasts.show(str(error), "fail")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import logging
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,11 +13,15 @@ import platformdirs
 from PySide6.QtCore import QByteArray, QSettings
 
 from app.workspace.workspace import default_folder
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import cannot_write
+from gelpolight_core.reading import read_file
 
 APPLICATION = "gelpolight"
 THEMES = ("system", "light", "dark")
 RECENT = 8
 CAMERAS = 16
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +42,34 @@ class Limits:
     size_percent: float = 5.0
 
 
+# How an INI file of Qt spells objects; one of Python's is made by running what it says.
+OBJECTS = re.compile(rb"@(Variant|DateTime)\(", re.IGNORECASE)
+SIZE_LIMIT = 10_000_000
+
+
+def _keep_aside_what_is_no_text(path: Path) -> None:
+    """Begin anew where a settings file holds more than texts, numbers and layouts."""
+    try:
+        spoilt = OBJECTS.search(read_file(path, SIZE_LIMIT)) is not None
+    except FileNotFoundError:
+        return
+    except InputError:
+        spoilt = True
+    if spoilt:
+        aside = path.with_name(f"{path.name}.refused")
+        _LOG.warning("%s holds what no settings are; it is kept as %s", path, aside.name)
+        try:
+            path.replace(aside)
+        except OSError as error:
+            raise cannot_write(error, path) from error
+
+
 class Settings:
     """Typed access to the settings file."""
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = path or platformdirs.user_config_path(APPLICATION) / "desktop.ini"
+        _keep_aside_what_is_no_text(self.path)
         self._store = QSettings(str(self.path), QSettings.Format.IniFormat)
 
     def _text(self, key: str, default: str = "") -> str:

@@ -12,12 +12,14 @@ from typing import Any, BinaryIO
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.measurement.measure import SHAPES
+from gelpolight_core.reading import NAME_LIMIT, NEWEST, brief, parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 FILE = "indenters.json"
 FORMAT = "gelpolight-indenters"
 VERSION = 1
 SIZE_LIMIT = 1_000_000
+MOST_MM = 10_000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,14 +109,15 @@ def read_indenters(folder: Path) -> tuple[Indenter, ...]:
     """
     path = folder / FILE
     try:
-        with path.open("rb") as stream:
-            content = json.loads(stream.read(SIZE_LIMIT))
+        content = parse_json(read_file(path, SIZE_LIMIT))
         return _parse(content, path)
     except FileNotFoundError:
         return first_indenters()
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("the list of indenters cannot be read ({error})").format(error=error),
+            tr("the list of indenters cannot be read ({error})").format(
+                error=brief(str(error), 200)
+            ),
             where=str(path),
             advice=tr("Repair the file, or remove it to begin with the first list again"),
         ) from error
@@ -151,7 +154,7 @@ def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ValueError("it is no list of indenters")
     version = content["version"]
-    if type(version) is int and version > VERSION:
+    if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
             tr("the list of indenters has version {v} and this program knows version {k}").format(
                 v=version, k=VERSION
@@ -161,8 +164,8 @@ def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
         )
     return tuple(
         Indenter(
-            str(row["name"]),
-            str(row["shape"]),
+            plain_text(row["name"], NAME_LIMIT),
+            plain_text(row["shape"], NAME_LIMIT),
             _length(row["size_mm"]),
             None if row.get("second_mm") is None else _length(row["second_mm"]),
             None if row.get("height_mm") is None else _length(row["height_mm"]),
@@ -173,5 +176,5 @@ def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
 
 def _length(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is no length")
-    return float(value)
+        raise ValueError(f"{brief(value)} is no length")
+    return float(value) if abs(value) < MOST_MM else math.inf

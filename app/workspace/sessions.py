@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.reading import NAME_LIMIT, parse_toml, plain_text, read_file
 
 DESCRIPTION = "session.toml"
 PICTURES = (".png", ".tif", ".tiff")
@@ -53,7 +55,7 @@ def read_session_entry(folder: Path) -> SessionEntry:
 
 def _serial(folder: Path) -> str:
     try:
-        content = tomllib.loads((folder / DESCRIPTION).read_text("utf-8"))
-        return str(content["sensor"]["serial"])
-    except (ValueError, KeyError, TypeError):
+        content = parse_toml(read_file(folder / DESCRIPTION))
+        return plain_text(content["sensor"]["serial"], NAME_LIMIT)
+    except (InputError, FileNotFoundError, ValueError, KeyError, TypeError):
         return folder.parent.parent.name

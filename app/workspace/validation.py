@@ -7,7 +7,6 @@ true, and the limits. It counts for one calibration only, whose identity it name
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,12 +14,15 @@ from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.reading import NEWEST, brief, parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
 VERSION = 1
 ENDING = ".validation.json"
 SIZE_LIMIT = 1_000_000
+# Percents of it are numbers still.
+MOST = 1e15
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,14 +124,13 @@ def read_validation(calibration: Path) -> Validation | None:
     """
     path = validation_path(calibration)
     try:
-        with path.open("rb") as stream:
-            content = json.loads(stream.read(SIZE_LIMIT))
+        content = parse_json(read_file(path, SIZE_LIMIT))
         return _parse(content, path)
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("the validation cannot be read ({error})").format(error=error),
+            tr("the validation cannot be read ({error})").format(error=brief(str(error), 200)),
             where=str(path),
             advice=tr("Validate the calibration again"),
         ) from error
@@ -139,7 +140,7 @@ def _parse(content: Any, path: Path) -> Validation:
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ValueError("it is not a validation")
     version = content["version"]
-    if type(version) is int and version > VERSION:
+    if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
             tr("the validation has version {v} and this program knows version {k}").format(
                 v=version, k=VERSION
@@ -170,14 +171,12 @@ def _parse(content: Any, path: Path) -> Validation:
 
 
 def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"{value!r} is no text")
-    return value
+    return plain_text(value)
 
 
 def _positive(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{value!r} is no number")
-    if not math.isfinite(value) or value <= 0.0:
-        raise ValueError(f"{value!r} is no length")
+        raise ValueError(f"{brief(value)} is no number")
+    if not 0.0 < value < MOST:
+        raise ValueError(f"{brief(value)} is no length")
     return float(value)

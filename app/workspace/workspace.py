@@ -30,15 +30,19 @@ from app.workspace.sessions import DESCRIPTION, SessionEntry, read_session_entry
 from app.workspace.validation import validation_path
 from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.export.atomic import NameTakenError, make_folder, write_atomically
+from gelpolight_core.reading import open_file, parse_json, read_file
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
+    from gelpolight_core.calibration.calibration import Calibration
     from gelpolight_core.records.records import Records
 
 ENDING = ".gplcal"
 STATE = "workspace.json"
 COPY_BYTES = 1 << 20
+NAME_BYTES = 160
+DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{n}{k}" for n in ("COM", "LPT") for k in range(10))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +151,26 @@ class Workspace:
         make_folder(folder)
         return _free(folder / f"{folder_name(name)}{ENDING}")
 
+    def keep_calibration(self, calibration: Calibration, name: str) -> Path:
+        """Write a new calibration into the library, whole or not at all; return its place.
+
+        Another program that uses the workspace may take a name at this moment.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        from gelpolight_core.calibration.file import write_calibration
+
+        while True:
+            path = self.calibration_path(calibration.sensor.serial, name)
+            try:
+                write_calibration(calibration, path, new=True)
+            except NameTakenError:
+                continue
+            return path
+
     def entries(self) -> tuple[Entry, ...]:
         """Return every calibration, by sensor, newest first; broken ones too.
 
@@ -181,11 +205,12 @@ class Workspace:
     def in_use(self) -> Path | None:
         """The calibration in use; None where none was chosen or it is gone."""
         try:
-            stored = json.loads((self.folder / STATE).read_text("utf-8"))["in_use"]
+            stored = parse_json(read_file(self.folder / STATE))["in_use"]
             path = self.folder / stored
-        except (OSError, ValueError, TypeError, KeyError):
+            inside = ".." not in path.parts and path.is_relative_to(self.sensors_folder)
+            return path if inside and path.is_file() else None
+        except (InputError, OSError, ValueError, TypeError, KeyError):
             return None  # a lost choice is made again by a click
-        return path if path.is_file() else None
 
     def use(self, path: Path | None) -> None:
         """Choose the calibration that is measured with, or none.
@@ -225,8 +250,7 @@ class Workspace:
             if entry.summary is not None and entry.summary.identity == summary.identity:
                 return known
         refuse_damaged_arrays(source)
-        target = _free(folder / f"{folder_name(source.stem)}{ENDING}")
-        _copy(source, target)
+        target = _copy_new(source, folder / f"{folder_name(source.stem)}{ENDING}")
         beside = validation_path(source)
         if beside.is_file():
             _copy(beside, validation_path(target))
@@ -302,6 +326,10 @@ def default_folder() -> Path:
 def folder_name(text: str) -> str:
     """Return a name that every file system takes, for any text."""
     name = re.sub(r"[^\w.+-]+", "_", text).strip("._ ")[:80]
+    # A letter may take four bytes, and names end at 255; Windows keeps some names for devices.
+    name = name.encode("utf-8", "ignore")[:NAME_BYTES].decode("utf-8", "ignore").rstrip("._ ")
+    if name.split(".")[0].upper() in DEVICES:
+        name = f"{name}_" if "." not in name else f"_{name}"
     return name or "unnamed"
 
 
@@ -327,13 +355,24 @@ def _write_bytes(path: Path, data: bytes) -> None:
     write_atomically(path, write)
 
 
-def _copy(source: Path, target: Path) -> None:
+def _copy_new(source: Path, wanted: Path) -> Path:
+    """Copy a file to a place that no other has, and return that."""
+    while True:
+        target = _free(wanted)
+        try:
+            _copy(source, target, new=True)
+        except NameTakenError:
+            continue
+        return target
+
+
+def _copy(source: Path, target: Path, *, new: bool = False) -> None:
     try:
-        stream = source.open("rb")
+        stream = open_file(source)
     except OSError as error:
         raise _refused(error, source) from error
     with stream:
-        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, COPY_BYTES))
+        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, COPY_BYTES), new=new)
 
 
 def _move(source: Path, target: Path) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.measurement.ledger import unwritable
-from gelpolight_core.session.wholeness import unreadable
+from gelpolight_core.reading import open_file, parse_json, unreadable
 
 FILE = "batch.jsonl"
 
@@ -100,7 +100,7 @@ class BatchLedger:
         if not path.exists():
             return
         try:
-            with path.open("rb") as file:
+            with open_file(path) as file:
                 for line in file:
                     self._take_in(line)
         except OSError as error:
@@ -184,9 +184,9 @@ def _unpacked(line: bytes) -> FrameRow | None:
     if not line.endswith(b"\n"):
         return None
     try:
-        content = json.loads(line)
+        content = parse_json(line)
         row = FrameRow(**{**content, "notes": tuple(map(str, content["notes"]))})
-    except (ValueError, TypeError, KeyError, RecursionError):
+    except (ValueError, TypeError, KeyError, AttributeError):
         return None
     texts = (row.output, row.stamp, row.input, row.error)
     whole = row.frame is None or type(row.frame) is int

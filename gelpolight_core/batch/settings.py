@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.session.wholeness import unreadable
+from gelpolight_core.reading import parse_json, read_file, unreadable
 from gelpolight_core.translation import tr
 
 FILE = "batch.json"
@@ -104,10 +104,10 @@ def require_same(settings: BatchSettings, out: Path) -> None:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        content = json.loads(path.read_bytes())
+        content = parse_json(read_file(path))
     except OSError as error:
         raise unreadable(error, path) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise _damaged(path) from error
     if not isinstance(content, dict):
         raise _damaged(path)

@@ -22,21 +22,27 @@ from gelpolight_core.calibration.calibration import MODELS, Calibration, HandEdi
 from gelpolight_core.calibration.file_full import full_arrays, full_entry, read_full
 from gelpolight_core.calibration.manifest import (
     FORMAT,
+    HEAD_LIMIT,
     MANIFEST,
     UNREADABLE,
     VERSION,
     damaged,
-    missing,
+    declared_bytes,
+    opened,
     read_manifest,
     read_member,
     read_quality,
+    refuse_bomb,
 )
 from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.export.npy import array_of
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.resampling import MembraneGrid, visible_grid
+from gelpolight_core.reading import brief, plain_text, written_text
 from gelpolight_core.reflectance.table import ReflectanceTable
 from gelpolight_core.response.curve import CameraResponse
-from gelpolight_core.session.session import SensorData
+from gelpolight_core.session.session import SENSOR_RANGES, SensorData
 from gelpolight_core.session.wholeness import MAX_PIXELS
 
 NODES_LIMIT = 10_000
@@ -46,11 +52,22 @@ MOST_CROSSTALK = 100.0
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
 
-def write_calibration(calibration: Calibration, path: Path) -> None:
+def write_calibration(calibration: Calibration, path: Path, *, new: bool = False) -> None:
     """Write a calibration file, whole or not at all.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        To be written.
+    path : Path
+        Where.
+    new : bool, optional
+        Whether it never takes the place of another file.
 
     Raises
     ------
+    NameTakenError
+        If it is to be new and there is a file of its name.
     InputError
         If the file cannot be written.
     """
@@ -77,7 +94,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
             ):
                 archive.writestr(zipfile.ZipInfo(name, ZIP_TIME), data, zipfile.ZIP_DEFLATED)
 
-    write_atomically(path, write)
+    write_atomically(path, write, new=new)
 
 
 def read_calibration(path: Path) -> Calibration:
@@ -89,13 +106,12 @@ def read_calibration(path: Path) -> Calibration:
         If the file is missing, damaged, truncated, of a newer version, or holds values that no
         calibration has.
     """
-    if not path.is_file():
-        raise missing(path)
     try:
-        with zipfile.ZipFile(path) as archive:
+        with opened(path) as archive:
             manifest = read_manifest(archive, path)
+            refuse_bomb(manifest["arrays"], archive)
             arrays = {
-                name: _read_array(archive, name, entry, path)
+                name: _read_array(archive, name, entry)
                 for name, entry in manifest["arrays"].items()
             }
         return _build(manifest, arrays)
@@ -150,7 +166,10 @@ def _manifest_of(c: Calibration) -> dict[str, Any]:
 
 def _grid_of(c: Calibration) -> dict[str, Any]:
     """Return where the maps' nodes lie; the grid is made anew on reading and must be the same."""
-    grid = c.table.grid
+    return _grid_entry(c.table.grid)
+
+
+def _grid_entry(grid: MembraneGrid) -> dict[str, Any]:
     return {
         "rows": grid.shape[0],
         "columns": grid.shape[1],
@@ -160,25 +179,14 @@ def _grid_of(c: Calibration) -> dict[str, Any]:
     }
 
 
-def _read_array(
-    archive: zipfile.ZipFile, name: str, entry: dict[str, Any], path: Path
-) -> NDArray[Any]:
-    shape = tuple(int(n) for n in entry["shape"])
-    kind = np.dtype(entry["kind"])
-    if kind.str not in ("<f4", "<f8") or min(shape) < 1:
-        raise ValueError(f"{name} is {kind} {shape}")
-    count = 1
-    for n in shape:
-        count *= n
-    if count > 3 * MAX_PIXELS:
-        raise ValueError(f"{name} declares {count} values")
-    data = read_member(archive, f"{name}.npy", count * kind.itemsize + 4096)
+def _read_array(archive: zipfile.ZipFile, name: str, entry: dict[str, Any]) -> NDArray[Any]:
+    data = read_member(archive, f"{name}.npy", declared_bytes(name, entry) + HEAD_LIMIT)
     if hashlib.sha256(data).hexdigest() != entry["sha256"]:
         raise ValueError(f"the checksum of {name} is wrong")
-    array = np.load(io.BytesIO(data), allow_pickle=False)
-    if array.shape != shape or array.dtype != kind:
+    array = array_of(data)
+    if list(array.shape) != entry["shape"] or array.dtype.str != entry["kind"]:
         raise ValueError(f"{name} is {array.dtype} {array.shape}")
-    return np.asarray(array)
+    return array.copy()
 
 
 def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibration:
@@ -192,7 +200,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
     if len(normal) != 3 or len(camera["distortion"]) != 5:
         raise ValueError("camera or plane is incomplete")
     calibration = Calibration(
-        sensor=SensorData(**manifest["sensor"]),
+        sensor=_read_sensor(manifest["sensor"]),
         model=model,
         camera=Camera(**camera),
         plane=TopPlane((normal[0], normal[1], normal[2]), float(plane["distance_mm"])),
@@ -209,17 +217,43 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         response=_read_response(arrays.get("camera_response")),
     )
     _check(calibration)
-    stated, made = manifest["grid"], _grid_of(calibration)
+    _check_grid(calibration, manifest["grid"])
+    _check_maps(calibration)
+    return calibration
+
+
+def _read_sensor(entry: dict[str, Any]) -> SensorData:
+    """Return what is stated of the sensor, in the ranges in which a session states it."""
+    sensor = SensorData(**entry)
+    plain_text(sensor.serial)
+    for name, (low, high) in SENSOR_RANGES.items():
+        value = getattr(sensor, name)
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not low <= value <= high
+        ):
+            raise ValueError(f"{name} is {brief(value)}")
+    return sensor
+
+
+def _check_grid(calibration: Calibration, stated: dict[str, Any]) -> None:
+    """Compare the grid that the optics give with the stated one, before anything is made on it."""
+    c = calibration
+    grid = visible_grid(c.camera, c.plane, c.stack, diameter_mm=c.sensor.working_diameter_mm)
+    made = _grid_entry(grid)
     if not np.allclose([float(stated[key]) for key in made], list(made.values()), atol=1e-6):
         raise ValueError("the maps lie on another grid than this program makes")
-    return calibration
+    if c.radiance.shape != (*grid.shape, 3):
+        raise ValueError("radiance does not fit the optics")
 
 
 def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
     cosines = tuple(arrays[f"reflectance_cosines_{k}"] for k in range(3))
     values = tuple(arrays[f"reflectance_values_{k}"] for k in range(3))
     for nodes in (*cosines, *values):
-        if nodes.ndim != 1 or not 2 <= nodes.size <= NODES_LIMIT or not (np.diff(nodes) > 0).all():
+        sized = nodes.ndim == 1 and 2 <= nodes.size <= NODES_LIMIT and np.isfinite(nodes).all()
+        if not sized or not (np.diff(nodes) > 0).all():
             raise ValueError("the reflectance table is not monotone")
     if any(c.size != v.size for c, v in zip(cosines, values, strict=True)):
         raise ValueError("the reflectance table's columns differ in length")
@@ -235,11 +269,22 @@ def _read_response(curves: NDArray[Any] | None) -> CameraResponse | None:
 
 
 def _read_provenance(entry: dict[str, Any]) -> Provenance:
-    edits = tuple(
-        HandEdit(**{**edit, "channels": tuple(str(name) for name in edit["channels"])})
-        for edit in entry.get("edits", ())
-    )
-    return Provenance(**{**entry, "edits": edits})
+    edits = tuple(_read_edit(edit) for edit in entry.get("edits", ()))
+    provenance = Provenance(**{**entry, "edits": edits})
+    for name in ("created", "operator", "program_version", "session"):
+        written_text(getattr(provenance, name))
+    for table in (provenance.sources, provenance.camera_settings):
+        for key, value in table.items():
+            written_text(key)
+            if isinstance(value, str):
+                written_text(value)
+    return provenance
+
+
+def _read_edit(entry: dict[str, Any]) -> HandEdit:
+    channels = tuple(written_text(name) for name in entry["channels"])
+    texts = {key: written_text(value) for key, value in entry.items() if key != "channels"}
+    return HandEdit(**texts, channels=channels)
 
 
 def _check(calibration: Calibration) -> None:
@@ -264,11 +309,9 @@ def _check(calibration: Calibration) -> None:
         "noise": ((3,), c.noise),
         "reflectance_coverage": ((3, 2), c.reflectance.coverage),
     }
-    maps = {"radiance": c.radiance, "factors": c.factors}
     if c.full is not None:
         expected["full_led_positions_mm"] = ((3, 3), c.full.led_positions_mm)
         expected["full_led_sd_mm"] = ((3, 3), c.full.led_sd_mm)
-        maps["full_background"] = c.full.background
     if c.model == "full" and c.full is None:
         raise ValueError("the full model is missing")
     for name, (shape, array) in expected.items():
@@ -276,7 +319,14 @@ def _check(calibration: Calibration) -> None:
             raise ValueError(f"{name} is not possible")
     if not np.linalg.cond(c.crosstalk) < MOST_CROSSTALK:
         raise ValueError("the crosstalk cannot be removed")
-    rows_columns = c.table.grid.shape
+
+
+def _check_maps(calibration: Calibration) -> None:
+    c = calibration
+    maps = {"radiance": c.radiance, "factors": c.factors}
+    if c.full is not None:
+        maps["full_background"] = c.full.background
+    rows_columns = c.radiance.shape[:2]
     for name, map_ in maps.items():
         if map_.shape != (*rows_columns, 3) or map_.dtype != np.float32:
             raise ValueError(f"{name} does not fit the optics")

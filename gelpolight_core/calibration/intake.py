@@ -7,8 +7,10 @@ from pathlib import Path
 
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import read_file
 from gelpolight_core.session.copies import file_hash, refuse_copies
 from gelpolight_core.session.session import Session, read_picture, require_colour
+from gelpolight_core.session.wholeness import FILE_LIMIT
 from gelpolight_core.translation import tr
 
 COLOUR_STAGES = (Stage.LIGHTS, Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
@@ -86,7 +88,7 @@ def read_bytes(path: Path) -> bytes:
         If it cannot be read.
     """
     try:
-        return path.read_bytes()
+        return read_file(path, FILE_LIMIT)
     except OSError as error:
         raise InputError(
             tr("the file cannot be read ({reason})").format(reason=error.strerror or error),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.calibration.intake import read_bytes, refuse_other_size, refuse_unfit
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.export.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.session.capture import average_frames, write_picture
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
@@ -98,9 +98,7 @@ class KeptSession:
         refuse_other_size(self._session, (frames[0].shape[1], frames[0].shape[0]))
         folder = FOLDERS[stage]
         with self._lock:
-            name = self._next_name(folder)
-            path = self._session.folder / folder / name
-            self._keep(name, radius_mm, lambda: write_picture(average_frames(frames), path))
+            name = self._keep(folder, ".png", radius_mm, partial(_write, average_frames(frames)))
             self._replace_views(folder, {name})
         return name
 
@@ -128,10 +126,8 @@ class KeptSession:
         names: list[str] = []
         with self._lock:
             for path in files:
-                name = self._next_name(folder, path.suffix.lower())
-                target = self._session.folder / folder / name
-                self._keep(name, radius_mm, partial(_copy, path, target))
-                names.append(name)
+                suffix = path.suffix.lower()
+                names.append(self._keep(folder, suffix, radius_mm, partial(_copy, path)))
             self._replace_views(folder, set(names))
         return tuple(names)
 
@@ -160,7 +156,27 @@ class KeptSession:
         taken = {f"{FOLDERS[stage]}/{name}" for name in names}
         return taken, self._replaced.get(min(taken), _Replaced())
 
-    def _keep(self, name: str, radius_mm: float | None, write: Callable[[], None]) -> None:
+    def _keep(
+        self,
+        folder: str,
+        suffix: str,
+        radius_mm: float | None,
+        write: Callable[[Path, Path], None],
+    ) -> str:
+        """Write a picture under the next free name, and return that.
+
+        Another program that captures into the same session may take a name at this moment.
+        """
+        while True:
+            name = self._next_name(folder, suffix)
+            place = partial(write, self._session.folder, self._session.folder / folder / name)
+            try:
+                self._keep_as(name, radius_mm, place)
+            except NameTakenError:
+                continue
+            return name
+
+    def _keep_as(self, name: str, radius_mm: float | None, write: Callable[[], None]) -> None:
         """Write a picture; its radius first, so that no press ever stands with another's."""
         before = self._session.ball_radii_mm.get(name)
         if radius_mm is not None:
@@ -314,10 +330,14 @@ _STEMS = {
 }
 
 
-def _copy(source: Path, target: Path) -> None:
+def _copy(source: Path, session: Path, target: Path) -> None:
     data = read_bytes(source)
     make_folder(target.parent)
-    write_atomically(target, lambda stream: stream.write(data))
+    write_atomically(target, lambda stream: stream.write(data), new=True, inside=session)
+
+
+def _write(rgb: Frame, session: Path, target: Path) -> None:
+    write_picture(rgb, target, new=True, inside=session)
 
 
 def _with(mapping: Mapping[Any, Any], key: Any, value: Any) -> dict[Any, Any]:

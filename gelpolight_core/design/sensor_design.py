@@ -6,7 +6,7 @@ guessed.
 
 from __future__ import annotations
 
-import tomllib
+import math
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ from gelpolight_core.design.parts import (
     SessionDesign,
 )
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import NAME_LIMIT, brief, parse_toml, plain_text, read_file
+from gelpolight_core.session.wholeness import MAX_PIXELS
 from gelpolight_core.translation import tr
 
 _THREE_LEDS = (
@@ -57,6 +59,10 @@ _EIGHT_PRESSES = (
     Press("coin", 8.0, 0.6, -1.0, -1.2, 10.0),
     Press("nut", 5.5, 0.8, 2.5, -1.5, 12.0),
 )
+
+
+# No number of a sensor has more digits; larger ones do not fit into the machine's.
+MOST = 10**15
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +143,14 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
             where=f"{where} [layers]",
             advice=tr("Increase top_distance_mm or make the layers thinner"),
         )
+    if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
+        raise InputError(
+            tr("the camera has {w} x {h} pixels").format(
+                w=design.camera.width_px, h=design.camera.height_px
+            ),
+            where=f"{where} [camera]",
+            advice=tr("Use at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
+        )
     if design.camera.bit_depth not in (8, 16):
         raise InputError(
             tr("bit_depth is {n}").format(n=design.camera.bit_depth),
@@ -145,14 +159,14 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
         )
     if design.camera.response not in RESPONSES:
         raise InputError(
-            tr("there is no response {name!r}").format(name=design.camera.response),
+            tr("there is no response {name}").format(name=brief(design.camera.response)),
             where=f"{where} [camera]",
             advice=tr("Use one of {names}").format(names=", ".join(RESPONSES)),
         )
     for press in design.presses:
         if press.shape not in SHAPES:
             raise InputError(
-                tr("there is no shape {shape!r}").format(shape=press.shape),
+                tr("there is no shape {shape}").format(shape=brief(press.shape)),
                 where=f"{where} [[presses]]",
                 advice=tr("Use one of {shapes}").format(shapes=", ".join(SHAPES)),
             )
@@ -169,7 +183,7 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
             # A NaN compares as false, so it is refused as well.
             if not np.all((numbers >= low) & (numbers <= high)):
                 raise InputError(
-                    tr("{name} is {value}").format(name=name, value=value),
+                    tr("{name} is {value}").format(name=name, value=brief(value)),
                     where=where,
                     advice=tr("Use a number from {low} to {high}").format(low=low, high=high),
                 )
@@ -215,15 +229,15 @@ def read_design(path: Path) -> SensorDesign:
         kind or out of range.
     """
     path = Path(path)
-    if not path.is_file():
+    try:
+        table = parse_toml(read_file(path))
+    except FileNotFoundError as error:
         raise InputError(
             tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
-        )
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        ) from error
+    except ValueError as error:
         raise InputError(
-            tr("the file is not valid TOML ({error})").format(error=error),
+            tr("the file is not valid TOML ({error})").format(error=brief(str(error), 200)),
             where=str(path),
             advice=tr("Correct the line that is named"),
         ) from error
@@ -263,11 +277,18 @@ def _part(kind: type[Any], table: Any, *, where: str) -> Any:
     )
 
 
+def _is_plain(text: str) -> bool:
+    try:
+        return bool(plain_text(text, NAME_LIMIT))
+    except ValueError:
+        return False
+
+
 def _refuse_unknown(table: dict[str, Any], known: set[str], *, where: str) -> None:
     unknown = sorted(set(table) - known)
     if unknown:
         raise InputError(
-            tr("unknown key {keys}").format(keys=", ".join(unknown)),
+            tr("unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
             where=where,
             advice=tr("Use only {known}").format(known=", ".join(sorted(known))),
         )
@@ -281,23 +302,23 @@ def _converted(value: Any, like: Any, *, where: str) -> Any:
             return tuple(_converted(v, x, where=where) for v, x in pairs)
         kind = tr("a list of {n}").format(n=len(like))
     elif isinstance(like, str):
-        if isinstance(value, str):
+        if isinstance(value, str) and _is_plain(value):
             return value
-        kind = tr("a text")
+        kind = tr("a plain text")
     elif isinstance(like, bool):
         if isinstance(value, bool):
             return value
         kind = tr("true or false")
     elif isinstance(like, int):
-        if isinstance(value, int) and not isinstance(value, bool):
+        if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST:
             return value
         kind = tr("a whole number")
     else:
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value)
+            return float(value) if abs(value) < MOST else math.inf
         kind = tr("a number")
     raise InputError(
-        tr("the value is {value!r}").format(value=value),
+        tr("the value is {value}").format(value=brief(value)),
         where=where,
         advice=tr("Give {kind}").format(kind=kind),
     )

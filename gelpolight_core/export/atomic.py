@@ -14,7 +14,17 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
-def write_atomically(path: Path, writer: Callable[[BinaryIO], object]) -> None:
+class NameTakenError(InputError):
+    """A new file cannot be written because there is one of its name."""
+
+
+def write_atomically(
+    path: Path,
+    writer: Callable[[BinaryIO], object],
+    *,
+    new: bool = False,
+    inside: Path | None = None,
+) -> None:
     """Write a file in such a way that other programs see the old one or the new one whole.
 
     The bytes go to a temporary file in the same folder, are brought to the disk, and take the
@@ -28,15 +38,35 @@ def write_atomically(path: Path, writer: Callable[[BinaryIO], object]) -> None:
         Where the file shall be; its folder must exist.
     writer : callable
         Gets the open binary file (which can seek) and writes into it.
+    new : bool, optional
+        Whether it never takes the place of another file, not even of one that another program
+        writes at this moment.
+    inside : Path, optional
+        A folder that somebody else may have made: links in it that lead out of it are not
+        followed.
 
     Raises
     ------
+    NameTakenError
+        Where a new file has the name of an old one.
     InputError
         Where the file cannot be written: no such folder, no permission, disk full.
     """
     target = _ordinary_target(path)
+    if inside is not None and not target.is_relative_to(os.path.realpath(inside)):
+        raise InputError(
+            tr("it is a link that leads out of the folder"),
+            where=str(path),
+            advice=tr("Put the file or folder itself in the place of the link"),
+        )
     try:
-        _write_and_replace(target, _temporary_for(target), writer)
+        _write_and_place(target, _temporary_for(target), writer, _place_new if new else os.replace)
+    except FileExistsError as error:
+        if not new:
+            raise cannot_write(error, path) from error
+        raise NameTakenError(
+            tr("there is a file of this name"), where=str(path), advice=tr("Choose another name")
+        ) from error
     except OSError as error:
         raise cannot_write(error, path) from error
 
@@ -91,7 +121,25 @@ def _temporary_for(target: Path) -> Path:
     return target.with_name(f".{target.name[:200]}.{secrets.token_hex(4)}.part")
 
 
-def _write_and_replace(target: Path, temporary: Path, writer: Callable[[BinaryIO], object]) -> None:
+def _place_new(temporary: Path, target: Path) -> None:
+    """Give a file its name, which no other file may have."""
+    try:
+        os.link(temporary, target)
+    except FileExistsError:
+        raise
+    except OSError:  # a disk without links: the name is taken first
+        target.open("xb").close()
+        os.replace(temporary, target)
+    else:
+        temporary.unlink()
+
+
+def _write_and_place(
+    target: Path,
+    temporary: Path,
+    writer: Callable[[BinaryIO], object],
+    place: Callable[[Path, Path], None],
+) -> None:
     # Not tempfile: its files can be read by their owner only, and would stay so.
     file = temporary.open("x+b")
     try:
@@ -101,7 +149,7 @@ def _write_and_replace(target: Path, temporary: Path, writer: Callable[[BinaryIO
             os.fsync(file.fileno())
         if target.is_file():
             temporary.chmod(stat.S_IMODE(target.stat().st_mode))
-        os.replace(temporary, target)
+        place(temporary, target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise

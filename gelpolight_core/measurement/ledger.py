@@ -18,9 +18,10 @@ import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.session.wholeness import unreadable
+from gelpolight_core.reading import parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
+SIZE_LIMIT = 100_000_000
 PAIRS = ("side_mm", "centre_mm")
 SPREADS = ("sd", "noise_sd", "calibration_sd")
 """Fields of a measurement that are no plain values, and that hold some."""
@@ -47,12 +48,14 @@ class Ledger:
         self._known: dict[str, Measurement | str] = {}
         # A line that a crash cut short is no line; the next one begins on a line of its own.
         self._torn = False
-        if path is None or not path.is_file():
+        if path is None:
             return
         try:
-            lines = path.read_text(encoding="utf-8").split("\n")
-        except (OSError, UnicodeDecodeError) as error:
-            raise _damaged(path, error) from error
+            lines = read_file(path, SIZE_LIMIT).decode().split("\n")
+        except FileNotFoundError:
+            return
+        except UnicodeDecodeError as error:
+            raise _damaged(path) from error
         self._torn = bool(lines[-1])
         for line in lines:
             self._take_in(line)
@@ -96,12 +99,12 @@ class Ledger:
     def _take_in(self, line: str) -> None:
         """Take in one line; one that was torn is measured again."""
         try:
-            content = json.loads(line)
+            content = parse_json(line)
             outcome = content["outcome"]
             self._known[content["key"]] = (
-                outcome if isinstance(outcome, str) else _measurement(outcome)
+                plain_text(outcome) if isinstance(outcome, str) else _measurement(outcome)
             )
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError):
             return
 
 
@@ -114,9 +117,7 @@ def unwritable(error: OSError, path: Path) -> InputError:
     )
 
 
-def _damaged(path: Path, error: OSError | UnicodeDecodeError) -> InputError:
-    if isinstance(error, OSError):
-        return unreadable(error, path)
+def _damaged(path: Path) -> InputError:
     return InputError(
         tr("the file is not text in UTF-8"),
         where=str(path),

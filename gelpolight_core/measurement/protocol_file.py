@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -12,6 +11,7 @@ import tomli_w
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.measurement.protocol import Protocol, check_protocol
+from gelpolight_core.reading import brief, parse_toml, read_file
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 
@@ -19,6 +19,7 @@ FILE_NAME = "protocol.toml"
 FORMAT = "gelpolight-protocol"
 VERSION = 1
 SIZE_LIMIT = 100_000
+LONGEST_MM = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,17 +86,16 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
     """
     path = folder / FILE_NAME
     try:
-        with path.open("rb") as stream:
-            content = tomllib.loads(stream.read(SIZE_LIMIT).decode("utf-8-sig"))
+        content = parse_toml(read_file(path, SIZE_LIMIT))
     except FileNotFoundError as error:
         raise InputError(
             tr("there is no {name}").format(name=FILE_NAME),
             where=str(folder),
             advice=tr("Name the folder of a run of the evaluation protocol"),
         ) from error
-    except (OSError, ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InputError(
-            tr("the protocol cannot be read ({reason})").format(reason=error),
+            tr("the protocol cannot be read ({reason})").format(reason=brief(str(error), 200)),
             where=str(path),
             advice=tr("Mend the file; the presses beside it are whole"),
         ) from error
@@ -142,11 +142,13 @@ def _texts(table: Table, key: str) -> tuple[str, ...]:
     value: Any = table.content.get(key)
     if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
         raise table.wrong(key, tr("is not a list of texts"))
-    return tuple(value)
+    return tuple(brief(text) for text in value)
 
 
 def _lengths(table: Table, key: str) -> tuple[float, ...]:
     value: Any = table.content.get(key)
-    if not isinstance(value, list) or not all(type(x) in (int, float) for x in value):
+    if not isinstance(value, list) or not all(
+        type(x) in (int, float) and abs(x) <= LONGEST_MM for x in value
+    ):
         raise table.wrong(key, tr("is not a list of lengths"))
     return tuple(float(x) for x in value)

@@ -30,6 +30,7 @@ from gelpolight_core.measurement.protocol_file import (
     read_protocol_file,
     write_protocol_file,
 )
+from gelpolight_core.reading import brief, read_file
 from gelpolight_core.session.capture import average_frames, write_picture
 from gelpolight_core.translation import tr
 
@@ -156,8 +157,10 @@ class ProtocolRun:
         InputError
             If ``truth.csv`` cannot be written.
         """
-        rows = {**self._rows, press.file: _row(press)}
         order = {wanted.file: k for k, wanted in enumerate(self.wanted)}
+        # What another program has added to the same run meanwhile stays.
+        there = {row[0]: row for row in _read_rows(self.presses / TRUTH) if row[0] in order}
+        rows = {**self._rows, **there, press.file: _row(press)}
         _write_rows([rows[file] for file in sorted(rows, key=order.__getitem__)], self.presses)
         self._rows = rows
 
@@ -256,7 +259,7 @@ def open_run(folder: Path) -> ProtocolRun:
         press = wanted.get(row[0])
         if press is None or len(row) != len(COLUMNS) or row[1:-1] != _row(press)[1:-1]:
             raise InputError(
-                tr("the row of {file} is not of this protocol").format(file=row[0]),
+                tr("the row of {file} is not of this protocol").format(file=brief(row[0])),
                 where=str(presses / TRUTH),
                 advice=tr("Put protocol.toml and truth.csv back as they were written"),
             )
@@ -321,17 +324,17 @@ def _write_rows(rows: Sequence[Sequence[str]], presses: Path) -> None:
 
 
 def _read_rows(path: Path) -> list[list[str]]:
-    if not path.is_file():
-        return []
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_file(path).decode("utf-8-sig")
+        lines = [row for row in csv.reader(text.splitlines()) if row]
+    except FileNotFoundError:
+        return []
+    except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(
             tr("the file cannot be read ({reason})").format(reason=error),
             where=str(path),
             advice=tr("Mend it; the pictures beside it are whole"),
         ) from error
-    lines = [row for row in csv.reader(text.splitlines()) if row]
     if not lines or tuple(lines[0]) != COLUMNS:
         raise InputError(
             tr("the first line is not that of a protocol's run"),
@@ -352,7 +355,7 @@ def _append(path: Path, line: str) -> None:
 
 
 def _count_lines(path: Path) -> int:
-    if not path.is_file():
+    try:
+        return read_file(path).count(b"\n")
+    except FileNotFoundError:
         return 0
-    with path.open("rb") as file:
-        return sum(1 for _ in file)

@@ -11,10 +11,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.calibration.manifest import UNREADABLE, read_member
 from gelpolight_core.errors import InputError
+from gelpolight_core.export.npy import array_of
+from gelpolight_core.reading import open_file
 from gelpolight_core.translation import tr
 
 PLATEAU = 0.98
+# 64 megapixels of 8 bytes.
+MOST_BYTES = 512_000_000 + 4096
 KEYS = ("depth_mm", "x0_mm", "y0_mm", "pitch_mm")
 
 
@@ -141,17 +146,22 @@ def read_true_depth(path: Path) -> TrueDepth:
     InputError
         If the file is missing, is not such a file, or lacks one of these.
     """
-    if not path.is_file():
+    try:
+        with open_file(path) as stream, zipfile.ZipFile(stream) as archive:
+            depth, x0, y0, pitch = (
+                array_of(read_member(archive, f"{key}.npy", MOST_BYTES)).astype(np.float64)
+                for key in KEYS
+            )
+    except FileNotFoundError as error:
         raise InputError(
             tr("there is no such file"),
             where=str(path),
             advice=tr("Use a session that holds the true depth of its presses"),
-        )
-    try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
-            depth, x0, y0, pitch = (np.asarray(data[key], np.float64) for key in KEYS)
-    except (KeyError, TypeError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        ) from error
+    except UNREADABLE as error:
         raise _not_a_truth(path) from error
+    if not x0.size == y0.size == pitch.size == 1:
+        raise _not_a_truth(path)
     if depth.ndim != 2 or not pitch > 0.0 or not np.isfinite(depth).all():
         raise _not_a_truth(path)
     rows, columns = depth.shape

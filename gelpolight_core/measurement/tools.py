@@ -10,10 +10,11 @@ from typing import Any, cast
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.indenter_tools import Ball, Cuboid, Cylinder
-from gelpolight_core.measurement.outline_tools import Circle, RectangleTool
+from gelpolight_core.measurement.outline_tools import EDGES, Circle, RectangleTool
 from gelpolight_core.measurement.point_tools import Angle, Distance, StepHeight
 from gelpolight_core.measurement.profile_tools import ProfileAngle, ProfileStep, ProfileWidth
 from gelpolight_core.measurement.tool import Tool, ToolResult
+from gelpolight_core.reading import brief
 from gelpolight_core.translation import tr
 
 __all__ = [
@@ -78,7 +79,7 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
     kind = TOOLS.get(name) if isinstance(name, str) else None
     if kind is None:
         raise InputError(
-            tr("unknown tool {name}").format(name=repr(name)),
+            tr("unknown tool {name}").format(name=brief(name)),
             where=tr("measuring tool"),
             advice=tr("Choose one of {names}").format(names=", ".join(TOOLS)),
         )
@@ -91,7 +92,7 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
         raise InputError(
             tr("{key} is missing").format(key=missing[0])
             if missing
-            else tr("{key} is not known").format(key=wrong[0]),
+            else tr("{key} is not known").format(key=brief(wrong[0])),
             where=tr("measuring tool {name}").format(name=name),
             advice=tr("It needs {names}").format(names=", ".join(known)),
         )
@@ -153,13 +154,15 @@ def _value(field: Field[Any], value: Any, tool: Any) -> Any:
                 _number(value.get("yaw_deg", 0.0)),
             )
         if kind == "Edge":
-            return str(value)
+            if value not in EDGES:
+                raise ValueError("no such edge")
+            return value
         if kind.startswith("tuple"):
             return tuple(_point(part) for part in value)
         return _point(value) if kind.startswith("Point") else _number(value)
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
+    except (TypeError, ValueError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("{key} is {value}").format(key=field.name, value=repr(value)),
+            tr("{key} is {value}").format(key=field.name, value=brief(value)),
             where=tr("measuring tool {name}").format(name=tool),
             advice=tr("Give lengths in mm as numbers, a place as two of them"),
         ) from error
@@ -172,8 +175,8 @@ def _point(value: Any) -> tuple[float, float]:
 
 def _number(value: Any) -> float:
     if isinstance(value, (bool, str)):
-        raise ValueError(f"{value!r} is no number")
+        raise ValueError("it is no number")
     number = float(value)
     if not abs(number) < 1e6:
-        raise ValueError(f"{value!r} is no length")
+        raise ValueError("it is no length")
     return number

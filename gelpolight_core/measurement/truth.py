@@ -10,8 +10,10 @@ from pathlib import Path
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Truth
+from gelpolight_core.reading import brief, is_file_name, read_file
 from gelpolight_core.translation import tr
 
+LONGEST_MM = 1000.0
 NEEDED = ("file", "shape", "height_mm")
 
 
@@ -77,6 +79,12 @@ def read_truth(path: Path) -> TruthTable:
             raise InputError(
                 tr("a row names no file"), where=where, advice=tr("Name the picture of the press")
             )
+        if not is_file_name(file):
+            raise InputError(
+                tr("'{file}' is not the name of a picture in this folder").format(file=brief(file)),
+                where=where,
+                advice=tr("Put the picture beside truth.csv, and name it without a folder"),
+            )
         if file in seen:
             raise InputError(
                 tr("{file} stands here a second time").format(file=file),
@@ -100,7 +108,7 @@ def read_truth(path: Path) -> TruthTable:
 def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
     """Return the rows with their line numbers, keys and values stripped."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_file(path).decode("utf-8-sig")
     except FileNotFoundError as error:
         raise InputError(
             tr("there is no such file"),
@@ -116,7 +124,15 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
             advice=tr("Save it again as CSV in UTF-8"),
         ) from error
     reader = csv.reader(text.splitlines())
-    header = [name.strip() for name in next(reader, [])]
+    try:
+        numbered = [(reader.line_num, cells) for cells in reader]
+    except csv.Error as error:
+        raise InputError(
+            tr("the file is not a table ({error})").format(error=error),
+            where=tr("{path}, line {line}").format(path=path, line=reader.line_num),
+            advice=tr("Save it again as CSV in UTF-8"),
+        ) from error
+    header = [name.strip() for name in numbered[0][1]] if numbered else []
     missing = [name for name in NEEDED if name not in header]
     if not {"diameter_mm", "side_mm"} & set(header):
         missing.append("diameter_mm")
@@ -127,8 +143,8 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
             advice=tr("Write the column names in the first line, separated by commas"),
         )
     return [
-        (reader.line_num, dict(zip(header, (cell.strip() for cell in cells), strict=False)))
-        for cells in reader
+        (line, dict(zip(header, (cell.strip() for cell in cells), strict=False)))
+        for line, cells in numbered[1:]
         if any(cell.strip() for cell in cells)
     ]
 
@@ -145,12 +161,14 @@ def _length(record: dict[str, str], key: str, where: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if math.isfinite(value) and value > 0.0:
+    if 0.0 < value <= LONGEST_MM:
         return value
     raise InputError(
-        tr("{key} is '{text}'").format(key=key, text=text)
+        tr("{key} is '{text}'").format(key=key, text=brief(text))
         if text
         else tr("{key} is empty").format(key=key),
         where=where,
-        advice=tr("Give a length in mm greater than zero"),
+        advice=tr("Give a length in mm greater than zero")
+        if not value > LONGEST_MM
+        else tr("Give a length of at most {most:g} mm").format(most=LONGEST_MM),
     )

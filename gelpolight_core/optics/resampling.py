@@ -119,9 +119,7 @@ def build_resampling_table(
             where=tr("camera"),
             advice=tr("Use pictures of at most {n} pixels a side").format(n=FLOAT32_MAX_PIXELS),
         )
-    if pitch_mm is None:
-        pitch_mm = paraxial_footprint_mm(camera, stack)
-    grid = _visible_grid(camera, plane, stack, working_diameter_mm, pitch_mm)
+    grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
     points = grid.points_mm()
     directions = membrane_to_camera(points, plane, stack)
     pixels = camera.project(directions)
@@ -151,10 +149,30 @@ def paraxial_footprint_mm(camera: Camera, stack: LayerStack) -> float:
     return apparent / max(camera.fx, camera.fy)
 
 
-def _visible_grid(
-    camera: Camera, plane: TopPlane, stack: LayerStack, diameter_mm: float, pitch_mm: float
+def visible_grid(
+    camera: Camera,
+    plane: TopPlane,
+    stack: LayerStack,
+    *,
+    diameter_mm: float,
+    pitch_mm: float | None = None,
 ) -> MembraneGrid:
-    """Return the grid over the seen part of the working circle, in transform-friendly sizes."""
+    """Return the grid over the seen part of the working circle, in transform-friendly sizes.
+
+    Parameters
+    ----------
+    camera, plane, stack, pitch_mm
+        As in :func:`build_resampling_table`.
+    diameter_mm : float
+        Of the working circle.
+
+    Raises
+    ------
+    InputError
+        If the camera sees nothing of the working circle, or the grid would be too large.
+    """
+    if pitch_mm is None:
+        pitch_mm = paraxial_footprint_mm(camera, stack)
     u = np.linspace(0.0, camera.width - 1, 65)
     v = np.linspace(0.0, camera.height - 1, 65)
     border = np.concatenate(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
 import struct
 import zlib
@@ -14,14 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import open_file, parse_json, unreadable
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.layout import FrameMark
 from gelpolight_core.recording.pixels import strip_rows, unpack_strip
 from gelpolight_core.recording.recording import VERSION, RecordedFrame, RecordingHeader, Rgb
-from gelpolight_core.session.wholeness import MAX_PIXELS, unreadable
+from gelpolight_core.session.wholeness import MAX_PIXELS
 from gelpolight_core.translation import tr
 
 SEARCH_BYTES = 1 << 20
+# Thirty million years: their differences are numbers still.
+MOST_S = 1e15
 
 
 class Recording:
@@ -76,13 +77,12 @@ class Recording:
             damaged.
         """
         try:
-            file = os.open(path, os.O_RDONLY | getattr(os, "O_CLOEXEC", 0))
+            with open_file(path) as stream:
+                file = os.dup(stream.fileno())
         except FileNotFoundError as error:
             raise InputError(
                 tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
             ) from error
-        except OSError as error:
-            raise unreadable(error, path) from error
         try:
             return cls(path, file)
         except OSError as error:
@@ -155,9 +155,9 @@ class Recording:
 def is_recording(path: Path) -> bool:
     """Return whether a file says that it is a recording, whatever its name and state."""
     try:
-        with path.open("rb") as stream:
+        with open_file(path) as stream:
             head = stream.read(layout.CLOSING_AT)
-    except OSError:
+    except (OSError, InputError):
         return False
     return head[layout.HEAD_AT :].startswith(layout.MAGIC)
 
@@ -185,7 +185,7 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
         text = os.pread(file, length, layout.DESCRIPTION_AT)
         if zlib.crc32(struct.pack("<II", version, length) + text) == crc:
             try:
-                return RecordingHeader.from_json(json.loads(text)), layout.padded(end)
+                return RecordingHeader.from_json(parse_json(text)), layout.padded(end)
             except ValueError:
                 pass  # damaged as much as one whose checksum is wrong
     raise InputError(
@@ -230,6 +230,9 @@ def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bo
     inside = end <= size and all(
         place < strip.place and strip.place + strip.size <= end for strip in mark.strips
     )
+    # The last strip may be shorter; a strip that cannot be packed any more takes a little more.
+    most = _most_bytes(mark) if mark.strips else 0
+    inside = inside and all(strip.size <= most for strip in mark.strips)
     shaped = (
         mark.bits in (8, 16)
         and 0 < mark.rows * mark.columns <= MAX_PIXELS
@@ -239,4 +242,10 @@ def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bo
         (mark.rows, mark.columns, mark.bits) == (before[0].rows, before[0].columns, before[0].bits)
         and mark.number > before[-1].number
     )
-    return inside and shaped and alike and math.isfinite(mark.time_s)
+    return inside and shaped and alike and abs(mark.time_s) <= MOST_S
+
+
+def _most_bytes(mark: FrameMark) -> int:
+    """Return what a packed strip takes at most, before memory is taken for it."""
+    plain = mark.rows_per_strip * mark.columns * 3 * mark.bits // 8
+    return plain + plain // 8 + 4096

@@ -41,10 +41,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
+from gelpolight_core.reading import written_text
 
 ENDING = ".gplrec"
 FORMAT = "gelpolight-recording"
 VERSION = 1
+MOST_SETTING = 1e15
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]
 SettingValue = float | str | bool
@@ -116,12 +118,16 @@ class RecordingHeader:
             raise ValueError("not the description of a recording")
         settings = content.get("settings")
         texts: dict[str, Any] = {name: content.get(name) for name in _TEXTS}
-        if not all(isinstance(text, str) for text in texts.values()):
-            raise ValueError("a text is missing")
+        for text in texts.values():
+            written_text(text)
         if not isinstance(settings, dict):
             raise ValueError("the settings are missing")
-        if not all(isinstance(value, float | int | str) for value in settings.values()):
-            raise ValueError("a setting is neither a number nor a text")
+        for key, value in settings.items():
+            written_text(key)
+            if isinstance(value, str):
+                written_text(value)
+            elif not isinstance(value, float | int) or not abs(value) < MOST_SETTING:
+                raise ValueError("a setting is neither a number nor a text")
         return cls(settings=settings, **texts)
 
 

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import brief
 from gelpolight_core.translation import tr
 
 DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
@@ -18,22 +19,24 @@ def in_plain_words(path: Path) -> Iterator[None]:
     """Raise InputError for what the database or the disk refuses inside of the block."""
     try:
         yield
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         found, advice = _plain_words(error)
         raise InputError(found, where=str(path), advice=advice) from error
 
 
-def is_damage(error: sqlite3.Error) -> bool:
+def is_damage(error: sqlite3.Error | UnicodeDecodeError) -> bool:
     """Return whether an error says that the file itself is spoilt."""
     return _code(error) in DAMAGED
 
 
-def _code(error: sqlite3.Error) -> int:
+def _code(error: sqlite3.Error | UnicodeDecodeError) -> int:
+    if isinstance(error, UnicodeDecodeError):
+        return sqlite3.SQLITE_CORRUPT  # so much so that it cannot even be told
     # The lower byte is the kind; what stands above it is a detail.
     return int(getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR)) & 0xFF
 
 
-def _plain_words(error: sqlite3.Error) -> tuple[str, str]:
+def _plain_words(error: sqlite3.Error | UnicodeDecodeError) -> tuple[str, str]:
     match _code(error):
         case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
             return tr("another program is holding the records"), tr(
@@ -53,6 +56,6 @@ def _plain_words(error: sqlite3.Error) -> tuple[str, str]:
             return tr("the records are damaged"), tr(
                 "Start the program again: it keeps the damaged file aside and begins a new one"
             )
-    return tr("the records cannot be used ({reason})").format(reason=error), tr(
+    return tr("the records cannot be used ({reason})").format(reason=brief(str(error))), tr(
         "Check the disk, and try again"
     )

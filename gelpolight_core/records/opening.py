@@ -9,6 +9,9 @@ from pathlib import Path
 from gelpolight_core.export.atomic import cannot_write
 from gelpolight_core.records.schema import bring_up_to_date
 
+VALUE_LIMIT = 10_000_000
+"""Bytes of one value, or of one row."""
+
 
 def connect(path: Path, busy_s: float) -> sqlite3.Connection:
     """Open the file, or begin one; bring its tables up to date and look through it for damage.
@@ -28,6 +31,10 @@ def connect(path: Path, busy_s: float) -> sqlite3.Connection:
         connection.row_factory = sqlite3.Row
         connection.execute("PRAGMA synchronous = EXTRA")
         connection.execute("PRAGMA foreign_keys = ON")
+        # What the file says of itself runs nothing, and no value of it fills the memory.
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.execute("PRAGMA cell_size_check = ON")
+        connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, VALUE_LIMIT)
         bring_up_to_date(connection, path)
         (state,) = connection.execute("PRAGMA quick_check(1)").fetchone()
         if state != "ok":

@@ -21,6 +21,7 @@ from types import TracebackType
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import brief, written_text
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.faults import in_plain_words, is_damage
 from gelpolight_core.records.opening import connect, keep_aside
@@ -90,7 +91,7 @@ class Records:
         """
         try:
             return cls(path, connect(path, busy_s))
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             if not is_damage(error):
                 with in_plain_words(path):
                     raise
@@ -134,7 +135,7 @@ class Records:
         *,
         removed: bool = False,
     ) -> tuple[MeasurementRecord, ...]:
-        """Return measurements, oldest first.
+        """Return measurements in the order in which they were kept, whatever the clock said.
 
         Parameters
         ----------
@@ -161,7 +162,7 @@ class Records:
         chosen = " AND ".join(where)
         with self._reading() as connection:
             rows = connection.execute(
-                f"SELECT m.* FROM measurements m WHERE {chosen} ORDER BY m.time, m.id", values
+                f"SELECT m.* FROM measurements m WHERE {chosen} ORDER BY m.id", values
             ).fetchall()
             parts = connection.execute(
                 "SELECT q.* FROM quantities q JOIN measurements m ON m.id = q.measurement_id"
@@ -170,14 +171,8 @@ class Records:
             ).fetchall()
         try:
             return records_of(rows, parts)
-        except (ValueError, TypeError, KeyError) as error:
-            raise InputError(
-                tr("the records hold something that no measurement is ({reason})").format(
-                    reason=error
-                ),
-                where=str(self.path),
-                advice=tr("Move the file away, or bring back an older copy of it"),
-            ) from error
+        except (ValueError, TypeError, KeyError, ArithmeticError) as error:
+            raise self._no_measurement(error) from error
 
     def update_note(self, number: int, note: str) -> None:
         """Change what the person wrote of a measurement.
@@ -240,7 +235,7 @@ class Records:
         return statistics_of(values)
 
     def drift(self, serial: str, quantity: str | None = None) -> Drift:
-        """Return the errors of a sensor's measurements that have a truth, oldest first.
+        """Return the errors of a sensor's measurements that have a truth, in that order.
 
         Parameters
         ----------
@@ -281,7 +276,10 @@ class Records:
         """Return the serials of all sensors that were measured with."""
         with self._reading() as connection:
             rows = connection.execute("SELECT serial FROM sensors ORDER BY serial").fetchall()
-        return tuple(row["serial"] for row in rows)
+        try:
+            return tuple(written_text(row["serial"]) for row in rows)
+        except ValueError as error:
+            raise self._no_measurement(error) from error
 
     def know_calibration(
         self, identity: str, serial: str, *, model: str = "", made: str = "", verdict: str = ""
@@ -317,6 +315,15 @@ class Records:
     ) -> None:
         """Close the file."""
         self.close()
+
+    def _no_measurement(self, error: Exception) -> InputError:
+        return InputError(
+            tr("the records hold something that no measurement is ({reason})").format(
+                reason=brief(str(error), 200)
+            ),
+            where=str(self.path),
+            advice=tr("Move the file away, or bring back an older copy of it"),
+        )
 
     def _change(self, number: int, what: str, value: str | None) -> None:
         with self._writing() as connection:

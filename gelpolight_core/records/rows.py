@@ -6,9 +6,12 @@ import json
 import sqlite3
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Any
 
+from gelpolight_core.reading import parse_json, written_text
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
+
+# As much as one value of the database may hold.
+MOST_TEXT = 10_000_000
 
 
 def text_of(time: datetime) -> str:
@@ -58,24 +61,24 @@ def records_of(
 
 
 def _quantity(row: sqlite3.Row) -> Quantity:
-    return Quantity(row["name"], row["value"], row["sd"], row["truth"], row["limit_percent"])
+    numbers = (row["value"], row["sd"], row["truth"], row["limit_percent"])
+    return Quantity(written_text(row["name"]), *numbers)
+
+
+_TEXTS = ("serial", "shape", "verdict", "reason", "operator", "picture", "note")
 
 
 def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRecord:
-    settings: dict[str, Any] = json.loads(row["settings"])
-    details: dict[str, Any] = json.loads(row["details"])
+    settings, details = parse_json(row["settings"]), parse_json(row["details"])
+    if not isinstance(settings, dict) or not isinstance(details, dict):
+        raise ValueError("the settings of a measurement are no table")
+    texts = {name: written_text(row[name], MOST_TEXT) for name in _TEXTS}
     return MeasurementRecord(
-        serial=row["serial"],
-        calibration_id=row["calibration_id"] or "",
-        shape=row["shape"],
+        **texts,
+        calibration_id=written_text(row["calibration_id"] or ""),
         quantities=quantities,
-        verdict=row["verdict"],
-        reason=row["reason"],
         settings=settings,
         details=details,
-        operator=row["operator"],
         time=datetime.fromisoformat(row["time"]),
-        picture=row["picture"],
-        note=row["note"],
         id=row["id"],
     )

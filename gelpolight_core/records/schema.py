@@ -69,6 +69,7 @@ def bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
         If it cannot be read or written.
     """
     if _version(connection, path) == len(MIGRATIONS):
+        refuse_other_tables(connection, path)
         return
     connection.execute("BEGIN IMMEDIATE")
     try:
@@ -82,6 +83,36 @@ def bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
     except BaseException:
         connection.rollback()
         raise
+
+
+def refuse_other_tables(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse views, triggers and tables that this program did not make: they may run for ever.
+
+    Raises
+    ------
+    InputError
+        If there are any, or one of ours is missing or another.
+    """
+    own = sqlite3.connect(":memory:")
+    try:
+        for statements in MIGRATIONS:
+            for statement in statements:
+                own.execute(statement)
+        wanted = _tables(own)
+    finally:
+        own.close()
+    if _tables(connection) != wanted:
+        raise InputError(
+            tr("the records hold other tables than this program makes"),
+            where=str(path),
+            advice=tr("Move the file away, or bring back an older copy of it"),
+        )
+
+
+def _tables(connection: sqlite3.Connection) -> set[tuple[object, ...]]:
+    rows = connection.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
+    # What SQLite keeps for itself: indices of its own, the last numbers, statistics.
+    return {(r[0], r[1], r[2]) for r in rows if not str(r[1]).startswith("sqlite_")}
 
 
 def _version(connection: sqlite3.Connection, path: Path) -> int:

@@ -22,14 +22,20 @@ def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
     """Return the lines of the table, under :data:`COLUMNS`; None where a value is not known."""
     return [
         (
-            r.id, r.time.strftime("%Y-%m-%d %H:%M:%S"), r.serial, r.calibration_id, r.shape,
-            q.name, q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent,
-            r.verdict, r.reason, r.operator, r.picture, r.note,
+            r.id, r.time.strftime("%Y-%m-%d %H:%M:%S"), _said(r.serial), _said(r.calibration_id),
+            _said(r.shape), _said(q.name),
+            q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent,
+            _said(r.verdict), _said(r.reason), _said(r.operator), _said(r.picture), _said(r.note),
             json.dumps(dict(r.settings), ensure_ascii=False) if r.settings else "",
         )
         for r in records
         for q in r.quantities
     ]  # fmt: skip
+
+
+def _said(text: str) -> str:
+    """Return a text so that no spreadsheet takes it for a formula and computes it."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
 def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:

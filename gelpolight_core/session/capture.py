@@ -34,8 +34,17 @@ def average_frames(frames: Sequence[Frame]) -> Frame:
     return np.asarray(np.round(total * (scale / len(frames))), np.uint16)
 
 
-def write_picture(rgb: Frame, path: Path) -> None:
+def write_picture(rgb: Frame, path: Path, *, new: bool = False, inside: Path | None = None) -> None:
     """Write a PNG file, whole or not at all.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        The picture.
+    path : Path
+        Where; its folder is made.
+    new, inside
+        As in :func:`~gelpolight_core.export.atomic.write_atomically`.
 
     Raises
     ------
@@ -48,4 +57,4 @@ def write_picture(rgb: Frame, path: Path) -> None:
         raise InputError(
             tr("the picture cannot be encoded"), where=str(path), advice=tr("Capture it again")
         )
-    write_atomically(path, lambda stream: stream.write(data.tobytes()))
+    write_atomically(path, lambda stream: stream.write(data.tobytes()), new=new, inside=inside)

@@ -7,14 +7,21 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.wholeness import unreadable
+from gelpolight_core.reading import open_file, unreadable
 from gelpolight_core.translation import tr
 
 
 def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal text."""
+    """Return the SHA-256 of a file as hexadecimal text.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no ordinary file.
+    """
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        with open_file(path) as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise unreadable(error, path) from error
 

@@ -8,7 +8,6 @@ honours them: the desktop program and the command line give the same calibration
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -19,6 +18,7 @@ import tomli_w
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.reading import NEWEST, brief, parse_toml, read_file
 from gelpolight_core.translation import tr
 
 FILE_NAME = "decisions.toml"
@@ -71,14 +71,10 @@ def read_decisions(folder: Path) -> Decisions:
         If the file is damaged, of a newer version, or holds what no decision is.
     """
     path = folder / FILE_NAME
-    if not path.is_file():
-        return Decisions()
     try:
-        if path.stat().st_size > SIZE_LIMIT:
-            raise ValueError(f"it is larger than {SIZE_LIMIT} bytes")
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = parse_toml(read_file(path, SIZE_LIMIT))
         version = content.get("version")
-        if content.get("format") == FORMAT and type(version) is int and version > VERSION:
+        if content.get("format") == FORMAT and type(version) is int and VERSION < version < NEWEST:
             raise InputError(
                 tr("the decisions have version {v} and this program knows version {k}").format(
                     v=version, k=VERSION
@@ -89,9 +85,11 @@ def read_decisions(folder: Path) -> Decisions:
         if content.get("format") != FORMAT or version != VERSION:
             raise ValueError("it is not marked as decisions of version 1")
         return _parse(content)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except FileNotFoundError:
+        return Decisions()
+    except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("the decisions cannot be used ({reason})").format(reason=error),
+            tr("the decisions cannot be used ({reason})").format(reason=brief(str(error), 200)),
             where=str(path),
             advice=tr("Mend the file, or move it away to go back to what was detected"),
         ) from error
@@ -125,7 +123,7 @@ def write_decisions(decisions: Decisions, folder: Path) -> None:
     def write(stream: BinaryIO) -> None:
         tomli_w.dump(content, stream)
 
-    write_atomically(folder / FILE_NAME, write)
+    write_atomically(folder / FILE_NAME, write, inside=folder)
 
 
 def _parse(content: Mapping[str, Any]) -> Decisions:
@@ -151,9 +149,9 @@ def _parse(content: Mapping[str, Any]) -> Decisions:
 
 def _numbers(values: Any, count: int) -> Any:
     if not isinstance(values, list) or len(values) != count:
-        raise ValueError(f"{values!r} is not {count} numbers"[:80])
+        raise ValueError(f"{brief(values)} is not {count} numbers")
     if not all(type(v) in (int, float) and math.isfinite(v) for v in values):
-        raise ValueError(f"{values!r} is not {count} numbers"[:80])
+        raise ValueError(f"{brief(values)} is not {count} numbers")
     return tuple(float(v) for v in values)
 
 

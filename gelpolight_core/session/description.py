@@ -44,7 +44,7 @@ def write_description(session: Session) -> None:
     def write(stream: BinaryIO) -> None:
         tomli_w.dump(content, stream)
 
-    write_atomically(session.folder / FILE_NAME, write)
+    write_atomically(session.folder / FILE_NAME, write, inside=session.folder)
 
 
 def create_session(session: Session) -> None:

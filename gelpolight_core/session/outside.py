@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import open_file
 from gelpolight_core.translation import tr
 
 _Mark = tuple[int, int]
@@ -32,8 +33,15 @@ class KnownFiles:
         """Take what a file holds now as known."""
         self._known[path] = _mark(path), _digest(path)
 
-    def refuse_changed(self, path: Path) -> None:
+    def refuse_changed(self, path: Path, *, advice: str = "") -> None:
         """Refuse to write over what somebody else has put into a file.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        advice : str, optional
+            What to do then, where it is no session's.
 
         Raises
         ------
@@ -44,7 +52,7 @@ class KnownFiles:
             raise InputError(
                 tr("the file was changed by something else since it was read; nothing was written"),
                 where=str(path),
-                advice=tr("Reload the session, then correct it again"),
+                advice=advice or tr("Reload the session, then correct it again"),
             )
 
     def _is_changed(self, path: Path) -> bool:
@@ -70,6 +78,7 @@ def _mark(path: Path) -> _Mark | None:
 def _digest(path: Path) -> bytes | None:
     """Return a hash of what a file holds; None where there is no file that can be read."""
     try:
-        return hashlib.sha256(path.read_bytes()).digest()
-    except OSError:
+        with open_file(path) as stream:
+            return hashlib.file_digest(stream, "sha256").digest()
+    except (OSError, InputError):
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,12 +11,13 @@ import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.reading import brief, parse_toml, read_file
 from gelpolight_core.response.curve import CameraResponse, declared_response
 from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.picture import Picture, linear_picture
 from gelpolight_core.session.table import Table
-from gelpolight_core.session.wholeness import decode_picture, unreadable
+from gelpolight_core.session.wholeness import decode_picture
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
@@ -25,6 +25,15 @@ VERSION = 1
 SUFFIXES = (".png", ".tif", ".tiff")
 # Diamond has 2.42; no clear elastomer or window has more.
 DENSEST_INDEX = 2.5
+SENSOR_RANGES = {
+    "led_height_mm": (0.1, 500.0),
+    "elastomer_thickness_mm": (0.0, 500.0),
+    "elastomer_refractive_index": (1.0, DENSEST_INDEX),
+    "window_thickness_mm": (0.0, 100.0),
+    "window_refractive_index": (1.0, DENSEST_INDEX),
+    "working_diameter_mm": (0.5, 1000.0),
+}
+_SENSOR_DEFAULTS = {"window_thickness_mm": 0.0, "window_refractive_index": 1.49}
 ONE_IMAGE_STAGES = ("mirror", "whiteboard", "background")
 SINGLE_LED_NAMES = ("red", "green", "blue")
 
@@ -242,10 +251,6 @@ def read_picture(path: Path, *, response: CameraResponse | None = None) -> Pictu
     InputError
         If the file is missing, is not a picture, or is neither 8 nor 16 bit.
     """
-    if not path.is_file():
-        raise InputError(
-            tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
-        )
     raw = decode_picture(path)
     if raw is None:
         raise InputError(
@@ -305,25 +310,19 @@ def read_session(folder: Path) -> Session:
         that is unknown, missing, of the wrong kind or out of range.
     """
     path = folder / "session.toml"
-    if not path.is_file():
+    try:
+        content = parse_toml(read_file(path))
+    except FileNotFoundError as error:
         raise InputError(
             tr("there is no session.toml"),
             where=str(folder),
             advice=tr("Name a session folder, or make one with gelpolight simulate"),
-        )
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        ) from error
+    except ValueError as error:
         raise InputError(
-            tr("the file is not valid TOML ({error})").format(error=error),
+            tr("the file is not valid TOML ({error})").format(error=brief(str(error), 200)),
             where=str(path),
             advice=tr("Mend that line"),
-        ) from error
-    except OSError as error:
-        raise unreadable(error, path) from error
-    except RecursionError as error:
-        raise InputError(
-            tr("the file is nested too deeply"), where=str(path), advice=tr("Mend the file")
         ) from error
     return parse_session(content, path)
 
@@ -354,11 +353,11 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
     checkerboard = _parse_board(top.table("checkerboard"))
     pose = _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard
     balls = top.table("balls")
-    radii = {str(name): balls.number(str(name), 0.05, 500.0) for name in balls.content}
     camera = top.table("camera") if "camera" in content else Table({}, "camera", path)
     declared = _parse_response(camera) if "camera" in content else None
+    radii = {name: balls.number(name, 0.05, 500.0) for name in balls.file_names()}
     series = top.table("response") if "response" in content else Table({}, "response", path)
-    times = {str(name): series.number(str(name), 1e-4, 1e6) for name in series.content}
+    times = {name: series.number(name, 1e-4, 1e6) for name in series.file_names()}
     top.no_more(
         "format", "version", "sensor", "checkerboard", "top_pose", "balls", "camera", "response"
     )
@@ -396,17 +395,11 @@ def _parse_response(table: Table) -> str | float | None:
 
 
 def _parse_sensor(table: Table) -> SensorData:
-    sensor = SensorData(
-        serial=table.text("serial"),
-        led_height_mm=table.number("led_height_mm", 0.1, 500.0),
-        elastomer_thickness_mm=table.number("elastomer_thickness_mm", 0.0, 500.0),
-        elastomer_refractive_index=table.number("elastomer_refractive_index", 1.0, DENSEST_INDEX),
-        window_thickness_mm=table.number("window_thickness_mm", 0.0, 100.0, default=0.0),
-        window_refractive_index=table.number(
-            "window_refractive_index", 1.0, DENSEST_INDEX, default=1.49
-        ),
-        working_diameter_mm=table.number("working_diameter_mm", 0.5, 1000.0),
-    )
+    numbers = {
+        name: table.number(name, low, high, default=_SENSOR_DEFAULTS.get(name))
+        for name, (low, high) in SENSOR_RANGES.items()
+    }
+    sensor = SensorData(serial=table.text("serial"), **numbers)
     table.no_more(*SensorData.__dataclass_fields__)
     return sensor
 

@@ -7,7 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import brief, is_file_name, plain_text
 from gelpolight_core.translation import tr
+
+MOST_WHOLE = 2**53
+TEXT_LENGTH = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +23,7 @@ class Table:
     path: Path
 
     def _key(self, key: str) -> str:
-        return f"[{self.name}] {key}" if self.name else key
+        return f"[{self.name}] {brief(key)}" if self.name else brief(key)
 
     def wrong(self, key: str, what: str) -> InputError:
         """Return the error about a key; that it is missing goes before what else is said."""
@@ -36,12 +40,17 @@ class Table:
         value = self.content.get(key)
         if not isinstance(value, str) or not value.strip():
             raise self.wrong(key, tr("is not a text"))
-        return value
+        try:
+            return plain_text(value, TEXT_LENGTH)
+        except ValueError as error:
+            raise self.wrong(
+                key, tr("is not a plain text of at most {n} characters").format(n=TEXT_LENGTH)
+            ) from error
 
     def whole(self, key: str) -> int:
         """Return a whole number."""
         value = self.content.get(key)
-        if type(value) is not int:
+        if type(value) is not int or abs(value) > MOST_WHOLE:
             raise self.wrong(key, tr("is not a whole number"))
         return value
 
@@ -51,7 +60,7 @@ class Table:
         good = isinstance(value, int | float) and not isinstance(value, bool)
         if not good or not low <= value <= high:  # type: ignore[operator]
             text = tr("is {value}, not a number from {low} to {high}")
-            raise self.wrong(key, text.format(value=str(value)[:40], low=low, high=high))
+            raise self.wrong(key, text.format(value=brief(value, 40), low=low, high=high))
         return float(value)  # type: ignore[arg-type]
 
     def table(self, key: str) -> Table:
@@ -60,6 +69,13 @@ class Table:
         if not isinstance(value, dict):
             raise self.wrong(key, tr("is not a table"))
         return Table(value, key, self.path)
+
+    def file_names(self) -> tuple[str, ...]:
+        """Return the keys, each of which is to name a file in a stage's folder."""
+        for key in self.content:
+            if not is_file_name(key):
+                raise self.wrong(key, tr("is not the name of a picture in the stage's folder"))
+        return tuple(self.content)
 
     def no_more(self, *known: str) -> None:
         """Refuse keys other than those known."""

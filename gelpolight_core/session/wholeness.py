@@ -10,11 +10,13 @@ import cv2
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import read_file
+from gelpolight_core.session.declared import PNG_HEAD, TIFF_HEADS, declared_sizes
 from gelpolight_core.translation import tr
 
 MAX_PIXELS = 64_000_000
-PNG_HEAD = b"\x89PNG\r\n\x1a\n"
-TIFF_HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+# Three channels of 16 bit, and what a file has beside them.
+FILE_LIMIT = 6 * MAX_PIXELS + (1 << 20)
 
 
 def is_whole_picture(data: bytes) -> bool:
@@ -42,44 +44,43 @@ def is_whole_picture(data: bytes) -> bool:
     return False
 
 
-def decode_picture(path: Path) -> np.ndarray[Any, Any] | None:
+def decode_picture(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[Any, Any] | None:
     """Return the values of a picture file as OpenCV orders them; None if it is not a whole one.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    flags : int, optional
+        What OpenCV shall make of it, such as a smaller picture.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or declares more pixels than any camera has.
+        If the file is missing, cannot be read, or declares more pixels than any camera has.
     """
     try:
-        data = np.fromfile(path, dtype=np.uint8)
-    except OSError as error:
-        raise unreadable(error, path) from error
-    _check_declared_size(path, data[:64].tobytes())
-    if not is_whole_picture(data.tobytes()):
+        data = read_file(path, FILE_LIMIT)
+    except FileNotFoundError as error:
+        raise InputError(
+            tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
+        ) from error
+    _check_declared_size(path, data)
+    if not is_whole_picture(data):
         return None
     try:
-        return cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+        raw = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error:
         return None
+    return None if raw is None or (raw.ndim == 3 and raw.shape[2] not in (3, 4)) else raw
 
 
-def unreadable(error: OSError, path: Path) -> InputError:
-    """Return what to raise about a file that the system does not give."""
-    return InputError(
-        tr("the file cannot be read ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check its permissions and the disk, or copy it to a folder of your own"),
-    )
-
-
-def _check_declared_size(path: Path, head: bytes) -> None:
-    """Refuse a PNG that declares more pixels than any camera has, before memory is taken."""
-    if head[:8] != b"\x89PNG\r\n\x1a\n" or len(head) < 24:
-        return
-    width, height = int.from_bytes(head[16:20], "big"), int.from_bytes(head[20:24], "big")
-    if width * height > MAX_PIXELS:
-        raise InputError(
-            tr("the picture declares {w} x {h} pixels").format(w=width, h=height),
-            where=str(path),
-            advice=tr("Use pictures of at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
-        )
+def _check_declared_size(path: Path, data: bytes) -> None:
+    """Refuse a picture that declares more than any camera gives, before memory is taken."""
+    for width, height in declared_sizes(data):
+        if width * height > MAX_PIXELS:
+            raise InputError(
+                tr("the picture declares {w} x {h} pixels").format(w=width, h=height),
+                where=str(path),
+                advice=tr("Use pictures of at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
+            )

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.wholeness import decode_picture
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
@@ -306,10 +306,7 @@ def relief_from_picture(
     InputError
         If the file is no grey picture of 8 or 16 bit, or shows no heights.
     """
-    data = np.frombuffer(path.read_bytes(), dtype=np.uint8) if path.is_file() else None
-    picture = None
-    if data is not None and data.size > 0:
-        picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+    picture = decode_picture(path)
     if picture is None or picture.ndim != 2 or picture.dtype not in (np.uint8, np.uint16):
         raise InputError(
             tr("the file is not a grey picture of 8 or 16 bit"),

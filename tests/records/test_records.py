@@ -94,8 +94,8 @@ def test_measurements_are_found_by_sensor_shape_and_time(records: Records) -> No
     second = records.add(cylinder(1.01, hours=2.0))
     first = records.add(cylinder(1.02))
     other = records.add(replace(cylinder(1.03, hours=1.0, serial="B-2"), shape="ball"))
-    assert [r.id for r in records.measurements()] == [first, other, second]
-    assert [r.id for r in records.measurements("A-1")] == [first, second]
+    assert [r.id for r in records.measurements()] == [second, first, other]
+    assert [r.id for r in records.measurements("A-1")] == [second, first]
     assert [r.id for r in records.measurements(shape="ball")] == [other]
     since = (NOON + timedelta(hours=1)).astimezone(timezone(timedelta(hours=5)))
     assert [r.id for r in records.measurements("A-1", since=since)] == [second]
@@ -158,9 +158,9 @@ def test_the_error_over_time_is_that_of_measurements_with_a_truth(records: Recor
         records.add(cylinder(height, hours=hours))
     records.add(MeasurementRecord("A-1", "", "distance", (Quantity("distance_mm", 9.0),)))
     drift = records.drift("A-1", "height_mm")
-    assert drift.error_percent == pytest.approx([1.0, -2.0, 5.0])
-    assert np.diff(drift.times_s) == pytest.approx([7200.0, 10800.0])
-    assert drift.times[0] == NOON
+    assert drift.error_percent == pytest.approx([5.0, 1.0, -2.0])
+    assert np.diff(drift.times_s) == pytest.approx([-18000.0, 7200.0])
+    assert drift.times[1] == NOON
     assert set(drift.quantities) == {"height_mm"}
     assert len(records.drift("A-1").times) == 6
     assert records.drift("unknown").error_percent.shape == (0,)

@@ -1,0 +1,49 @@
+"""Whatever is done to a file, its reader gives a good result or one sentence."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "packaging"))
+
+import fuzz  # noqa: E402
+from fuzz_kinds import Kind, all_kinds  # noqa: E402
+
+NAMES = (
+    "calibration", "recording", "PNG picture", "TIFF picture", "records", "true depth", "session",
+    "decisions", "design", "protocol", "truth", "ledger", "tools", "indenters", "validation",
+    "workspace", "settings",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Kind]:
+    return {kind.name: kind for kind in all_kinds(tmp_path_factory.mktemp("seeds"))}
+
+
+def test_every_kind_is_tried(kinds: dict[str, Kind]) -> None:
+    assert tuple(kinds) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_good_file_is_read(kinds: dict[str, Kind], tmp_path: Path, name: str) -> None:
+    for seed in kinds[name].seeds[:6]:
+        assert fuzz.try_one(kinds[name], seed, tmp_path / "in") == "good"
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("name", NAMES)
+@settings(deadline=None, max_examples=25)
+@given(number=st.integers(0, 10**9))
+def test_a_spoilt_file_is_read_or_refused_in_a_sentence(
+    kinds: dict[str, Kind], tmp_path_factory: pytest.TempPathFactory, name: str, number: int
+) -> None:
+    kind = kinds[name]
+    folder = tmp_path_factory.getbasetemp() / "spoilt"
+    assert fuzz.try_one(kind, fuzz.spoilt_input(kind, 1, number), folder) in ("good", "refused")

@@ -1,0 +1,442 @@
+"""Files that somebody made to do harm: each attack that once got through ends in a sentence."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import struct
+import sys
+import tracemalloc
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtCore import QSettings
+from recorded import write_recording
+
+from app.shell.settings import Settings
+from app.workspace.indenters import read_indenters
+from app.workspace.sessions import read_session_entry
+from app.workspace.validation import read_validation
+from app.workspace.workspace import Workspace, folder_name
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.design.sensor_design import read_design
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.npy import array_of
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_file import (
+    ProtocolFile,
+    read_protocol_file,
+    write_protocol_file,
+)
+from gelpolight_core.measurement.score import read_true_depth
+from gelpolight_core.measurement.tools import tools_from_json
+from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.reading import parse_json, parse_toml
+from gelpolight_core.recording import layout
+from gelpolight_core.recording.reader import Recording, is_recording
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.session.decisions import read_decisions
+from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.simulation.indenters import relief_from_picture
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "c.gplcal": read_calibration,
+    "s.gplcal": read_summary,
+    "r.gplrec": Recording.open,
+    "p.png": read_picture,
+    "g.png": lambda p: relief_from_picture(p, width_mm=1.0, relief_mm=1.0, depth_mm=1.0),
+    "t.npz": read_true_depth,
+    "session.toml": lambda p: read_session(p.parent),
+    "d.toml": read_design,
+    "protocol.toml": lambda p: read_protocol_file(p.parent),
+    "truth.csv": read_truth,
+}
+ABSENT: dict[str, Callable[[Path], object]] = {
+    "decisions.toml": lambda p: read_decisions(p.parent),
+    "ledger.jsonl": lambda p: Ledger(p, "c"),
+    "indenters.json": lambda p: read_indenters(p.parent),
+    "c.validation.json": lambda p: read_validation(p.with_name("c.gplcal")),
+    "workspace.json": lambda p: Workspace(p.parent).in_use,
+    "any": is_recording,
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError):
+        READERS[name](tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ABSENT)
+def test_a_pipe_counts_as_no_file_where_there_need_be_none(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    ABSENT[name](tmp_path / name)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_folder_in_the_place_of_a_file_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).mkdir()
+    with pytest.raises(InputError):
+        READERS[name](tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in READERS if n[1:] not in (".gplcal", ".gplrec", ".npz")]
+)
+def test_a_file_of_a_terabyte_is_not_taken_into_memory(tmp_path: Path, name: str) -> None:
+    with (tmp_path / name).open("wb") as stream:
+        stream.truncate(2**40)
+    with pytest.raises(InputError, match="more than"):
+        READERS[name](tmp_path / name)
+
+
+ENDLESS = (
+    "a." * 400_000 + "b = 1",
+    "a." * 400_000 + "#",
+    "x = " + "[" * 10**5,
+    "x = " + "9" * 5000,
+    'x = """a"""',
+    "x = " + "{a=" * 1000,
+)
+
+
+@pytest.mark.parametrize("text", ENDLESS)
+def test_a_text_that_takes_for_ever_or_too_deep_is_refused_at_once(text: str) -> None:
+    # It was hours.
+    with pytest.raises(ValueError, match=r"\w"):
+        parse_toml(text.encode())
+
+
+@pytest.mark.parametrize("text", ["NaN", "Infinity", "1e999", "[" * 10**5, "9" * 5000])
+def test_a_number_that_is_none_is_no_json(text: str) -> None:
+    with pytest.raises(ValueError, match=r"\w"):
+        parse_json(text)
+
+
+def npy(head: str, body: bytes = b"") -> bytes:
+    text = head.ljust(118)[:9000] + "\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode() + body
+
+
+@pytest.mark.parametrize("head", [
+    "{'descr': '<f4', 'fortran_order': False, 'shape': (10000000000,), }",
+    "{'descr': '|O', 'fortran_order': False, 'shape': (3,), }",
+    "{'descr': '<f4', 'fortran_order': False, 'shape': (-1,), }",
+    "(" * 3000, "'", "{'descr': '<f4', 'shape': (", "9" * 5000,
+])  # fmt: skip
+def test_an_array_takes_no_more_memory_than_its_bytes(head: str) -> None:
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match=r"\w"):
+            array_of(npy(head, bytes(100)))
+        assert tracemalloc.get_traced_memory()[1] < 10_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_pickle_in_an_array_is_never_run(tmp_path: Path) -> None:
+    class Harm:
+        def __reduce__(self) -> tuple[object, tuple[str]]:
+            return os.mkdir, (str(tmp_path / "harm"),)
+
+    with pytest.raises(ValueError, match=r"version|magic"):
+        array_of(pickle.dumps(Harm()))
+    assert not (tmp_path / "harm").exists()
+
+
+def test_settings_that_hold_objects_are_put_aside_and_nothing_of_them_is_run(
+    tmp_path: Path,
+) -> None:
+    class Harm:
+        def __reduce__(self) -> tuple[object, tuple[str]]:
+            return os.mkdir, (str(tmp_path / "harm"),)
+
+    made = QSettings(str(tmp_path / "made.ini"), QSettings.Format.IniFormat)
+    made.setValue("theme", Harm())
+    made.sync()
+    (tmp_path / "desktop.ini").write_bytes((tmp_path / "made.ini").read_bytes())
+    settings = Settings(tmp_path / "desktop.ini")
+    assert settings.theme == "system"
+    assert not (tmp_path / "harm").exists()
+    assert (tmp_path / "desktop.ini.refused").exists()
+
+
+@pytest.mark.parametrize(("order", "big"), [("<", False), (">", False), ("<", True)])
+@pytest.mark.parametrize(("tags"), [(256, 257), (322, 323)])
+def test_a_tiff_that_declares_a_gigantic_size_is_refused_unread(
+    tmp_path: Path, order: str, big: bool, tags: tuple[int, int]
+) -> None:
+    mark = b"II" if order == "<" else b"MM"
+    entries = [(tags[0], 30_000), (tags[1], 30_000)]
+    if big:
+        data = mark + struct.pack(order + "HHHQQ", 43, 8, 0, 16, len(entries))
+        data += b"".join(struct.pack(order + "HHQQ", t, 16, 1, v) for t, v in entries)
+    else:
+        data = mark + struct.pack(order + "HIH", 42, 8, len(entries))
+        data += b"".join(struct.pack(order + "HHII", t, 4, 1, v) for t, v in entries)
+    (tmp_path / "p.tif").write_bytes(data + bytes(16))
+    with pytest.raises(InputError, match="declares 30000 x 30000 pixels"):
+        read_picture(tmp_path / "p.tif")
+
+
+def test_a_relief_of_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
+    good = bytearray(cv2.imencode(".png", np.zeros((2, 2), np.uint8))[1].tobytes())
+    struct.pack_into(">II", good, 16, 30_000, 30_000)
+    struct.pack_into(">I", good, 29, zlib.crc32(good[12:29]))
+    (tmp_path / "g.png").write_bytes(good)
+    with pytest.raises(InputError, match="declares 30000 x 30000 pixels"):
+        READERS["g.png"](tmp_path / "g.png")
+
+
+def sessions_toml(more: str) -> str:
+    return (
+        'format = "gelpolight-session"\nversion = 1\n[sensor]\nserial = "A"\nled_height_mm = 13.8\n'
+        "elastomer_thickness_mm = 14.0\nelastomer_refractive_index = 1.41\n"
+        "working_diameter_mm = 26.0\n[checkerboard]\ninner_corners = [9, 6]\nsquare_mm = 3.0\n"
+        f"[balls]\ndefault = 3.0\n{more}\n"
+    )
+
+
+@pytest.mark.parametrize("line", [
+    '"../../etc/passwd" = 3.0', '"/dev/zero" = 3.0', f'"{"x" * 300}" = 3.0', '"a\\u0000b" = 3.0',
+    '"a.png" = 0x' + "f" * 5000, '"a.png" = ' + "9" * 5000, '"a.png" = nan', '"a.png" = -1',
+])  # fmt: skip
+def test_a_ball_is_named_by_a_file_in_its_folder_and_has_a_length(
+    tmp_path: Path, line: str
+) -> None:
+    (tmp_path / "balls").mkdir()
+    (tmp_path / "session.toml").write_text(sessions_toml(line))
+    with pytest.raises(InputError) as refusal:
+        read_session(tmp_path).ball_radius_mm("ball_01.png")
+    assert len(str(refusal.value)) < 1000
+
+
+@pytest.mark.parametrize("file", ["../secret.png", "/etc/passwd", "..", "a/b.png"])
+def test_a_truth_names_only_pictures_beside_it(tmp_path: Path, file: str) -> None:
+    (tmp_path / "truth.csv").write_text(
+        f"file,shape,diameter_mm,side_mm,height_mm\n{file},ball,3,,1\n"
+    )
+    with pytest.raises(InputError, match="not the name of a picture in this folder"):
+        read_truth(tmp_path)
+
+
+def test_a_truth_with_an_endless_cell_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "truth.csv").write_text("file,shape,diameter_mm,height_mm\n" + "x" * 200_000)
+    with pytest.raises(InputError, match="not a table"):
+        read_truth(tmp_path)
+
+
+def test_a_design_of_too_large_a_camera_or_number_is_refused(tmp_path: Path) -> None:
+    many = "9" * 400
+    for text in ("width_px = 16000\nheight_px = 16000", f"fx = {many}", f"width_px = {many}"):
+        (tmp_path / "d.toml").write_text(f"[camera]\n{text}\n")
+        with pytest.raises(InputError, match=r"\[camera\]|camera"):
+            read_design(tmp_path / "d.toml")
+
+
+@pytest.mark.parametrize("value", ["9" * 400, "NaN", "1e999", "true", "[" * 5000])
+def test_lengths_of_lists_and_tools_are_numbers(tmp_path: Path, value: str) -> None:
+    (tmp_path / "indenters.json").write_text(
+        '{"format": "gelpolight-indenters", "version": 1, "indenters": [{"name": "a", "shape":'
+        f' "ball", "size_mm": {value}}}]}}'
+    )
+    with pytest.raises(InputError):
+        read_indenters(tmp_path)
+    if value == "9" * 400:
+        with pytest.raises(InputError):
+            tools_from_json(json.loads(f'{{"tool": "ball", "at_mm": [{value}, 0]}}'))
+
+
+def test_a_tool_with_an_unknown_edge_is_refused() -> None:
+    with pytest.raises(InputError, match="edge"):
+        tools_from_json({"tool": "circle", "points_mm": [[0, 0], [1, 0], [0, 1]], "edge": "x"})
+
+
+def test_a_line_of_a_ledger_that_is_too_deep_costs_that_line_only(tmp_path: Path) -> None:
+    (tmp_path / "l").write_text(
+        '{"key":"a","outcome":' + "[" * 10**5 + '\n{"key":"b","outcome":"c"}\n'
+    )
+    assert Ledger(tmp_path / "l", "n").find("b") == "c"
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    write_recording(tmp_path / "r.gplrec")
+    return tmp_path / "r.gplrec"
+
+
+@pytest.mark.parametrize("note", ["[" * 10**5, '"\\ud800"', "3"])
+def test_a_recordings_description_is_plain(recording: Path, note: str) -> None:
+    data = recording.read_bytes()
+    text = b'{"format": "gelpolight-recording", "note": ' + note.encode() + b"}"
+    crc = zlib.crc32(struct.pack("<II", 1, len(text)) + text)
+    head = layout.HEAD.pack(layout.MAGIC, 1, len(text), crc)
+    recording.write_bytes(data[: layout.HEAD_AT] + head + bytes(layout.CLOSING.size) + text)
+    with pytest.raises(InputError, match="head of the recording is damaged"):
+        Recording.open(recording)
+
+
+def test_a_strip_that_is_larger_than_its_pixels_is_not_taken_into_memory(recording: Path) -> None:
+    """The file is as large as it says, and has a hole where the strip is."""
+    data = bytearray(recording.read_bytes())
+    begin = data.index(layout.FRAME_MAGIC)
+    struct.pack_into("<Q", data, begin + 24, 10_000_000)
+    struct.pack_into("<Q", data, begin + 48 + 32, 9_000_000)
+    struct.pack_into("<I", data, begin + 128, zlib.crc32(data[begin : begin + 128]))
+    recording.write_bytes(data.ljust(12_000_000, b"\0"))
+    mark = layout.unpack_mark(bytes(data[begin:]))
+    assert mark is not None
+    assert mark.strips[0].size == 9_000_000
+    with Recording.open(recording) as opened:
+        assert opened.numbers.tolist() == [1, 2]
+
+
+RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),), note="=1+1")
+
+
+@pytest.mark.parametrize("statement", [
+    "CREATE TRIGGER t AFTER INSERT ON measurements BEGIN DELETE FROM measurements; END",
+    "CREATE VIEW v AS WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x FROM c) SELECT x FROM c",
+    "ALTER TABLE sensors RENAME TO others",
+])  # fmt: skip
+def test_records_with_more_than_our_tables_are_refused(tmp_path: Path, statement: str) -> None:
+    with Records.open(tmp_path / NAME) as records:
+        records.add(RECORD)
+        records._connection.execute(statement)
+    before = (tmp_path / NAME).read_bytes()
+    with pytest.raises(InputError, match="other tables than this program makes"):
+        Records.open(tmp_path / NAME)
+    assert (tmp_path / NAME).read_bytes() == before
+
+
+@pytest.mark.parametrize("change", [
+    "settings = '" + "[" * 5000 + "'", "settings = '[]'", "time = x'00'",
+    "serial = x'ff'", "note = CAST(x'ff' AS TEXT)",
+])  # fmt: skip
+def test_records_of_what_no_measurement_is_are_refused(tmp_path: Path, change: str) -> None:
+    with Records.open(tmp_path / NAME) as records:
+        records.add(RECORD)
+        records._connection.execute("PRAGMA foreign_keys = OFF")
+        records._connection.execute(f"UPDATE measurements SET {change}")
+    with Records.open(tmp_path / NAME) as records, pytest.raises(InputError) as refusal:
+        records.measurements()
+    assert str(refusal.value).isprintable()
+
+
+def test_no_spreadsheet_computes_what_a_stranger_wrote(tmp_path: Path) -> None:
+    with Records.open(tmp_path / NAME) as records:
+        records.add(RECORD)
+        records.export_csv(tmp_path / "out.csv")
+    assert "'=1+1" in (tmp_path / "out.csv").read_text("utf-8-sig")
+
+
+def test_a_workspaces_choice_lies_inside_of_it(tmp_path: Path) -> None:
+    (tmp_path / "other.gplcal").write_bytes(b"x")
+    workspace = Workspace(tmp_path / "w")
+    workspace.sensors_folder.mkdir(parents=True)
+    for chosen in (str(tmp_path / "other.gplcal"), "sensors/../../other.gplcal", "x" * 300, "a\0b"):
+        (tmp_path / "w/workspace.json").write_text(json.dumps({"in_use": chosen}))
+        assert workspace.in_use is None
+
+
+@pytest.mark.parametrize("serial", ["CON", "nul.txt", "\U0001d538" * 80, "../..", "\ud800", ""])
+def test_every_name_is_one_that_any_disk_takes(tmp_path: Path, serial: str) -> None:
+    name = folder_name(serial)
+    assert name.split(".")[0].upper() not in ("CON", "NUL")
+    (tmp_path / f"{name}-12.validation.json").write_text("")
+    assert (tmp_path / f"{name}-12.validation.json").resolve().parent == tmp_path.resolve()
+
+
+def test_a_session_with_an_unreadable_description_is_listed_all_the_same(tmp_path: Path) -> None:
+    folder = tmp_path / "A" / "sessions" / "one"
+    folder.mkdir(parents=True)
+    os.mkfifo(folder / "session.toml")
+    assert read_session_entry(folder).serial == "A"
+
+
+def test_a_sentence_holds_nothing_that_commands_a_terminal() -> None:
+    error = InputError("x\x1b[2J", where="a\nb", advice="c")
+    assert str(error) == "a\\nb: x\\x1b[2J. c."
+
+
+def test_a_calibration_that_declares_more_than_it_can_hold_is_refused(tmp_path: Path) -> None:
+    """Zeros pack a thousandfold: a file of 75 kB would take 75 MB for each of its arrays."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging"))
+    import hashlib
+
+    from fuzz_kinds import _calibrations
+
+    (tmp_path / "c.gplcal").write_bytes(_calibrations(tmp_path)[0])
+    with zipfile.ZipFile(tmp_path / "c.gplcal") as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    manifest = json.loads(parts["manifest.json"])
+    shape = [2500, 2500, 3]
+    head = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {tuple(shape)}, }}"
+    parts["radiance.npy"] = npy(head, bytes(18_750_000 * 4))
+    digest = hashlib.sha256(parts["radiance.npy"]).hexdigest()
+    manifest["arrays"]["radiance"] = {"shape": shape, "kind": "<f4", "sha256": digest}
+    parts["manifest.json"] = json.dumps(manifest).encode()
+    parts["manifest.json.sha256"] = hashlib.sha256(parts["manifest.json"]).hexdigest().encode()
+    with zipfile.ZipFile(
+        tmp_path / "bomb.gplcal", "w", zipfile.ZIP_DEFLATED, compresslevel=1
+    ) as out:
+        for name, part in parts.items():
+            out.writestr(name, part)
+    for read in (read_calibration, read_summary):
+        with pytest.raises(InputError, match="its arrays declare 75"):
+            read(tmp_path / "bomb.gplcal")
+
+
+def test_records_too_damaged_for_words_are_kept_aside(tmp_path: Path) -> None:
+    """SQLite quotes the damage in its message, which then is no text."""
+    with Records.open(tmp_path / NAME) as records:
+        records.add(RECORD)
+    data = (tmp_path / NAME).read_bytes()
+    (tmp_path / NAME).write_bytes(
+        data.replace(b"CREATE TABLE sensors", b"CREATE TABLE \xac\xff sors")
+    )
+    with Records.open(tmp_path / NAME) as records:
+        assert "damaged" in records.notice
+
+
+def test_a_protocol_of_a_number_of_thousands_of_digits_is_refused(tmp_path: Path) -> None:
+    write_protocol_file(ProtocolFile(Protocol(), "A", "c"), tmp_path)
+    text = (tmp_path / "protocol.toml").read_text()
+    many = text.replace("repeats = 5", "repeats = 0x" + "f" * 5000)
+    (tmp_path / "protocol.toml").write_text(many)
+    with pytest.raises(InputError, match="repeats is not a whole number"):
+        read_protocol_file(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["decisions.toml", "balls/ball_01.png", "mirror/m.png"])
+def test_a_pipe_in_a_session_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    (tmp_path / "session.toml").write_text(sessions_toml(""))
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    os.mkfifo(tmp_path / name)
+    project = CalibrationProject(tmp_path)
+    if name != "decisions.toml":
+        with pytest.raises(InputError):
+            project.statuses()
+
+
+@pytest.mark.parametrize("version", ["0x" + "f" * 5000, "9" * 4000])
+def test_a_version_of_thousands_of_digits_is_not_read_out(tmp_path: Path, version: str) -> None:
+    (tmp_path / "decisions.toml").write_text(
+        f'format = "gelpolight-decisions"\nversion = {version}'
+    )
+    (tmp_path / "session.toml").write_text(f'format = "gelpolight-session"\nversion = {version}')
+    for read in (read_decisions, read_session):
+        with pytest.raises(InputError) as refusal:
+            read(tmp_path)
+        assert len(str(refusal.value)) < 1000

@@ -1,0 +1,209 @@
+"""Nothing is lost: power cuts, full disks, clocks set back, two programs on one workspace."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded import noisy
+
+from app.workspace.indenters import first_indenters, read_indenters, write_indenters
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import NameTakenError, write_atomically
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.recording.reader import Recording
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.session.decisions import Decisions, read_decisions, write_decisions
+from gelpolight_core.session.outside import KnownFiles
+from gelpolight_core.simulation.session import session_toml
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),))
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    folder = tmp_path / "session"
+    folder.mkdir()
+    (folder / "session.toml").write_text(session_toml(SensorDesign()))
+    return folder
+
+
+def test_two_programs_that_capture_into_one_session_keep_both_pictures(session: Path) -> None:
+    one, two = CalibrationProject(session), CalibrationProject(session)
+    one._next_name = lambda folder, suffix=".png": "ball_001.png"  # type: ignore[method-assign]
+    assert one.add_capture(Stage.BALLS, [noisy(1)]) == "ball_001.png"
+    names = iter(["ball_001.png", "ball_002.png"])  # it looked before the other one had written
+    two._next_name = lambda folder, suffix=".png": next(names)  # type: ignore[method-assign]
+    assert two.add_capture(Stage.BALLS, [noisy(2)]) == "ball_002.png"
+    assert len(list((session / "balls").iterdir())) == 2
+
+
+def test_a_new_file_never_takes_the_place_of_another(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    write_atomically(path, lambda stream: stream.write(b"one"), new=True)
+    with pytest.raises(NameTakenError, match="a file of this name"):
+        write_atomically(path, lambda stream: stream.write(b"two"), new=True)
+    assert path.read_bytes() == b"one"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_new_file_is_written_on_a_disk_that_knows_no_links(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "no links here")
+
+    monkeypatch.setattr(os, "link", refuse)
+    write_atomically(tmp_path / "a", lambda stream: stream.write(b"one"), new=True)
+    assert (tmp_path / "a").read_bytes() == b"one"
+    with pytest.raises(NameTakenError):
+        write_atomically(tmp_path / "a", lambda stream: stream.write(b"two"), new=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize("name", ["decisions.toml", "session.toml", "balls"])
+def test_a_strangers_session_leads_no_writer_out_of_its_folder(
+    session: Path, tmp_path: Path, name: str
+) -> None:
+    outside = tmp_path / "home"
+    outside.mkdir()
+    (outside / "precious").write_text((session / "session.toml").read_text())
+    target = outside if name == "balls" else outside / "precious"
+    if name == "decisions.toml":
+        write_decisions(Decisions(), session)
+        target.write_bytes((session / name).read_bytes())
+    before = {p.name: p.read_bytes() for p in outside.iterdir()}
+    (session / name).unlink(missing_ok=True)
+    (session / name).symlink_to(target)
+    project = CalibrationProject(session)
+    with pytest.raises(InputError, match="a link that leads out of the folder"):
+        match name:
+            case "decisions.toml":
+                project.place_spot(0, (1.0, 2.0))
+            case "session.toml":
+                project.set_ball_radius("a.png", 2.0)
+            case _:
+                project.add_capture(Stage.BALLS, [noisy(1)])
+    assert {p.name: p.read_bytes() for p in outside.iterdir()} == before
+
+
+def test_two_programs_on_one_run_of_the_protocol_keep_both_presses(tmp_path: Path) -> None:
+    begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
+    one, two = open_run(tmp_path), open_run(tmp_path)
+    first, second = one.wanted[:2]
+    one.accept(first, [noisy(1)])
+    two.accept(second, [noisy(2)])
+    assert {press.file for press in open_run(tmp_path).done} == {first.file, second.file}
+
+
+def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(
+    tmp_path: Path,
+) -> None:
+    write_indenters(first_indenters(), tmp_path)
+    before = KnownFiles([tmp_path / "indenters.json"])
+    write_indenters(first_indenters()[:1], tmp_path)
+    with pytest.raises(InputError, match="changed by something else"):
+        before.refuse_changed(tmp_path / "indenters.json")
+    assert len(read_indenters(tmp_path)) == 1
+
+
+def test_records_stand_in_the_order_in_which_they_were_made_when_the_clock_is_set_back(
+    tmp_path: Path,
+) -> None:
+    now = datetime.now(UTC)
+    with Records.open(tmp_path / NAME) as records:
+        for hours in (0, -5, -10):
+            records.add(replace(RECORD, time=now + timedelta(hours=hours)))
+        assert [r.id for r in records.measurements()] == [1, 2, 3]
+        assert records.drift("A").ids == (1, 2, 3)
+
+
+def test_a_recording_goes_on_when_the_clock_is_set_back(tmp_path: Path) -> None:
+    path = tmp_path / "r.gplrec"
+    with RecordingWriter(path, RecordingHeader()) as writer:
+        for number, time_s in enumerate((100.0, 50.0, 51.0)):
+            writer.append(noisy(number), number, time_s)
+    with Recording.open(path) as recording:
+        assert recording.numbers.tolist() == [0, 1, 2]
+        assert not recording.truncated
+        assert all(np.array_equal(recording.frame(k).rgb, noisy(k)) for k in range(3))
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EIO])
+@pytest.mark.parametrize("when", ["write", "sync", "replace"])
+def test_what_the_disk_refuses_leaves_the_old_decisions_whole(
+    session: Path, monkeypatch: pytest.MonkeyPatch, number: int, when: str
+) -> None:
+    old = Decisions(excluded=frozenset({"balls/a.png"}))
+    write_decisions(old, session)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    match when:
+        case "write":
+            monkeypatch.setattr("tomli_w.dump", refuse)
+        case "sync":
+            monkeypatch.setattr(os, "fsync", refuse)
+        case _:
+            monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(InputError, match=r"decisions\.toml: "):
+        write_decisions(Decisions(), session)
+    monkeypatch.undo()
+    assert read_decisions(session) == old
+    assert sorted(p.name for p in session.iterdir()) == ["decisions.toml", "session.toml"]
+
+
+def test_a_power_cut_while_decisions_are_written_leaves_the_old_or_the_new_ones(
+    session: Path,
+) -> None:
+    """The cut leaves a part of the temporary file, of any length, beside the old file."""
+    old, new = Decisions(excluded=frozenset({"balls/a.png"})), Decisions()
+    write_decisions(new, session)
+    written = (session / "decisions.toml").read_bytes()
+    write_decisions(old, session)
+    for size in range(len(written)):
+        (session / ".decisions.toml.0badcafe.part").write_bytes(written[:size])
+        assert read_decisions(session) == old
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from gelpolight_core.export.atomic import write_atomically
+
+def write(stream):
+    stream.write(b"x" * 100_000)
+    stream.flush()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+write_atomically(Path(sys.argv[1]), write)
+"""
+
+
+def test_a_program_that_is_killed_while_it_writes_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "workspace.json"
+    path.write_text(json.dumps({"in_use": "a"}))
+    ended = subprocess.run(
+        [sys.executable, "-c", KILLED, str(path)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert ended.returncode < 0
+    assert json.loads(path.read_text()) == {"in_use": "a"}
