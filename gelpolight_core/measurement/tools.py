@@ -79,7 +79,7 @@ def tool_from_dict(content: Mapping[str, Any]) -> Tool:
     kind = TOOLS.get(name) if isinstance(name, str) else None
     if kind is None:
         raise InputError(
-            tr("unknown tool {name}").format(name=brief(name)),
+            tr("unknown tool '{name}'").format(name=brief(name)),
             where=tr("measuring tool"),
             advice=tr("Choose one of {names}").format(names=", ".join(TOOLS)),
         )

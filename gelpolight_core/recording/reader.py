@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import zlib
@@ -21,8 +22,6 @@ from gelpolight_core.session.wholeness import MAX_PIXELS
 from gelpolight_core.translation import tr
 
 SEARCH_BYTES = 1 << 20
-# Thirty million years: their differences are numbers still.
-MOST_S = 1e15
 
 
 class Recording:
@@ -242,7 +241,7 @@ def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bo
         (mark.rows, mark.columns, mark.bits) == (before[0].rows, before[0].columns, before[0].bits)
         and mark.number > before[-1].number
     )
-    return inside and shaped and alike and abs(mark.time_s) <= MOST_S
+    return inside and shaped and alike and math.isfinite(mark.time_s)
 
 
 def _most_bytes(mark: FrameMark) -> int:

@@ -46,7 +46,6 @@ from gelpolight_core.reading import written_text
 ENDING = ".gplrec"
 FORMAT = "gelpolight-recording"
 VERSION = 1
-MOST_SETTING = 1e15
 
 Rgb = NDArray[np.uint8] | NDArray[np.uint16]
 SettingValue = float | str | bool
@@ -126,7 +125,7 @@ class RecordingHeader:
             written_text(key)
             if isinstance(value, str):
                 written_text(value)
-            elif not isinstance(value, float | int) or not abs(value) < MOST_SETTING:
+            elif not isinstance(value, float | int):
                 raise ValueError("a setting is neither a number nor a text")
         return cls(settings=settings, **texts)
 
