@@ -138,7 +138,8 @@ class PressingView(QWidget):
             tolerance_px=TOLERANCE_MM * target.pixels_per_mm,
         )
         if not judged.accepted:
-            self._must_move = True
+            # The same again would be refused again; of one that moved, holding still is enough.
+            self._must_move = not judged.moved
             self._watching.forget_movement()
             self._work.refuse(target.press, judged.reason)
             self.panel.show_live(tr("Refused: {why}").format(why=judged.reason))

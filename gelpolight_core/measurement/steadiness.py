@@ -75,6 +75,11 @@ class PressJudgement:
     moving_share: float
     contact: Contact
 
+    @property
+    def moved(self) -> bool:
+        """Whether it was moving; false where that could not be seen."""
+        return self.moving_share > MOVING_SHARE
+
 
 def find_contact(bare: Frame, now: Frame) -> Contact:
     """Return what is pressed in a frame.

@@ -9,6 +9,7 @@ from typing import Any
 
 # More blocks than threads, so that an uneven picture keeps all of them busy.
 BLOCKS = 4
+THREAD_NAME = "picture rows"
 
 
 class RowWorkers:
@@ -22,7 +23,7 @@ class RowWorkers:
 
     def __init__(self, count: int) -> None:
         self.count = max(count, 1)
-        self._pool = ThreadPoolExecutor(self.count - 1) if self.count > 1 else None
+        self._pool = ThreadPoolExecutor(self.count - 1, THREAD_NAME) if self.count > 1 else None
 
     def run(self, rows: int, action: Callable[..., object], *arguments: Any) -> None:
         """Call ``action(first, last, *arguments)`` so that all rows are done once."""

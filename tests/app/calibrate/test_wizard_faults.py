@@ -150,7 +150,8 @@ def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("gelpolight_core.export.atomic.os.replace", refuse)
+    for name in ("os.replace", "_place_new"):
+        monkeypatch.setattr(f"gelpolight_core.export.atomic.{name}", refuse)
 
 
 def test_a_full_disk_is_said_and_nothing_half_written_counts(
@@ -182,7 +183,7 @@ def test_a_ball_that_could_not_be_written_leaves_no_radius_behind(
     project = computed_project()
     radii = dict(project.session.ball_radii_mm)
     monkeypatch.setattr(
-        "gelpolight_core.calibration.kept_session.write_picture", lambda *_: full_picture()
+        "gelpolight_core.calibration.kept_session.write_picture", lambda *_, **__: full_picture()
     )
     with pytest.raises(Exception, match="disk is full"):
         project.add_capture(Stage.BALLS, [np.zeros((240, 320, 3), np.uint8)], radius_mm=2.0)
