@@ -31,6 +31,7 @@ RECORD = MeasurementRecord(
 
 ADD_FOR_EVER = """
 import sys
+import time
 from pathlib import Path
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import Records
@@ -39,6 +40,8 @@ records = Records.open(Path(sys.argv[1]))
 while True:
     values = tuple(Quantity(f"q{k}_mm", 1.0) for k in range(20))
     print(records.add(MeasurementRecord("A", "c", "cylinder", values)), flush=True)
+    # No two people are so quick that a third program finds no moment to look.
+    time.sleep(0.003)
 """
 
 
