@@ -103,7 +103,7 @@ class Measurement:
             self._move.timeout.connect(dragger(context.source.bench, PRESSED))
             self._move.start(DRAG_MS)
         live = Reconstructor(calibration, model=options.model, effort=options.effort)
-        self.page.library.loaded.emit(live, live)
+        self.page.calibrations.loaded.emit(live, live)
 
     def _choose(self, source: Path | None, width: int, context: AppContext) -> None:
         if source is None:

@@ -35,7 +35,7 @@ class Situation:
         Of its pictures; None before the first.
     used : Known or None
         The calibration in use.
-    library : tuple of Known
+    calibrations : tuple of Known
         All calibrations.
     trouble : str
         Why there are no pictures or no depth.
@@ -47,7 +47,7 @@ class Situation:
     serial: str = ""
     size: Size | None = None
     used: Known | None = None
-    library: tuple[Known, ...] = ()
+    calibrations: tuple[Known, ...] = ()
     trouble: str = ""
     drift: str = ""
 
@@ -107,7 +107,7 @@ def advise(now: Situation) -> Advice:
 
 def _remedy(now: Situation) -> tuple[str, str]:
     """Return how to come to a calibration that fits."""
-    if any(known.fits(now.serial, now.size) for known in now.library):
+    if any(known.fits(now.serial, now.size) for known in now.calibrations):
         return "fitting", tr("Use a calibration that fits")
     if now.kind == "virtual":
         return "calibrate", tr("Calibrate the virtual sensor now")

@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 from app.inspect.actions import Deeds
 from app.inspect.advice import Situation, advise
 from app.inspect.banner import Banner
+from app.inspect.calibration_choice import CalibrationBox, CalibrationChoice
 from app.inspect.drift_watch import DriftWatch
 from app.inspect.first_calibration import begin_first_calibration
-from app.inspect.library import CalibrationBox, Library
 from app.inspect.link import LiveLink
 from app.inspect.place import PixelPlaces, read_at
 from app.inspect.products import Shown
@@ -55,7 +55,7 @@ class InspectPage(QWidget):
         self.views = Views(self.jobs, context=context)
         self.link = LiveLink(self._show, context=context, parent=self)
         self.box = CalibrationBox()
-        self.library = Library(self.jobs, self.box, context=context)
+        self.calibrations = CalibrationChoice(self.jobs, self.box, context=context)
         self.ways = WayChoice(self.jobs, self, context=context)
         self.banner = Banner(
             tr("Press an object into the membrane. Space lets the picture stand with all detail.")
@@ -114,7 +114,7 @@ class InspectPage(QWidget):
         self.views.wanted_changed.connect(self._want)
         self.views.pointed.connect(self._on_pointed)
         self.views.picture_pointed.connect(self._on_picture_pointed)
-        self.library.loaded.connect(self._on_loaded)
+        self.calibrations.loaded.connect(self._on_loaded)
         self.ways.chosen.connect(self._use)
         self.drift.said.connect(self._on_drift)
         self.context.source.changed.connect(self._on_source)
@@ -133,8 +133,8 @@ class InspectPage(QWidget):
 
     def enter(self) -> None:
         """Look at the source, through the calibration in use."""
-        self.library.refresh()
-        self.library.refer_cameras(self._loaded[0])
+        self.calibrations.refresh()
+        self.calibrations.refer_cameras(self._loaded[0])
         self._want()
         self.link.enter(True)
         self._words.start()
@@ -213,7 +213,7 @@ class InspectPage(QWidget):
         """Look through the calibration in the way that is chosen."""
         self._loaded = live, best
         if self.isVisible():
-            self.library.refer_cameras(live)
+            self.calibrations.refer_cameras(live)
         self._advise()
 
     # The cursor
@@ -276,7 +276,7 @@ class InspectPage(QWidget):
 
     def _situation(self) -> Situation:
         return situation_of(
-            self.link, self.library, self._loaded[0], context=self.context,
+            self.link, self.calibrations, self._loaded[0], context=self.context,
             size=self._size, trouble=self._trouble, drift=self._drift,
         )  # fmt: skip
 
@@ -305,7 +305,7 @@ class InspectPage(QWidget):
             case "sensors":
                 self.context.requests.page.emit("sensors")
             case "fitting":
-                self.library.use_what_fits(self.link.serial, self._size)
+                self.calibrations.use_what_fits(self.link.serial, self._size)
             case "reopen":
                 self.link.open()
             case "zero":

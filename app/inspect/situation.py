@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.inspect.advice import Known, Situation, Size
-from app.inspect.library import Library
+from app.inspect.calibration_choice import CalibrationChoice
 from app.inspect.link import LiveLink
 from app.shell.context import AppContext
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -11,7 +11,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 def situation_of(
     link: LiveLink,
-    library: Library,
+    calibrations: CalibrationChoice,
     loaded: Reconstructor | None,
     *,
     context: AppContext,
@@ -25,7 +25,7 @@ def situation_of(
     ----------
     link : LiveLink
         With the source's stream.
-    library : Library
+    calibrations : CalibrationChoice
         All calibrations.
     loaded : Reconstructor or None
         Of the calibration in use.
@@ -38,13 +38,13 @@ def situation_of(
     if loaded is not None:
         camera = loaded.calibration.camera
         used = Known(loaded.calibration.sensor.serial, (camera.width, camera.height))
-    summaries = (entry.summary for entry in library.entries)
+    summaries = (entry.summary for entry in calibrations.entries)
     return Situation(
         kind="" if info is None else info.kind,
         serial=link.serial,
         size=size,
         used=used,
-        library=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
+        calibrations=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
         trouble=trouble,
         drift=drift,
     )

@@ -73,7 +73,7 @@ class Desk(DeskFrame):
         self.open_pressed.connect(self.choose_file)
         self.propose_pressed.connect(self.propose)
         self.keep_pressed.connect(self.keep)
-        self.library.loaded.connect(self._use)
+        self.calibrations.loaded.connect(self._use)
         self.context.source.changed.connect(self._on_source)
         self.link.said.connect(self._on_said)
         self.drift.said.connect(self._on_drift)
@@ -102,8 +102,8 @@ class Desk(DeskFrame):
 
     def enter(self) -> None:
         """Look at the source through the calibration in use."""
-        self.library.refresh()
-        self.library.refer_cameras(self._loaded[0])
+        self.calibrations.refresh()
+        self.calibrations.refer_cameras(self._loaded[0])
         self.show_validated()
         self._want()
         self.link.enter(True)
@@ -324,7 +324,7 @@ class Desk(DeskFrame):
         """Measure with another calibration; live only where it belongs to the pictures."""
         self._loaded = live, best
         if self.isVisible():
-            self.library.refer_cameras(live)
+            self.calibrations.refer_cameras(live)
         self._refused, self._shown = "", None
         self.drift.again()
         self.link.use(None)
@@ -358,7 +358,7 @@ class Desk(DeskFrame):
 
     def _situation(self) -> Situation:
         return situation_of(
-            self.link, self.library, self._loaded[0], context=self.context,
+            self.link, self.calibrations, self._loaded[0], context=self.context,
             size=self._size, trouble=self._trouble,
         )  # fmt: skip
 
@@ -384,6 +384,6 @@ class Desk(DeskFrame):
             case "live":
                 self.release()
             case "fitting":
-                self.library.use_what_fits(self.link.serial, self._size)
+                self.calibrations.use_what_fits(self.link.serial, self._size)
             case "reopen":
                 self.link.open()

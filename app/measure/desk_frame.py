@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.inspect.banner import Banner
-from app.inspect.library import CalibrationBox, Library
+from app.inspect.calibration_choice import CalibrationBox, CalibrationChoice
 from app.inspect.replay_bar import ReplayBar
 from app.measure.details import Details
 from app.measure.side_panel import SidePanel
@@ -68,7 +68,7 @@ class DeskFrame(QMainWindow):
         self.work = Work(self)
         self.box = CalibrationBox()
         self.box.setObjectName("measure.calibration")
-        self.library = Library(jobs, self.box, context=context)
+        self.calibrations = CalibrationChoice(jobs, self.box, context=context)
         self.banner = Banner(
             tr("Place a tool, or ask what is pressed. Space goes back to the camera.")
         )
@@ -200,7 +200,7 @@ class DeskFrame(QMainWindow):
 
     def show_validated(self) -> None:
         """Say whether the calibration in use was tried on an object of known size."""
-        entry = next((e for e in self.library.entries if e.in_use), None)
+        entry = next((e for e in self.calibrations.entries if e.in_use), None)
         text, role = "", "muted"
         if entry is not None:
             text, role = (

@@ -49,7 +49,7 @@ def presses(small_session: Path, context: AppContext) -> Path:
 def _use(page: InspectPage, calibration: Calibration) -> None:
     """Look through a calibration by the paper's model, which is quick."""
     reconstructor = Reconstructor(calibration, model="paper")
-    page.library.loaded.emit(reconstructor, reconstructor)
+    page.calibrations.loaded.emit(reconstructor, reconstructor)
 
 
 def _wait_for_depth(page: InspectPage, qtbot: QtBot) -> None:

@@ -51,7 +51,7 @@ class CalibrationBox(QComboBox):
                         self.setCurrentIndex(self.count() - 1)
 
 
-class Library(QObject):
+class CalibrationChoice(QObject):
     """Reads the calibration in use, beside the window.
 
     Parameters
