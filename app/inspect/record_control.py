@@ -12,11 +12,11 @@ from PySide6.QtWidgets import QWidget
 from app.inspect.link import LiveLink
 from app.shell.actions import make_action
 from app.shell.context import AppContext
-from app.sources.recorder import Recorder, RecorderFigures
+from app.sources.recorder import Recorder, RecorderFigures, header_for
 from app.workspace.workspace import Workspace
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
-from gelpolight_core.recording.recording import ENDING, RecordingHeader
+from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
 
 POLL_MS = 300
@@ -68,12 +68,10 @@ class RecordControl(QObject):
         reconstructor = self._link.reconstructor
         calibration = None if reconstructor is None else reconstructor.calibration
         serial = "" if calibration is None else calibration.sensor.serial
-        header = RecordingHeader(
+        header = header_for(
+            stream.source,
             serial=serial,
             calibration_id="" if calibration is None else calibration.identity,
-            source=info.name,
-            kind=info.kind,
-            settings={setting.key: setting.value for setting in stream.source.settings()},
         )
         try:
             path = recording_path(self._context.workspace, serial or "unknown")

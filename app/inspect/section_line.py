@@ -61,12 +61,6 @@ class SectionLine(QObject):
             end = (start[0] + LEAST_MM, start[1])
         return start, end
 
-    def set_ends(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Lay it elsewhere."""
-        handles = self._roi.getHandles()
-        for handle, place in zip(handles, (start, end), strict=True):
-            self._roi.movePoint(handle, pg.Point(*place), coords="parent", finish=False)
-
     def set_width(self, width_mm: float) -> None:
         """Show over which width is averaged."""
         self._width_mm = width_mm

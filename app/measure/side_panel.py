@@ -33,7 +33,6 @@ from gelpolight_core.translation import tr
 
 WIDTH = 340
 LIST_HEIGHT = 96
-LEAST_ROWS = 6
 KEY = Qt.ItemDataRole.UserRole
 
 
