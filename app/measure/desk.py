@@ -24,6 +24,7 @@ from app.measure.measuring import Taken
 from app.measure.steady import SteadyPress
 from app.shell.context import AppContext
 from app.shell.jobs import Jobs
+from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -99,6 +100,12 @@ class Desk(DeskFrame):
         panel.truth.limits_wanted.connect(self.limits_wanted)
 
     # What the page asks
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The calibration that is measured with; None where there is none."""
+        best = self._loaded[1]
+        return None if best is None else best.calibration
 
     def enter(self) -> None:
         """Look at the source through the calibration in use."""

@@ -154,7 +154,7 @@ class MeasurePage(QWidget):
             # No message over the window: it would lie on the button for the next one.
             self.desk.panel.say_kept(text)
 
-        self.book.add(record, done)
+        self.book.add(record, done, calibration=self.desk.calibration)
 
     def _keep_evaluation(self, record: MeasurementRecord) -> None:
         """Write a run that is complete into the records, once."""

@@ -10,6 +10,7 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
+from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once
 from gelpolight_core.records.records import NAME, Records
@@ -68,9 +69,31 @@ class RecordBook(QObject):
         else:
             self._take(())
 
-    def add(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
-        """Keep a measurement; `done` is told its number once it is on the disk."""
-        self._do(tr("Keeping the measurement"), lambda records: records.add(record), done)
+    def add(
+        self,
+        record: MeasurementRecord,
+        done: Callable[[int], object],
+        *,
+        calibration: Calibration | None = None,
+    ) -> None:
+        """Keep a measurement, and what is known of its calibration.
+
+        `done` is told its number once it is on the disk.
+        """
+
+        def keep(records: Records) -> int:
+            number = records.add(record)
+            if calibration is not None and calibration.identity == record.calibration_id:
+                records.know_calibration(
+                    calibration.identity,
+                    record.serial,
+                    model=calibration.model,
+                    made=calibration.provenance.created,
+                    verdict=calibration.verdict.value,
+                )
+            return number
+
+        self._do(tr("Keeping the measurement"), keep, done)
 
     def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
         """Keep an evaluation unless it is there already; `done` is told its number, or 0."""

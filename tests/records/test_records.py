@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import sqlite3
 import threading
+from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
@@ -195,6 +197,10 @@ def test_what_is_known_of_a_calibration_is_kept(records: Records) -> None:
     records.add(cylinder(1.0))
     records.know_calibration("c1", "A-1", model="full", made="2026-01-01", verdict="pass")
     assert records.measurements()[0].calibration_id == "c1"
+    with closing(sqlite3.connect(records.path)) as other:
+        rows = other.execute("SELECT id, serial, model, made, verdict FROM calibrations")
+        known = rows.fetchall()
+    assert known == [("c1", "A-1", "full", "2026-01-01", "pass")]
 
 
 @pytest.mark.parametrize(

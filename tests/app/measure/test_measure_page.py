@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import cv2
@@ -22,10 +24,11 @@ from app.measure.page import MeasurePage
 from app.shell.context import AppContext
 from app.shell.settings import Limits
 from gelpolight_core.calibration.calibration import Calibration
-from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.measurement.tools import ProfileWidth
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.records.records import NAME
 
 PATIENCE_MS = 60_000
 
@@ -143,6 +146,12 @@ def test_a_press_is_recognised_measured_compared_and_kept_like_the_command_says(
     assert [q.value for q in record.quantities] == [told["diameter_mm"], told["height_mm"]]
     assert [q.error_percent for q in record.quantities] == list(told["error_percent"].values())
     assert (record.operator, record.note, record.picture) == ("Ada", "on the bench", press.name)
+
+    with closing(sqlite3.connect(context.workspace.folder / NAME)) as records:
+        calibrations = records.execute("SELECT id, model, made, verdict FROM calibrations")
+        (known,) = calibrations.fetchall()
+    used = read_calibration(calibration_file)
+    assert known == (used.identity, "full", used.provenance.created, used.verdict.value)
 
     # The limits are the person's: remembered, and followed at once.
     page._keep_limits(Limits(size_percent=0.001))
