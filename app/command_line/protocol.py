@@ -20,6 +20,7 @@ from gelpolight_core.experiments.virtual_protocol import (
     run_ledger,
 )
 from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.export.run_lock import RunLock
 from gelpolight_core.measurement.protocol import (
     SHAPES,
     Protocol,
@@ -28,7 +29,6 @@ from gelpolight_core.measurement.protocol import (
 )
 from gelpolight_core.measurement.protocol_file import FILE_NAME
 from gelpolight_core.measurement.protocol_run import ProtocolRun, begin_run, open_run
-from gelpolight_core.measurement.run_lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 

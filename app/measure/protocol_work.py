@@ -17,13 +17,13 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.virtual_protocol import evaluate_run, run_ledger
 from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.export.run_lock import RunLock
 from gelpolight_core.measurement.evaluation import Evaluation, measure_press
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.presses import picture_reconstruction
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.measurement.run_lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.evaluation_files import write_evaluation_files
 from gelpolight_core.translation import tr

@@ -7,13 +7,12 @@ no line: that frame is done again. Of two lines for one result the later one cou
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.measurement.ledger import unwritable
+from gelpolight_core.export.appending import append_durably
 from gelpolight_core.reading import open_file, parse_json, unreadable
 
 FILE = "batch.jsonl"
@@ -122,13 +121,7 @@ class BatchLedger:
         lines = [_packed(row) for row in rows]
         if not lines:
             return
-        try:
-            with self._path.open("ab") as file:
-                file.write((b"\n" if self._torn else b"") + b"".join(lines))
-                file.flush()
-                os.fsync(file.fileno())
-        except OSError as error:
-            raise unwritable(error, self._path) from error
+        append_durably(self._path, (b"\n" if self._torn else b"") + b"".join(lines))
         if self._torn:
             self._end, self._torn = self._end + 1, False
         for row, line in zip(rows, lines, strict=True):

@@ -23,7 +23,7 @@ from gelpolight_core.batch.summary import write_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import ending
-from gelpolight_core.measurement.run_lock import RunLock
+from gelpolight_core.export.run_lock import RunLock
 from gelpolight_core.translation import tr
 
 Runner = Callable[[Iterator[Job], int, Stopped], Generator[list[Outcome], None, None]]

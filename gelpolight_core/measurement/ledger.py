@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.export.appending import append_durably
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.reading import parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
@@ -87,13 +87,7 @@ class Ledger:
             return
         said = outcome if isinstance(outcome, str) else _as_json(outcome)
         line = json.dumps({"key": key, "outcome": said}, separators=(",", ":")) + "\n"
-        try:
-            with self._path.open("a", encoding="utf-8") as file:
-                file.write("\n" + line if self._torn else line)
-                file.flush()
-                os.fsync(file.fileno())
-        except OSError as error:
-            raise unwritable(error, self._path) from error
+        append_durably(self._path, ("\n" + line if self._torn else line).encode())
         self._torn = False
 
     def _take_in(self, line: str) -> None:
@@ -106,15 +100,6 @@ class Ledger:
             )
         except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError):
             return
-
-
-def unwritable(error: OSError, path: Path) -> InputError:
-    """Return what to raise about a file that cannot be added to."""
-    return InputError(
-        tr("the file cannot be written ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check the disk and its permissions, then go on where it was left"),
-    )
 
 
 def _damaged(path: Path) -> InputError:

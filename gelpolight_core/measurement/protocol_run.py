@@ -20,9 +20,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.export.appending import append_durably, unwritable
 from gelpolight_core.export.atomic import make_folder, write_atomically
 from gelpolight_core.measurement.evaluation import Crossing
-from gelpolight_core.measurement.ledger import unwritable
 from gelpolight_core.measurement.protocol import PressWanted, Protocol, check_protocol
 from gelpolight_core.measurement.protocol_file import (
     FILE_NAME,
@@ -174,7 +174,7 @@ class ProtocolRun:
         """
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerow([_now(), press.file, reason])
-        _append(self.folder / REFUSED, text.getvalue())
+        append_durably(self.folder / REFUSED, text.getvalue().encode())
         self._refused += 1
 
     def take_back(self, press: PressWanted) -> Path | None:
@@ -342,16 +342,6 @@ def _read_rows(path: Path) -> list[list[str]]:
             advice=tr("Put the file back as it was written"),
         )
     return lines[1:]
-
-
-def _append(path: Path, line: str) -> None:
-    try:
-        with path.open("a", encoding="utf-8") as file:
-            file.write(line)
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError as error:
-        raise unwritable(error, path) from error
 
 
 def _count_lines(path: Path) -> int:

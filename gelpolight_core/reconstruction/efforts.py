@@ -57,8 +57,8 @@ WAYS = (*(Way(FULL, effort) for effort in EFFORTS), Way(PAPER, "best"))
 
 FOUND: Mapping[Way, FoundError] = MappingProxyType(
     {
-        Way(FULL, "fast"): FoundError(0.84, 0.40),
-        Way(FULL, "balanced"): FoundError(0.44, 0.22),
+        Way(FULL, "fast"): FoundError(0.70, 0.41),
+        Way(FULL, "balanced"): FoundError(0.39, 0.22),
         Way(FULL, "best"): FoundError(0.41, 0.14),
         Way(PAPER, "best"): FoundError(2.0, 2.6),
     }

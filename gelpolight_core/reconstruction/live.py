@@ -51,7 +51,7 @@ ROUNDS = 2
 SHALLOW_MM = 0.05
 # Of the integration, round by round: the first ones only have to say where the surface is.
 FIRST_TOLERANCES = (0.05, 0.005)
-TOLERANCE = 3e-3
+TOLERANCE = 1e-3
 # Bytes that a node at quarter scale, a solved node and a shown node must read and write once.
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 4 * (12 + 20 + 13), 88, 6
 

@@ -24,7 +24,7 @@ from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import write_heightmap
-from gelpolight_core.measurement.run_lock import RunLock
+from gelpolight_core.export.run_lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.session import read_picture
 

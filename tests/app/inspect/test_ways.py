@@ -49,7 +49,7 @@ def test_every_way_is_offered_with_the_errors_that_were_measured(
     choice.take(full, full)
     texts = [choice.box.itemText(k) for k in range(choice.box.count())]
     assert len(texts) == len(WAYS) == 4
-    assert "fast   0.84 / 0.40 %" in choice.box.currentText()
+    assert "fast   0.70 / 0.41 %" in choice.box.currentText()
     assert "2.0 / 2.6 %" in texts[-1]
     errors = [FOUND[way] for way in WAYS[:3]]
     assert errors == sorted(errors, key=lambda e: e.height_percent, reverse=True)

@@ -22,9 +22,9 @@ from app.sources.bench import Bench
 from app.sources.source import SourceInfo
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.export.run_lock import RunLock
 from gelpolight_core.measurement.protocol import PressWanted, Protocol
 from gelpolight_core.measurement.result import Truth
-from gelpolight_core.measurement.run_lock import RunLock
 from gelpolight_core.optics.refraction import camera_to_membrane
 from gelpolight_core.records.entry import MeasurementRecord
 

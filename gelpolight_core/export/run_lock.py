@@ -1,4 +1,4 @@
-"""One program at a time writes a run of the protocol; the others are told who does."""
+"""One program at a time writes a run's folder; the others are told who does."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.ledger import unwritable
+from gelpolight_core.export.appending import unwritable
 from gelpolight_core.translation import tr
 
 if sys.platform == "win32":

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.run_lock import RunLock
+from gelpolight_core.export.run_lock import RunLock
 
 
 def test_a_second_program_is_told_who_writes_the_run(tmp_path: Path) -> None:
