@@ -99,6 +99,9 @@ class Measurement:
         for picture in self._view.findChildren(QGraphicsView):
             picture.viewport().installEventFilter(self._paints)
         self._lateness = Lateness()
+        self._memory_mb: list[float] = []
+        self._minutes = QTimer()
+        self._minutes.timeout.connect(self._note_memory)
         self._move = QTimer()
         self._move.timeout.connect(dragger(self.bench))
         if drag:
@@ -116,8 +119,12 @@ class Measurement:
         self._paints.ages_ms.clear()
         self._lateness.late_ms.clear()
         self._before = self.stream.figures()
-        self._memory_mb = resident_mb()
+        self._note_memory()
+        self._minutes.start(60_000)
         self._spent = Spent()
+
+    def _note_memory(self) -> None:
+        self._memory_mb.append(resident_mb())
 
     def tell(self) -> None:
         """Print what was measured."""
@@ -135,12 +142,13 @@ class Measurement:
                 print(f"the last frame failed: {last.sentence}")
         print(told("lateness of the user interface", self._lateness.late_ms, "ms"))
         print(told("age of a frame when its painting begins", self._paints.ages_ms, "ms"))
-        print(f"memory: {self._memory_mb:.0f} MB, at the end {resident_mb():.0f} MB")
+        print("memory by the minute, MB:", *(f"{mb:.0f}" for mb in self._memory_mb))
         print(self._spent.told())
 
     def stop(self) -> None:
         """End all threads."""
         self._move.stop()
+        self._minutes.stop()
         self._view.set_stream(None)
         began = time.monotonic()
         if self._processor is not None:
@@ -153,8 +161,8 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--minutes", type=float, default=1.0)
-    # The first depth map of a machine compiles the kernels, which can take a minute.
-    parser.add_argument("--warm-up", type=float, default=10.0, help="seconds not measured")
+    # By then every item has lain on the sensor once; a machine's first depth map compiles kernels.
+    parser.add_argument("--warm-up", type=float, default=75.0, help="seconds not measured")
     parser.add_argument("--calibration", type=Path, help="make depth maps with it")
     parser.add_argument("--still", action="store_true", help="nothing is dragged")
     parser.add_argument("--wizard", type=Path, metavar="SESSION", help="open the wizard on it")

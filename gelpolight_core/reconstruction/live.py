@@ -34,6 +34,7 @@ from gelpolight_core.reconstruction.live_pixels import (
     show_depth,
     show_normals,
 )
+from gelpolight_core.reconstruction.near_light_kernel import UNSOLVED_WEIGHT
 from gelpolight_core.reconstruction.plan import Plan, PlanRecord
 from gelpolight_core.reconstruction.region import Region, padded_region
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -52,6 +53,8 @@ SHALLOW_MM = 0.05
 # Of the integration, round by round: the first ones only have to say where the surface is.
 FIRST_TOLERANCES = (0.05, 0.005)
 TOLERANCE = 1e-3
+# Along both axes, of the nodes that are counted.
+THIN = 2
 # Bytes that a node at quarter scale, a solved node and a shown node must read and write once.
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 4 * (12 + 20 + 13), 88, 6
 
@@ -68,6 +71,8 @@ class LiveDepth:
         As in :class:`FullDepth`.
     plan : Plan
         What was done and what was left out.
+    unsolved : float
+        As in :class:`FullDepth`.
     """
 
     depth_mm: Map
@@ -76,6 +81,7 @@ class LiveDepth:
     stopped: str
     rim: str
     plan: Plan
+    unsolved: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,15 +152,17 @@ class LiveSolver:
         flags = self.maps.flags.copy()
         shown = flat_normals(depth.shape) if normals else None
         region, stopped, rim = self._region(raw, record, everywhere), "done", "held"
+        unsolved = 0.0
         if region is None:
             for name in (tr("resampling and comparing"), tr("near light"), tr("integration")):
                 record.left_out(name, tr("nothing is pressed into the membrane"))
         else:
-            stopped, rim = self._solve(raw, region, effort, record, depth, flags, shown)
+            stopped, rim, unsolved = self._solve(raw, region, effort, record, depth, flags, shown)
         if not normals:
             record.left_out(tr("normals"), tr("nobody asked for them"))
         record.left_out(tr("standard deviations"), tr("nobody asked for them"))
-        return LiveDepth(depth, shown, flags, stopped, rim, Plan(effort, tuple(record.steps)))
+        plan = Plan(effort, tuple(record.steps))
+        return LiveDepth(depth, shown, flags, stopped, rim, plan, unsolved)
 
     def _region(self, raw: NDArray[Any], record: PlanRecord, everywhere: bool) -> Region | None:
         whole = Region((0, 0), self.maps.quarter.shape)
@@ -180,8 +188,11 @@ class LiveSolver:
         depth: Map,
         flags: NDArray[np.uint8],
         normals: Map | None,
-    ) -> tuple[str, str]:
-        """Solve a region and write it into the maps of the whole grid."""
+    ) -> tuple[str, str, float]:
+        """Solve a region and write it into the maps of the whole grid.
+
+        Returns how the rounds ended, what became of the rim, and the unsolved share.
+        """
         maps, nodes = self.maps, region.nodes
         with record.done(tr("resampling and comparing"), nodes * SAMPLED_BYTES) as reason:
             half, quarter = self._sampler.compare(raw, region, linear=self._linear)
@@ -212,7 +223,15 @@ class LiveSolver:
         with record.done(tr("true positions"), 16 * nodes * SHOWN_BYTES) as reason:
             self._show(scale, region, slopes, moved, depth, flags, normals)
             reason.append(tr("and to the whole grid's scale"))
-        return stopped, "held" if picture.let_go is None else "free"
+        rim = "held" if picture.let_go is None else "free"
+        return stopped, rim, self._unsolved_share(scale, corner, slopes.weight)
+
+    def _unsolved_share(self, scale: LiveScale, corner: tuple[int, int], weight: Map) -> float:
+        """Return the share of the field's nodes that light does not decide, from some of them."""
+        (top, left), (rows, columns) = corner, weight.shape
+        usable = scale.kind[top : top + rows : THIN, left : left + columns : THIN] == 2
+        unsolved = usable & (weight[::THIN, ::THIN] <= np.float32(UNSOLVED_WEIGHT))
+        return THIN**2 * float(np.count_nonzero(unsolved)) / max(scale.usable_nodes, 1)
 
     def _rounds(
         self, region: Region, picture: PressPicture

@@ -46,6 +46,8 @@ class LiveScale:
         over background (3); drift of the rays (2) and its derivatives by x and y (4).
     kind : (rows, columns) uint8
         2 usable, 1 inside but not usable, 0 outside.
+    usable_nodes : int
+        How many are.
     """
 
     factor: int
@@ -54,6 +56,7 @@ class LiveScale:
     pitch_mm: float
     static: Map
     kind: NDArray[np.uint8]
+    usable_nodes: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,6 +200,7 @@ def _scale(
         pitch,
         static,
         np.where(all_usable, 2, mostly_inside).astype(np.uint8),
+        int(np.count_nonzero(all_usable)),
     )
 
 

@@ -246,7 +246,7 @@ class Reconstructor:
         full = self.calibration.full
         assert full is not None
         found = self.live.depth(frame, effort=self.effort, normals=normals)
-        notes += _notes(found.rim, found.stopped)
+        notes += _notes(found.rim, found.stopped, found.unsolved)
         heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
         scale = full.scale_sd
         return replace(
@@ -333,7 +333,7 @@ class Reconstructor:
         return accepted(frame, name=name)
 
 
-def _notes(rim: str, stopped: str, unsolved: float = 0.0) -> Notes:
+def _notes(rim: str, stopped: str, unsolved: float) -> Notes:
     """Return what is to be said of a reconstruction, in sentences for a person."""
     notes = []
     if rim == "free":

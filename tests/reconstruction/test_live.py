@@ -17,6 +17,7 @@ from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction import live
 from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.plan import EFFORTS
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reflectance.membrane import CURVE_NODES
@@ -135,6 +136,22 @@ def test_half_scale_is_near_to_the_best(
     assert np.median(np.degrees(np.arcsin(np.clip(across[plateau], 0.0, 1.0)))) < 1.0
     same = (planned.flags & Flag.OUTSIDE) == (best.flags & Flag.OUTSIDE)
     assert same.all()
+
+
+@pytest.mark.parametrize(("decay_mm", "said"), [(0.7, False), (0.1, True)])
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_walls_that_light_does_not_decide_are_said_at_every_effort(
+    effort: str,
+    decay_mm: float,
+    said: bool,
+    shown: Callable[[State], Frame],
+    virtual_calibration: Calibration,
+) -> None:
+    """Walls of 57 degrees, and of 84."""
+    surface = pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, decay_mm=decay_mm)
+    picture = shown(PressedMembrane(surface))
+    notes = Reconstructor(virtual_calibration, effort=effort).depth(picture).notes
+    assert any("steep walls" in note for note in notes) is said
 
 
 def test_the_paper_and_the_best_effort_leave_nothing_out(
