@@ -167,18 +167,15 @@ def _paper_steps(reconstructor: Reconstructor, frame: NDArray[Any]) -> Steps:
     """Return the paper's model step by step, each with the bytes that it touches."""
     maps, solver = reconstructor.maps, reconstructor.solver
     slopes = reconstructor.slope_solver
-    field = slopes.solve(frame)
-    slope_bytes = field.slope_x.nbytes + field.slope_y.nbytes
+    divergence, field = slopes.divergence(frame, solver)
     read = frame.nbytes + maps.u_px.nbytes + maps.v_px.nbytes + maps.gain.nbytes
     return {
-        "resampling and normals": (
-            lambda: slopes.solve(frame, length_error=False),
-            read + slope_bytes + field.flags.nbytes,
+        "resampling, normals and their divergence": (
+            lambda: slopes.divergence(frame, solver),
+            read + divergence.nbytes + field.flags.nbytes,
         ),
-        "integration": (
-            lambda: solver.integrate(field.slope_x, field.slope_y),
-            slope_bytes + field.slope_x.nbytes,
-        ),
+        # Of a copy, because it is written over.
+        "integration": (lambda: solver.depth_of(divergence.copy()), 2 * divergence.nbytes),
     }
 
 

@@ -36,7 +36,7 @@ def _clean(source, target, limit):  # type: ignore[no-untyped-def]  # pragma: no
 
 
 @_whole
-def _add_along_row(slope, start, weights, left, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def add_along_row(slope, start, weights, left, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Add the x part of the divergence of one line of slopes to one padded line."""
     columns = slope.shape[0]
     inner = max(columns - 4, 0)
@@ -60,7 +60,7 @@ def _add_along_row(slope, start, weights, left, target):  # type: ignore[no-unty
 
 
 @_whole
-def _add_down(r0, r1, r2, r3, r4, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def add_down(r0, r1, r2, r3, r4, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Add the y part of the divergence of one line, from five lines of slopes."""
     a, b, c, d, e = weights
     for k in range(target.shape[0]):
@@ -107,7 +107,7 @@ def divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
                 faults[loaded + top, 0] += bad
                 faults[loaded + top, 1] += clipped
             loaded += 1
-        _add_down(
+        add_down(
             ring[begin % 5],
             ring[(begin + 1) % 5],
             ring[(begin + 2) % 5],
@@ -120,4 +120,4 @@ def divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
             bad, clipped = _clean(slope_x[line - top], line_x, limit)
             faults[line, 0] += bad
             faults[line, 1] += clipped
-            _add_along_row(line_x, start_x, weight_x, left, field[line])
+            add_along_row(line_x, start_x, weight_x, left, field[line])

@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.paper_divergence import paper_divergence_rows
 from gelpolight_core.reconstruction.paper_kernel import (
     BLOCK,
     SATURATED,
     STATIC_PLANES,
     solve_rows,
 )
+from gelpolight_core.reconstruction.poisson import PoissonSolver
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
@@ -71,8 +73,9 @@ class SlopeField:
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     length_error : (rows, columns) float32
-        | |n| - 1 | of the solved normal, a check that costs little; 0 outside. Of no size where
-        nobody asked for it.
+        | |n| - 1 | of the solved normal, a check that costs little; 0 outside.
+
+    Maps that were not asked for are of no size.
     """
 
     slope_x: Map
@@ -108,47 +111,81 @@ class SlopeSolver:
         self._take = Buffers().take
         self._lock = Lock()
 
-    def solve(self, raw: NDArray[Any], *, length_error: bool = True) -> SlopeField:
+    def solve(self, raw: NDArray[Any]) -> SlopeField:
         """Return the slopes of the depth.
 
         Parameters
         ----------
         raw : (height, width, 3) uint8, uint16 or float32
             Raw picture in RGB order; float pictures are 0..1.
-        length_error : bool, optional
-            Whether it is wanted.
         """
+        slope_x, slope_y, length = (np.empty(self._shape, np.float32) for _ in range(3))
+        flags = np.empty(self._shape, np.uint8)
+        with self._lock:
+            picture, sensor = self._of_picture(raw)
+            self._workers.run(
+                self._shape[0], solve_rows, picture, sensor, slope_x, slope_y, flags, length
+            )
+        return SlopeField(slope_x, slope_y, flags, length)
+
+    def divergence(
+        self, raw: NDArray[Any], solver: PoissonSolver, *, slopes: bool = False
+    ) -> tuple[Map, SlopeField]:
+        """Return what `solver` makes the depth of, and the slopes where they are wanted.
+
+        One pass, which is quicker than :meth:`solve` and :meth:`PoissonSolver.integrate`.
+
+        Parameters
+        ----------
+        raw : (height, width, 3) uint8, uint16 or float32
+            As in :meth:`solve`.
+        solver : PoissonSolver
+            Of the same grid, in single precision.
+        slopes : bool, optional
+            Whether they are wanted beside the flags; the length's error is not made.
+        """
+        none = np.empty((0, 0), np.float32)
+        shape = self._shape if slopes else (0, 0)
+        slope_x, slope_y = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        flags = np.empty(self._shape, np.uint8)
+        edges = solver.edges
+        field = np.empty((len(edges.weight_y), len(edges.weight_x)), np.float32)
+        with self._lock:
+            self._workers.run(
+                len(field),
+                paper_divergence_rows,
+                *self._of_picture(raw),
+                (edges.start_x, edges.weight_x, edges.start_y, edges.weight_y),
+                edges.top,
+                edges.left,
+                slopes,
+                slope_x,
+                slope_y,
+                flags,
+                field,
+            )
+        return field, SlopeField(slope_x, slope_y, flags, none)
+
+    def _of_picture(self, raw: NDArray[Any]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """Return a picture and the sensor as the kernels want them."""
         height, width = raw.shape[:2]
         # Compiled code is made anew for an array that must not be written to.
         raw = np.require(raw, requirements=["C", "W"])
         full_scale = np.float32(1.0 if raw.dtype.kind == "f" else np.iinfo(raw.dtype).max)
-        slope_x, slope_y = np.empty(self._shape, np.float32), np.empty(self._shape, np.float32)
-        flags = np.empty(self._shape, np.uint8)
-        length = np.empty(self._shape if length_error else (0, 0), np.float32)
-        with self._lock:
-            self._workers.run(
-                self._shape[0],
-                solve_rows,
-                raw.reshape(-1, 3),
-                self._pairs(raw) if raw.dtype == np.uint8 and width > 1 else None,
-                (width, height),
-                np.float32(SATURATED) * full_scale,
-                self._static,
-                self._lit,
-                self._table,
-                tuple(self._scale / full_scale),
-                self._coverage,
-                self._leds,
-                self._x_first,
-                self._pitch,
-                self._y_mm,
-                length_error,
-                slope_x,
-                slope_y,
-                flags,
-                length,
-            )
-        return SlopeField(slope_x, slope_y, flags, length)
+        pairs = self._pairs(raw) if raw.dtype == np.uint8 and width > 1 else None
+        limit = np.float32(SATURATED) * full_scale
+        sensor = (
+            self._static,
+            self._lit,
+            self._table,
+            tuple(self._scale / full_scale),
+            self._coverage,
+            self._leds,
+            self._x_first,
+            self._pitch,
+            self._y_mm,
+        )
+        return (raw.reshape(-1, 3), pairs, width, height, limit), sensor
 
     def _pairs(self, raw: NDArray[np.uint8]) -> NDArray[np.uint64]:
         """Return (pixels,): of each pixel its three bytes and those of its right neighbour.

@@ -47,7 +47,7 @@ def _most(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     return a if a > b else b
 
 
-@_whole
+@_part
 def _pixels(i, block, static, width, height, w, pixel):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Note the upper left one of the four pixels about each node, and the place between them."""
     right, low = _int(width - 2), _int(height - 2)
@@ -59,7 +59,7 @@ def _pixels(i, block, static, width, height, w, pixel):  # type: ignore[no-untyp
         w[j], w[_B + j] = u - _single(c), v - _single(r)
 
 
-@_whole
+@_part
 def _pick(pixel, pairs, below, words):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Fetch four pixels of a byte per channel: two neighbours at a time."""
     for j in range(_B):
@@ -94,7 +94,7 @@ def _byte_between(words, j, shift, fu, fv):  # type: ignore[no-untyped-def]  # p
     )
 
 
-@_whole
+@_part
 def _resample_bytes(words, w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     for j in range(_B):
         fu, fv = w[j], w[_B + j]
@@ -107,7 +107,7 @@ def _resample_bytes(words, w):  # type: ignore[no-untyped-def]  # pragma: no cov
         w[_TOP * _B + j] = _most(top0, _most(top1, top2))
 
 
-@_whole
+@_part
 def _resample_any(pixel, raw, right, below, w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """As `_pick` and `_resample_bytes`, for pixels (pixels, 3) of any kind."""
     for j in range(_B):
@@ -128,6 +128,15 @@ def _resample_any(pixel, raw, right, below, w):  # type: ignore[no-untyped-def] 
 
 
 @_part
+def _resample(pixel, raw, pairs, right, below, words, w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    if pairs is not None:
+        _pick(pixel, pairs, below, words)
+        _resample_bytes(words, w)
+    else:
+        _resample_any(pixel, raw, right, below, w)
+
+
+@_part
 def _limited(place, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a place within the table, whether it was no number or below, and whether beyond."""
     bad = not (place >= _0)
@@ -136,7 +145,7 @@ def _limited(place, last):  # type: ignore[no-untyped-def]  # pragma: no cover -
     return last if far else place, bad, far
 
 
-@_whole
+@_part
 def _places(i, block, static, scale, size, w, entry):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Divide by light and factor (Eq. 7), and find the place in each channel's table."""
     last, top = _single(size - 1), _int(size - 2)
@@ -158,7 +167,7 @@ def _places(i, block, static, scale, size, w, entry):  # type: ignore[no-untyped
         w[_BAD * _B + j] = _1 if bad0 | bad1 | bad2 else _0
 
 
-@_whole
+@_part
 def _look_up(entry, table, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Fetch entries of the tables: a cosine and the step to the next, half a word each."""
     for j in range(3 * _B):
@@ -175,7 +184,7 @@ def _cosine(w, found, k, j, coverage):  # type: ignore[no-untyped-def]  # pragma
     return cosine, dark, (not dark) & ((cosine < coverage[k][0]) | (cosine > coverage[k][1]))
 
 
-@_whole
+@_part
 def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Solve Eq. (10) by cross products of the ways to the LEDs, and bring the normal to slopes.
 
@@ -230,91 +239,76 @@ def _normals(i, block, static, found, coverage, leds, limit, x_first, pitch, y, 
         w[(_OUT + 3) * _B + j] = ok * abs(size / (side * whole) - _1)
 
 
-@_whole
-def _put(w, plane, out, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+@_part
+def _put(w, plane, line, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    part = line[begin : begin + count]
     if count == _B:
         for j in range(_B):
-            out[i, begin + j] = w[plane * _B + j]
+            part[j] = w[plane * _B + j]
     else:
         for j in range(count):
-            out[i, begin + j] = w[plane * _B + j]
+            part[j] = w[plane * _B + j]
+
+
+@_part
+def work_arrays():  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return what `solve_row` works in, made by its caller once for many rows."""
+    return (
+        np.zeros(_PLANES * _B, np.float32),
+        np.zeros(_B, np.uint32),
+        np.zeros(3 * _B, np.uint32),
+        np.zeros(4 * _B, np.uint32),
+        np.zeros(6 * _B, np.uint32),
+    )
+
+
+@_part
+def solve_row(i, picture, sensor, work, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Solve row `i` into lines (columns,); `length_error` may be None.
+
+    `picture` is: pixels (pixels, 3); of one of bytes two neighbours in each word (pixels,), else
+    None; width, height; the value that counts as saturated. `sensor` is: `static` (rows, blocks,
+    5 * 64) with u, v and the three gains; `lit` (rows, blocks), which blocks have any node of use;
+    the table, a cosine and the step to the next in each word; from processed value to place in it
+    (3); the cosines that it has data for (3, 2); the LEDs (3, 3); x of the first node, the pitch;
+    y of the rows.
+    """
+    raw, pairs, width, height, limit = picture
+    static, lit, table, scale, coverage, leds, x_first, pitch, y_mm = sensor
+    w, pixel, entry, words, found = work
+    right = np.uint32(1 if width > 1 else 0)
+    below = np.uint32(width if height > 1 else 0)
+    entries, columns = table.shape[0] // 3, slope_x.shape[0]
+    shares = found.view(np.float32)
+    for block in range(static.shape[1]):
+        begin = block * _B
+        if lit[i, block]:
+            _pixels(i, block, static, width, height, w, pixel)
+            _resample(pixel, raw, pairs, right, below, words, w)
+            _places(i, block, static, scale, entries, w, entry)
+            _look_up(entry, table, found)
+            x = _single(x_first + pitch * begin)
+            step, y = _single(pitch), y_mm[i]
+            _normals(i, block, static, shares, coverage, leds, limit, x, step, y, w)
+        else:
+            w[_OUT * _B :] = _0
+            w[(_OUT + 2) * _B : (_OUT + 3) * _B] = _F_OUTSIDE
+        count = min(_B, columns - begin)
+        _put(w, _OUT, slope_x, begin, count)
+        _put(w, _OUT + 1, slope_y, begin, count)
+        if length_error is not None:
+            _put(w, _OUT + 3, length_error, begin, count)
+        marks = flags[begin : begin + count]
+        for j in range(count):
+            marks[j] = np.uint8(_int(w[(_OUT + 2) * _B + j]))
 
 
 @_whole
-def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    first,
-    last,
-    raw,
-    pairs,
-    size,
-    limit,
-    static,
-    lit,
-    table,
-    scale,
-    coverage,
-    leds,
-    x_first,
-    pitch,
-    y_mm,
-    length,
-    slope_x,
-    slope_y,
-    flags,
-    length_error,
-):
-    """Solve rows `first` to `last`.
-
-    `raw` (pixels, 3) is the picture, of `size` (width, height); of one of bytes `pairs` (pixels,)
-    holds two neighbours in each word, else it is None. `static` (rows, blocks, 5 * 64) holds u, v
-    and the three gains; `lit` (rows, blocks) says which blocks have any node of use; `table` holds
-    a cosine and the step to the next in each word. `length_error` is written where `length`.
-    """
-    width, height = size
-    right = np.uint32(1 if width > 1 else 0)
-    below = np.uint32(width if height > 1 else 0)
-    entries = table.shape[0] // 3
-    columns = slope_x.shape[1]
-    w = np.zeros(_PLANES * _B, np.float32)
-    pixel, entry = np.zeros(_B, np.uint32), np.zeros(3 * _B, np.uint32)
-    words, found = np.zeros(4 * _B, np.uint32), np.zeros(6 * _B, np.uint32)
-    shares = found.view(np.float32)
+def solve_rows(first, last, picture, sensor, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Solve rows `first` to `last` of maps (rows, columns); else as `solve_row`."""
+    work = work_arrays()
     for i in range(first, last):
-        for block in range(static.shape[1]):
-            begin = block * _B
-            if lit[i, block]:
-                _pixels(i, block, static, width, height, w, pixel)
-                if pairs is not None:
-                    _pick(pixel, pairs, below, words)
-                    _resample_bytes(words, w)
-                else:
-                    _resample_any(pixel, raw, right, below, w)
-                _places(i, block, static, scale, entries, w, entry)
-                _look_up(entry, table, found)
-                x = _single(x_first + pitch * begin)
-                _normals(
-                    i,
-                    block,
-                    static,
-                    shares,
-                    coverage,
-                    leds,
-                    limit,
-                    x,
-                    _single(pitch),
-                    y_mm[i],
-                    w,
-                )
-            else:
-                w[_OUT * _B :] = _0
-                w[(_OUT + 2) * _B : (_OUT + 3) * _B] = _F_OUTSIDE
-            count = min(_B, columns - begin)
-            _put(w, _OUT, slope_x, i, begin, count)
-            _put(w, _OUT + 1, slope_y, i, begin, count)
-            if length:
-                _put(w, _OUT + 3, length_error, i, begin, count)
-            for j in range(count):
-                flags[i, begin + j] = np.uint8(_int(w[(_OUT + 2) * _B + j]))
+        solve_row(i, picture, sensor, work, slope_x[i], slope_y[i], flags[i], length_error[i])
 
 
 @_whole

@@ -57,6 +57,28 @@ class Integration:
     clipped_count: int
 
 
+@dataclass(frozen=True, slots=True)
+class EdgeWeights:
+    """The divergence of a grid with its padding, as sums over five neighbouring nodes.
+
+    Attributes
+    ----------
+    start_x, start_y : (padded columns,), (padded rows,) int
+        First of the nodes.
+    weight_x, weight_y : (padded columns, 5), (padded rows, 5)
+        What their slopes along x and y count.
+    top, left : int
+        Lines and columns of padding before the grid.
+    """
+
+    start_x: NDArray[np.int64]
+    weight_x: FloatArray
+    start_y: NDArray[np.int64]
+    weight_y: FloatArray
+    top: int
+    left: int
+
+
 class PoissonSolver:
     """Integrates slopes on a grid of one size; everything that does not change is made ready once.
 
@@ -123,15 +145,16 @@ class PoissonSolver:
         self.slope_limit = slope_limit
         self._axes = tuple(axis for axis in (0, 1) if self.shape[axis] > 1) or (1,)
         lengths = [good_length(n) for n in self.shape]
-        self._padding = tuple((m - n) // 2 for m, n in zip(lengths, self.shape, strict=True))
+        top, left = ((m - n) // 2 for m, n in zip(lengths, self.shape, strict=True))
         self._workers = RowWorkers(workers)
         waves = _waves(lengths[1]) if 1 in self._axes else np.zeros(lengths[1])
         self._waves = waves
         self._settled = settled_rows(waves, lengths[0], self.dtype)
-        self._stencils = tuple(
+        (start_y, weight_y), (start_x, weight_x) = (
             _axis_stencil(n, m, stencil if axis in self._axes else 0, self.dtype)
             for axis, (n, m) in enumerate(zip(self.shape, lengths, strict=True))
         )
+        self.edges = EdgeWeights(start_x, weight_x, start_y, weight_y, top, left)
 
     def integrate(self, slope_x: FloatArray, slope_y: FloatArray) -> Integration:
         """Return the depth whose slopes these are.
@@ -147,36 +170,39 @@ class PoissonSolver:
         ValueError
             Where a shape is not the solver's.
         """
-        rows, columns = self.shape
         for slope in (slope_x, slope_y):
             if np.shape(slope) != self.shape:
                 raise ValueError(f"slopes of shape {np.shape(slope)}, solver for {self.shape}")
-        (start_y, weight_y), (start_x, weight_x) = self._stencils
-        field = np.empty([len(weights) for weights in (weight_y, weight_x)], self.dtype)
+        edges = self.edges
+        field = np.empty((len(edges.weight_y), len(edges.weight_x)), self.dtype)
         faults = np.empty((len(field), 2), np.int64)
         self._workers.run(
             len(field),
             divergence_rows,
             np.ascontiguousarray(slope_x, dtype=self.dtype),
             np.ascontiguousarray(slope_y, dtype=self.dtype),
-            start_x,
-            weight_x,
-            start_y,
-            weight_y,
-            self._padding[0],
-            self._padding[1],
+            edges.start_x,
+            edges.weight_x,
+            edges.start_y,
+            edges.weight_y,
+            edges.top,
+            edges.left,
             np.asarray(self.slope_limit, dtype=self.dtype)[()],
             field,
             faults,
         )
-        field = self._solve(field)
-        top, left = self._padding
-        depth_mm = np.ascontiguousarray(field[top : top + rows, left : left + columns])
         bad, clipped = faults.sum(axis=0)
-        return Integration(depth_mm, int(bad), int(clipped))
+        return Integration(self.depth_of(field), int(bad), int(clipped))
 
-    def _solve(self, field: FloatArray) -> FloatArray:
-        """Return the depth of a divergence: waves along the rows, elimination down the columns."""
+    def depth_of(self, divergence: FloatArray) -> FloatArray:
+        """Return the depth (rows, columns), mm: waves along the rows, elimination down the columns.
+
+        Parameters
+        ----------
+        divergence : (padded rows, padded columns)
+            Made with `edges`; written over.
+        """
+        field, (rows, columns) = divergence, self.shape
         if 1 in self._axes:
             field = self._transform(scipy.fft.dst, field)
         if 0 in self._axes:
@@ -185,7 +211,10 @@ class PoissonSolver:
             self._workers.run(blocks, solve_columns, field, self._waves, self._settled, scale)
         else:
             field *= (-self.pitch_mm / self._waves).astype(self.dtype)
-        return self._transform(scipy.fft.idst, field) if 1 in self._axes else field
+        if 1 in self._axes:
+            field = self._transform(scipy.fft.idst, field)
+        top, left = self.edges.top, self.edges.left
+        return np.ascontiguousarray(field[top : top + rows, left : left + columns])
 
     def _transform(self, transform: Callable[..., Any], field: FloatArray) -> FloatArray:
         options = {"type": _TRANSFORM, "axis": 1, "overwrite_x": True, "workers": self.workers}

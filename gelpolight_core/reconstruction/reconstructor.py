@@ -220,13 +220,14 @@ class Reconstructor:
             if why is None:
                 return self._depth_live(frame, name, normals, notes)
             return self._depth_full(frame, name, normals, uncertainty, why, notes)
-        field = self.slope_solver.solve(self.linearise(frame), length_error=False)
-        depth_mm = self.solver.integrate(field.slope_x, field.slope_y).depth_mm
+        light = self.linearise(frame)
+        divergence, field = self.slope_solver.divergence(light, self.solver, slopes=normals)
+        depth_mm = self.solver.depth_of(divergence)
         self._threads.run(len(depth_mm), blank_rows, field.flags, depth_mm)
         shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
         depth_mm = np.asarray(depth_mm, np.float32)
         heightmap = self._heightmap(depth_mm, shown, field.flags, name, notes)
-        names = [tr("resampling and normals"), tr("integration")]
+        names = [tr("resampling, normals and their divergence"), tr("integration")]
         plan = _unplanned(self.effort, names, tr("the paper's model knows one way"), normals, False)
         return replace(heightmap, plan=plan)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.normals import ShadingMaps, SlopeField, SlopeSolver
+from gelpolight_core.reconstruction.poisson import PoissonSolver
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Array = NDArray[np.float64]
@@ -154,9 +155,24 @@ def test_a_picture_is_left_as_it_was_and_may_be_a_view(kind: type) -> None:
     np.testing.assert_array_equal(raw, before)
 
 
-def test_what_nobody_asked_for_is_not_made() -> None:
-    maps, raw = maps_of((9, 100), (20, 30), 5), picture_of((20, 30), np.uint8, 5)
-    solver = SlopeSolver(maps, WORKERS[1])
-    whole, less = solver.solve(raw), solver.solve(raw, length_error=False)
-    assert less.length_error.size == 0
-    np.testing.assert_array_equal(whole.slope_x, less.slope_x)
+@settings(max_examples=25, deadline=None)
+@given(GRIDS, PICTURES, KINDS, SEEDS)
+def test_one_pass_to_the_divergence_is_slopes_and_then_integration(
+    grid: tuple[int, int], picture: tuple[int, int], kind: type, seed: int
+) -> None:
+    """Whatever the threads; grids of seven lines and more are padded."""
+    maps, raw = maps_of(grid, picture, seed), picture_of(picture, kind, seed)
+    poisson = PoissonSolver(*grid, pitch_mm=0.1)
+    slopes = SlopeSolver(maps, WORKERS[1]).solve(raw)
+    expected = poisson.integrate(slopes.slope_x, slopes.slope_y).depth_mm
+    for workers in WORKERS.values():
+        solver = SlopeSolver(maps, workers)
+        divergence, found = solver.divergence(raw, poisson, slopes=True)
+        np.testing.assert_array_equal(found.flags, slopes.flags)
+        np.testing.assert_array_equal(found.slope_x, slopes.slope_x)
+        np.testing.assert_array_equal(found.slope_y, slopes.slope_y)
+        again, bare = solver.divergence(raw, poisson)
+        np.testing.assert_array_equal(again, divergence)
+        assert bare.slope_x.size == 0
+        scale = 1.0 + np.abs(expected).max()
+        np.testing.assert_allclose(poisson.depth_of(divergence), expected, atol=1e-5 * scale)
