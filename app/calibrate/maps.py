@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage, QPixmap, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
@@ -152,7 +153,7 @@ class MapsView(QWidget):
         named(self, "calibrate.maps", tr("Result as pictures"))
         self._grid = QGridLayout(self)
         self._shown: list[_PanelView] = []
-        self._none = named(QLabel(), "calibrate.maps.none", tr("Why there is no picture"))
+        self._none = named(PlainLabel(), "calibrate.maps.none", tr("Why there is no picture"))
         self._none.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._none.setWordWrap(True)
         self._grid.addWidget(self._none, 0, 0, 1, 2)
@@ -181,8 +182,8 @@ class _PanelView(QWidget):
         super().__init__()
         column = QVBoxLayout(self)
         column.setContentsMargins(4, 4, 4, 4)
-        self._title, self._caption = QLabel(), QLabel()
-        self._picture = named(QLabel(), name, tr("Result"))
+        self._title, self._caption = PlainLabel(), PlainLabel()
+        self._picture = named(PlainLabel(), name, tr("Result"))
         self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._picture.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self._picture.setMinimumSize(120, 90)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.inspect.colour_bar import ColourBar
 from app.inspect.height_panel import extent_of
 from app.inspect.map_view import MapView
 from app.inspect.place import flag_words
 from app.inspect.products import QUALITY_COLOURS, Shown
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.misfit import Misfit
@@ -42,7 +43,7 @@ class QualityPanel(QWidget):
         self._what.addItem(tr("Misfit of the picture (| |n| - 1 |)"), "misfit")
         self._what.addItem(tr("Uncertainty (when paused)"), "uncertainty")
         self._what.currentIndexChanged.connect(self._on_chosen)
-        self._legend = named(QLabel(), "inspect.quality.legend", tr("What the colours mean"))
+        self._legend = named(MarkupLabel(), "inspect.quality.legend", tr("What the colours mean"))
         self._legend.setWordWrap(True)
         self._legend.setContentsMargins(6, 2, 6, 2)
         row = QHBoxLayout()
@@ -98,7 +99,7 @@ class QualityPanel(QWidget):
 
 
 def misfit_text(misfit: Misfit) -> str:
-    """Return what the misfit is, and how large in the middle of all nodes."""
+    """Return what the misfit is, and how large in the middle of all nodes, as markup."""
     if misfit.model == "paper":
         text = tr("| |n| - 1 |: length of the solved normal less 1; median {m:.1f} %.")
     else:
@@ -106,11 +107,11 @@ def misfit_text(misfit: Misfit) -> str:
             "Brightness seen less explained by the depth, of the flat membrane's; median {m:.1f} %."
         )
     known = misfit.values[np.isfinite(misfit.values)]
-    return text.format(m=100.0 * float(np.median(known)) if known.size else 0.0)
+    return escaped(text.format(m=100.0 * float(np.median(known)) if known.size else 0.0))
 
 
 def legend(flags: np.ndarray) -> str:
-    """Return the flags that are set, in their colours, with the share of the area."""
+    """Return the flags that are set, in their colours, with the share of the area, as markup."""
     some = flags[::3, ::3]
     inside = some[some & Flag.OUTSIDE.value == 0]
     words, parts = flag_words(), []

@@ -7,7 +7,6 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QScrollArea,
     QToolButton,
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from app.sensors.model import made_cell
 from app.shell.icons import icon
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
@@ -32,8 +32,10 @@ class Details(QWidget):
     def __init__(self, actions: tuple[QAction, ...]) -> None:
         super().__init__()
         named(self, "sensors.details", tr("Details of the calibration"))
-        self._title = named(QLabel(self), "sensors.details.title", tr("Calibration"))
-        self._facts = named(QLabel(self), "sensors.details.facts", tr("Where it comes from"))
+        self._title = named(MarkupLabel(parent=self), "sensors.details.title", tr("Calibration"))
+        self._facts = named(
+            PlainLabel(parent=self), "sensors.details.facts", tr("Where it comes from")
+        )
         for label in (self._title, self._facts):
             label.setWordWrap(True)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -68,7 +70,7 @@ class Details(QWidget):
             self._facts.setText(tr("Choose a calibration to see how good it is."))
             self._area.setWidget(QWidget())
             return
-        self._title.setText(f"<h3>{entry.path.stem}</h3>")
+        self._title.setText(f"<h3>{escaped(entry.path.stem)}</h3>")
         if entry.summary is None:
             self._facts.setText(
                 tr("This file cannot be read: {reason}").format(reason=entry.broken)
@@ -98,8 +100,8 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
     row = QHBoxLayout(heading)
     row.setContentsMargins(0, 10, 0, 0)
     row.addWidget(Sign(icon(verdict.value, verdict.value), heading))
-    row.addWidget(QLabel(f"<b>{title}</b>", heading))
-    row.addWidget(QLabel(verdict_word(verdict), heading))
+    row.addWidget(MarkupLabel(f"<b>{escaped(title)}</b>", heading))
+    row.addWidget(PlainLabel(verdict_word(verdict), heading))
     row.addStretch(1)
     return heading
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QLabel, QStatusBar
+from PySide6.QtWidgets import QStatusBar
 
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -100,7 +101,7 @@ class StatusLine(QStatusBar):
         named(self, "main.status", tr("Status"))
         self.setSizeGripEnabled(False)
         self._labels = {
-            key: named(QLabel(self), f"main.status.{key}", accessible, tip)
+            key: named(PlainLabel(parent=self), f"main.status.{key}", accessible, tip)
             for key, accessible, tip in (
                 ("camera", tr("Camera"), tr("Where the pictures come from")),
                 ("rate", tr("Frame rate"), tr("Frames a second from the camera")),
