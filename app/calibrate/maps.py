@@ -169,10 +169,19 @@ class MapsView(QWidget):
             view.deleteLater()
         for number, panel in enumerate(panels):
             if number == len(self._shown):
-                view = _PanelView(f"calibrate.maps.{number}")
-                self._shown.append(view)
-                self._grid.addWidget(view, number // 2, number % 2)
+                self._shown.append(_PanelView(f"calibrate.maps.{number}"))
             self._shown[number].show_panel(panel)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Lay the pictures out: a single one has the whole width."""
+        columns = 1 if len(self._shown) == 1 else 2
+        for view in self._shown:
+            self._grid.removeWidget(view)
+        for column in range(2):
+            self._grid.setColumnStretch(column, int(column < columns))
+        for number, view in enumerate(self._shown):
+            self._grid.addWidget(view, number // columns, number % columns)
 
 
 class _PanelView(QWidget):

@@ -25,6 +25,8 @@ from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.quality import Verdict, verdict_word
 from gelpolight_core.translation import tr
 
+FACT_LINES = 5
+
 
 class Details(QWidget):
     """Shows one calibration, or what to do when none is chosen."""
@@ -38,7 +40,10 @@ class Details(QWidget):
         )
         for label in (self._title, self._facts):
             label.setWordWrap(True)
+            label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        # Room for all that is said of a validated one: the buttons below stay where they are.
+        self._facts.setMinimumHeight(FACT_LINES * self._facts.fontMetrics().lineSpacing())
         buttons = QHBoxLayout()
         for action in actions:
             button = named(

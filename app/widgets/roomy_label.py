@@ -25,6 +25,10 @@ class RoomyLabel(PlainLabel):
         self.setWordWrap(True)
         self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
 
+    def hasHeightForWidth(self) -> bool:
+        """Whether the height follows from the width: also while there is no text."""
+        return True
+
     def heightForWidth(self, width: int) -> int:
         """Return the height of the longest text, or of the present one where that is higher."""
         metrics, wrap = self.fontMetrics(), Qt.TextFlag.TextWordWrap
