@@ -78,6 +78,11 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
             self.fit()
         self._scale.setVisible(True)
 
+    @property
+    def has_picture(self) -> bool:
+        """Whether a picture is shown, and no words."""
+        return not self._extent.isNull()
+
     def say(self, text: str) -> None:
         """Show words in the place of a picture."""
         self._image.clear()

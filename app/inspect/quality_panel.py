@@ -80,12 +80,14 @@ class QualityPanel(QWidget):
         self.map.show_picture(shown.quality, extent_of(shown.heightmap))
         if self.what == "uncertainty":
             self.bar.show_range("inferno", 0.0, 1e3 * shown.quality_top, tr("um"))
+            self.bar.show()
             self._legend.setText(
                 tr("Standard deviation of repeats of this picture; one in a hundred is above.")
             )
             return
         if shown.misfit is not None:
             self.bar.show_range("inferno", 0.0, 100.0 * shown.quality_top, "%")
+            self.bar.show()
         self._count += 1
         if still or self._count % TELL_EVERY == 1:
             misfit = shown.misfit
@@ -93,7 +95,11 @@ class QualityPanel(QWidget):
             self._legend.setText(text)
 
     def _on_chosen(self) -> None:
-        self.bar.setVisible(self.what != "flags")
+        # What is shown is of another figure: neither its colours nor its words stay for this one.
+        self.bar.hide()
+        self._legend.clear()
+        if self.map.has_picture:
+            self.map.say(tr("One moment."))
         self._count = 0
         self.chosen.emit()
 

@@ -16,6 +16,7 @@ from gelpolight_core.translation import tr
 
 WINDOW_S = 3.0
 LEAST_HZ = 0.2
+NUMBERS = ("rate", "processing", "dropped")
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +131,9 @@ class StatusLine(QStatusBar):
             label = self._labels[key]
             label.setText(text)
             label.setVisible(bool(text))
+            if key in NUMBERS:
+                # It keeps the room of the widest number, and those beside it their place.
+                label.setMinimumWidth(max(label.minimumWidth(), label.sizeHint().width()))
 
 
 def skipped_text(rate_hz: float) -> str:

@@ -20,7 +20,14 @@ from app.shell.pages import PageEntry, all_pages
 from app.shell.preferences import PreferencesDialog
 from app.shell.settings import Limits, Settings
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
-from app.shell.status import Skipped, Status, skipped_text, status_texts
+from app.shell.status import (
+    Skipped,
+    Status,
+    StatusLine,
+    StatusModel,
+    skipped_text,
+    status_texts,
+)
 from gelpolight_core.errors import InputError
 
 
@@ -471,3 +478,19 @@ def test_a_checkerboard_to_print_is_in_the_help_menu(
     assert [path for path in opened if any(path in text for text in told)] == (
         [] if shows else opened
     )
+
+
+def test_numbers_of_the_status_bar_keep_their_places(qtbot: QtBot) -> None:
+    """They change several times a second."""
+    model = StatusModel()
+    line = StatusLine(model)
+    qtbot.addWidget(line)
+    line.resize(900, 24)
+    with qtbot.waitExposed(line):
+        line.show()
+    model.update(rate_hz=9.9, processing_ms=1234.5, dropped=0)
+    QApplication.processEvents()
+    place = line._labels["dropped"].x()
+    model.update(rate_hz=9.9, processing_ms=4.5)
+    QApplication.processEvents()
+    assert line._labels["dropped"].x() == place
