@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
-    QLabel,
     QSizePolicy,
     QSlider,
     QSpinBox,
@@ -22,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.sources.bench import CONDITION_RANGES, FAULTS, FLAT, PRESSED, Bench, Scene
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -80,7 +80,7 @@ class BenchPanel(QWidget):
         self._fill_scene()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)
-        heading = QLabel(tr("On the sensor"))
+        heading = PlainLabel(tr("On the sensor"))
         heading.setBuddy(self._item)
         layout.addWidget(heading)
         layout.addWidget(self._item)
@@ -113,7 +113,7 @@ class BenchPanel(QWidget):
         self._pose_row = self._make_pose_row()
         self._form.addRow(tr("Pose"), self._pose_row)
         self._size = self._number("size_mm", tr("Size of the object"), tr("mm"), 0.1)
-        self._size_label = QLabel()
+        self._size_label = PlainLabel()
         self._form.addRow(self._size_label, self._size)
         self._depth = self._number("depth_mm", tr("Depth"), tr("mm"), 0.01)
         self._depth_slider = named(
@@ -137,7 +137,9 @@ class BenchPanel(QWidget):
         self._yaw.setWrapping(True)
         self._form.addRow(tr("Turned by"), self._yaw)
         self._hint = named(
-            QLabel(tr("Drag it on the picture to move it; the middle button moves the picture.")),
+            PlainLabel(
+                tr("Drag it on the picture to move it; the middle button moves the picture.")
+            ),
             "bench.hint",
             tr("Hint"),
         )

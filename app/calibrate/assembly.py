@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.shell import theme
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -56,7 +57,7 @@ class AssemblyPicture(QWidget):
         """Show another cross-section."""
         self._name = name
         self.setAccessibleName(assembly_words(name))
-        self.setToolTip(assembly_words(name))
+        self.setToolTip(plain_tip(assembly_words(name)))
         self.update()
 
     def sizeHint(self) -> QSize:

@@ -7,13 +7,14 @@ from functools import partial
 from operator import is_
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.calibrate.controller import CalibrationController
 from app.calibrate.lut_editor import LutEditor
 from app.calibrate.lut_effect import Effect, ball_effect
 from app.calibrate.lut_model import Curve, CurveEdit, start_edit, with_curves
 from app.shell.jobs import Job
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
@@ -46,7 +47,7 @@ class CurveStep(QWidget):
         self._made_of: tuple[object, object] | None = None
         self._column = QVBoxLayout(self)
         self._column.setContentsMargins(0, 0, 0, 0)
-        self._said = named(QLabel(), "curves.said", tr("Why there is no curve"))
+        self._said = named(PlainLabel(), "curves.said", tr("Why there is no curve"))
         self._said.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._said.setWordWrap(True)
         self._column.addWidget(self._said, 1)

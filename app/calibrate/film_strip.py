@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu, QW
 
 from app.calibrate.states import state_icon, state_word
 from app.shell import theme
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.wholeness import decode_picture
@@ -87,7 +88,7 @@ class FilmStrip(QListWidget):
             word = tr("left out") if take.state == "excluded" else state_word(take.state)
             item = QListWidgetItem(self._icon(take), f"{take.path.stem}\n{take.note or word}")
             item.setData(Qt.ItemDataRole.UserRole, take)
-            item.setToolTip(f"{take.path.name}: {word}. {take.sentence}".strip())
+            item.setToolTip(plain_tip(f"{take.path.name}: {word}. {take.sentence}".strip()))
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{take.path.stem}, {word}")
             self.addItem(item)
             if take.path.name == keep:

@@ -99,8 +99,10 @@ class Looking(QObject):
         self._pictures.view.set_stream(stream)
         if stream is None:
             said = tr("No camera: choose one in the bar above, or import pictures.")
-            self._pictures.view.say(said)
             self._panel.show_live(said if self.has_pictures else "", ready=False)
+            if self.has_pictures and self._controller.project.session.found(self.step.folder):
+                said += "\n" + tr("Click a picture below to look at it.")
+            self._pictures.view.say(said)
         else:
             self._pictures.view.say(tr("Waiting for the camera's first picture."))
             self._panel.show_live("", ready=True)

@@ -22,6 +22,7 @@ from app.calibrate.lut_hints import HINT, LASSO_HINT, node_hint
 from app.calibrate.lut_live import LivePanel
 from app.calibrate.lut_model import CHANNELS, CurveEdit
 from app.calibrate.lut_plot import CurvePlot
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from app.widgets.roomy_label import RoomyLabel
 from gelpolight_core.calibration.scatter import ReflectanceScatter
@@ -172,7 +173,7 @@ class LutEditor(QWidget):
             if shortcut:
                 action.setShortcut(QKeySequence(shortcut))
                 tip += f" ({action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)})"
-            action.setToolTip(tip)
+            action.setToolTip(plain_tip(tip))
             actions[key] = action
             self.addAction(action)
             return action
@@ -228,14 +229,15 @@ class LutEditor(QWidget):
         )
 
     def _fill_bar(self, bar: QToolBar, groups: Sequence[Sequence[str]]) -> None:
-        for keys in groups:
+        for number, keys in enumerate(filter(None, groups)):
+            if number:
+                bar.addSeparator()
             for key in keys:
                 bar.addAction(self._actions[key])
                 button = bar.widgetForAction(self._actions[key])
                 if isinstance(button, QToolButton):
                     named(button, f"lut.{key}.button", self._actions[key].text())
                     button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-            bar.addSeparator()
 
     def _lay_out(self) -> None:
         if self._history is None:

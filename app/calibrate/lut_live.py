@@ -9,12 +9,13 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QHideEvent, QShowEvent
-from PySide6.QtWidgets import QComboBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 
 from app.calibrate.lut_effect import Effect
 from app.calibrate.lut_model import CurveEdit
 from app.calibrate.lut_worker import NewestWins
 from app.shell import theme
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
 from gelpolight_core.errors import InputError
@@ -63,9 +64,8 @@ class LivePanel(QWidget):
         for name in presses:
             self.press.addItem(PurePath(name).name, name)
         self.press.currentIndexChanged.connect(self._ask)
-        self._words = named(QLabel(), "lut.effect", tr("Effect on the press"))
+        self._words = named(PlainLabel(), "lut.effect", tr("Effect on the press"))
         self._words.setWordWrap(True)
-        self._words.setTextFormat(Qt.TextFormat.PlainText)
         self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._words.setMinimumHeight(5 * self.fontMetrics().lineSpacing())
         self._profile = named(_bare_plot(), "lut.profile", tr("Depth through the ball's centre"))
@@ -73,7 +73,7 @@ class LivePanel(QWidget):
         self._lines = self._make_lines()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        title = QLabel(tr("What the edit does to a press"))
+        title = PlainLabel(tr("What the edit does to a press"))
         title.setBuddy(self.press)
         for widget in (title, self.press, self._words):
             layout.addWidget(widget)
@@ -156,6 +156,8 @@ class LivePanel(QWidget):
         name = self.press.currentData()
         if name is None or not self.isVisible():
             return
+        if not self._words.text():
+            self._words.setText(tr("Reconstructing the press."))
         self._worker.ask((self._state, name))
         self._timer.start()
 
@@ -209,4 +211,7 @@ def effect_sentence(before: Effect, after: Effect) -> str:
 
 
 def _bare_plot() -> pg.PlotWidget:
-    return without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False)))
+    plot = without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False)))
+    for side in ("left", "bottom"):
+        plot.getAxis(side).enableAutoSIPrefix(False)
+    return plot

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage, QPixmap, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
+from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from gelpolight_core.calibration.inputs import Stage
@@ -152,7 +153,7 @@ class MapsView(QWidget):
         named(self, "calibrate.maps", tr("Result as pictures"))
         self._grid = QGridLayout(self)
         self._shown: list[_PanelView] = []
-        self._none = named(QLabel(), "calibrate.maps.none", tr("Why there is no picture"))
+        self._none = named(PlainLabel(), "calibrate.maps.none", tr("Why there is no picture"))
         self._none.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._none.setWordWrap(True)
         self._grid.addWidget(self._none, 0, 0, 1, 2)
@@ -168,10 +169,19 @@ class MapsView(QWidget):
             view.deleteLater()
         for number, panel in enumerate(panels):
             if number == len(self._shown):
-                view = _PanelView(f"calibrate.maps.{number}")
-                self._shown.append(view)
-                self._grid.addWidget(view, number // 2, number % 2)
+                self._shown.append(_PanelView(f"calibrate.maps.{number}"))
             self._shown[number].show_panel(panel)
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Lay the pictures out: a single one has the whole width."""
+        columns = 1 if len(self._shown) == 1 else 2
+        for view in self._shown:
+            self._grid.removeWidget(view)
+        for column in range(2):
+            self._grid.setColumnStretch(column, int(column < columns))
+        for number, view in enumerate(self._shown):
+            self._grid.addWidget(view, number // columns, number % columns)
 
 
 class _PanelView(QWidget):
@@ -181,8 +191,8 @@ class _PanelView(QWidget):
         super().__init__()
         column = QVBoxLayout(self)
         column.setContentsMargins(4, 4, 4, 4)
-        self._title, self._caption = QLabel(), QLabel()
-        self._picture = named(QLabel(), name, tr("Result"))
+        self._title, self._caption = PlainLabel(), PlainLabel()
+        self._picture = named(PlainLabel(), name, tr("Result"))
         self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._picture.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self._picture.setMinimumSize(120, 90)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from app.calibrate.controller import CalibrationController
+from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
@@ -28,7 +29,7 @@ class OutsideBar(QWidget):
         named(self, "calibrate.outside", tr("Changed by something else"))
         self._controller = controller
         self._refusal = ""
-        self.sentence = named(QLabel(), "calibrate.outside.sentence", tr("What was changed"))
+        self.sentence = named(PlainLabel(), "calibrate.outside.sentence", tr("What was changed"))
         self.sentence.setWordWrap(True)
         show_meaning(self.sentence, "warn")
         make_bold(self.sentence)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QSizePolicy,
     QTabWidget,
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import (
 from app.calibrate.film_strip import FilmStrip
 from app.calibrate.maps import MapsView
 from app.live.live_view import LiveView
+from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -69,7 +69,7 @@ class Pictures(QWidget):
         self.lost = named(QWidget(), "calibrate.lost", tr("The camera is lost"))
         row = QHBoxLayout(self.lost)
         row.setContentsMargins(8, 4, 8, 4)
-        self.why = named(QLabel(), "calibrate.lost.why", tr("Why no picture comes"))
+        self.why = named(PlainLabel(), "calibrate.lost.why", tr("Why no picture comes"))
         self.why.setWordWrap(True)
         show_meaning(self.why, "fail")
         make_bold(self.why)

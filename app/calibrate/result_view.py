@@ -8,7 +8,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QScrollArea,
     QToolButton,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.calibrate.states import RUNNING, is_done, state_icon, state_meaning, state_word
 from app.calibrate.steps import Step
+from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -49,7 +49,7 @@ class ResultView(QWidget):
         named(self, "result", tr("Calibration"))
         self._rows: dict[Stage, _StageRow] = {}
         column = QVBoxLayout(self)
-        self.headline = named(QLabel(), "result.headline", tr("Verdict"))
+        self.headline = named(PlainLabel(), "result.headline", tr("Verdict"))
         self.headline.setWordWrap(True)
         make_bold(self.headline, size=1.2)
         column.addWidget(self.headline)
@@ -158,7 +158,7 @@ class _StageRow(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 2, 0, 2)
         row = QHBoxLayout()
-        self._sign, self._word, self._said = Sign(), QLabel(), QLabel()
+        self._sign, self._word, self._said = Sign(), PlainLabel(), PlainLabel()
         self._said.setWordWrap(True)
         self._word.setMinimumWidth(96)
         make_bold(self._word)

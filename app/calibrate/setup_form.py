@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QScrollArea,
@@ -23,6 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
@@ -78,9 +78,9 @@ class SetupForm(QScrollArea):
         holder.setMinimumWidth(FORM_WIDTH - 120)
         middle.addWidget(holder)
         middle.addStretch(1)
-        self.title = QLabel(tr("What is known of the sensor"))
+        self.title = PlainLabel(tr("What is known of the sensor"))
         make_bold(self.title, size=1.35)
-        self.task = QLabel(
+        self.task = PlainLabel(
             tr(
                 "State it from the housing's drawing and the parts; every length here scales the"
                 " result. It can be changed later. Then press the button at the foot."
@@ -93,7 +93,7 @@ class SetupForm(QScrollArea):
         column.addWidget(self._build_sensor())
         column.addWidget(self._build_boards())
         column.addWidget(self._build_balls())
-        self.problem = named(QLabel(), "setup.problem", tr("What is missing"))
+        self.problem = named(PlainLabel(), "setup.problem", tr("What is missing"))
         self.problem.setWordWrap(True)
         column.addWidget(self.problem)
         self.accept = named(QPushButton(), "setup.accept", tr("Begin the calibration"))
@@ -106,7 +106,7 @@ class SetupForm(QScrollArea):
     def _build_camera(self) -> QGroupBox:
         box = QGroupBox(tr("Camera"))
         row = QHBoxLayout(box)
-        self.camera = named(QLabel(), "setup.camera", tr("How the camera is set"))
+        self.camera = named(PlainLabel(), "setup.camera", tr("How the camera is set"))
         self.camera.setWordWrap(True)
         self.camera_settings = named(
             QPushButton(tr("&Set and lock…")),
@@ -161,7 +161,7 @@ class SetupForm(QScrollArea):
                 tr("The circle on the membrane in which is measured"),
             ),
         ):
-            widget.setToolTip(tip)
+            widget.setToolTip(plain_tip(tip))
             form.addRow(label, widget)
         return box
 
@@ -275,9 +275,9 @@ class _BoardRow(QWidget):
             box.setRange(3, 100)
         self.square = _length(f"{name}.square", tr("{b}: square").format(b=accessible), 0.05, 500.0)
         row.addWidget(self.columns)
-        row.addWidget(QLabel("x"))
+        row.addWidget(PlainLabel("x"))
         row.addWidget(self.rows)
-        row.addWidget(QLabel(tr("squares of")))
+        row.addWidget(PlainLabel(tr("squares of")))
         row.addWidget(self.square, 1)
         self.print = named(
             QToolButton(),

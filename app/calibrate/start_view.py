@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
 
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -37,9 +38,9 @@ class StartView(QWidget):
         column = QVBoxLayout(self)
         column.setAlignment(Qt.AlignmentFlag.AlignCenter)
         column.setSpacing(10)
-        title = QLabel(tr("Calibrate a sensor"))
+        title = PlainLabel(tr("Calibrate a sensor"))
         make_bold(title, size=1.6)
-        said = QLabel(
+        said = PlainLabel(
             tr(
                 "The program leads you through the lens, the top surface, the lights and the"
                 " membrane, and judges every stage while you can still repeat it."
@@ -59,7 +60,7 @@ class StartView(QWidget):
             button.setFixedWidth(460)
             button.clicked.connect(signal)
             column.addWidget(button)
-        self.problem = named(QLabel(), "start.problem", tr("Why it was not opened"))
+        self.problem = named(PlainLabel(), "start.problem", tr("Why it was not opened"))
         self.problem.setWordWrap(True)
         show_meaning(self.problem, "fail")
         self.problem.setFixedWidth(460)
@@ -81,13 +82,13 @@ class StartView(QWidget):
             if old is not None:
                 old.deleteLater()
         if folders:
-            self._recent.addWidget(QLabel(tr("Go on with a recent session")))
+            self._recent.addWidget(PlainLabel(tr("Go on with a recent session")))
         for number, folder in enumerate(folders[:MOST_RECENT]):
             text = f"{folder.parent.parent.name} / {folder.name}"
             button = named(
                 QPushButton(text), f"start.recent.{number}", tr("Go on with {s}").format(s=text)
             )
-            button.setToolTip(str(folder))
+            button.setToolTip(plain_tip(str(folder)))
             button.setFlat(True)
             button.setFixedWidth(460)
             button.setStyleSheet("text-align: left;")

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from app.calibrate.states import state_icon, state_word
 from app.calibrate.steps import Step
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -49,7 +50,7 @@ class StepList(QListWidget):
     def _show_state(self, row: int, step: Step, state: str, sentence: str) -> None:
         item = self.item(row)
         item.setIcon(state_icon(state))
-        item.setToolTip(f"{step.title}: {state_word(state)}. {sentence}".strip())
+        item.setToolTip(plain_tip(f"{step.title}: {state_word(state)}. {sentence}".strip()))
         item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
 
     def go_to(self, row: int) -> None:

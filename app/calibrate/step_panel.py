@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFrame,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QPushButton,
     QScrollArea,
@@ -24,6 +23,7 @@ from PySide6.QtWidgets import (
 from app.calibrate.assembly import AssemblyPicture
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
 from app.calibrate.steps import Step
+from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -90,7 +90,7 @@ class StepPanel(QWidget):
         outer.addLayout(self._build_foot())
 
     def _build_head(self) -> None:
-        self.title = named(QLabel(), "calibrate.title", tr("Step"))
+        self.title = named(PlainLabel(), "calibrate.title", tr("Step"))
         make_bold(self.title, size=1.35)
         self.task = named(_wrapped(), "calibrate.task", tr("What to do"))
         self.assembly = AssemblyPicture()
@@ -115,7 +115,7 @@ class StepPanel(QWidget):
         self.radius.setDecimals(3)
         self.radius.setSuffix(tr(" mm"))
         self.radius.setKeyboardTracking(False)
-        row.addWidget(QLabel(tr("Ball radius")))
+        row.addWidget(PlainLabel(tr("Ball radius")))
         row.addWidget(self.radius, 1)
         self.capture = named(
             QPushButton(tr("&Capture")),
@@ -158,7 +158,7 @@ class StepPanel(QWidget):
     def _build_state(self) -> None:
         row = QHBoxLayout()
         self._sign = Sign()
-        self._word = named(QLabel(), "calibrate.state", tr("State of the step"))
+        self._word = named(PlainLabel(), "calibrate.state", tr("State of the step"))
         make_bold(self._word)
         self.recompute = named(
             QPushButton(tr("&Recompute")),
@@ -328,8 +328,8 @@ def lay_button(name: str) -> QPushButton:
     return button
 
 
-def _wrapped(*, lines: int = 0) -> QLabel:
-    label = QLabel()
+def _wrapped(*, lines: int = 0) -> PlainLabel:
+    label = PlainLabel()
     label.setWordWrap(True)
     label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)

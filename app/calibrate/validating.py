@@ -249,7 +249,12 @@ class Validating(QObject):
         if found is None:
             self._panel.show_verdict(tr("Not validated."), passed=False)
         elif found.passed:
-            self._panel.show_verdict(tr("This calibration is validated."), passed=True)
+            self._panel.show_verdict(
+                tr(
+                    "This calibration is validated. Look through it on Inspect, or measure with it."
+                ),
+                passed=True,
+            )
         else:
             self._panel.show_verdict(
                 tr("Not validated: the recorded trial is beyond its limits."), passed=False

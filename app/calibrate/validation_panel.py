@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QPushButton,
     QVBoxLayout,
@@ -20,6 +19,7 @@ from app.calibrate.assembly import AssemblyPicture
 from app.calibrate.step_panel import WIDTH, lay_button, side_scroll
 from app.calibrate.steps import Step
 from app.calibrate.trial import KnownObject, Trial
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -56,13 +56,13 @@ class ValidationPanel(QWidget):
         outer.addWidget(scroll)
         column = QVBoxLayout(inside)
         column.setContentsMargins(12, 10, 12, 10)
-        title = QLabel(step.title)
+        title = PlainLabel(step.title)
         make_bold(title, size=1.35)
         picture = AssemblyPicture()
         picture.show_assembly(step.assembly)
-        task = QLabel(step.task)
+        task = PlainLabel(step.task)
         task.setWordWrap(True)
-        self.calibration = named(QLabel(), "validation.calibration", tr("Calibration tried"))
+        self.calibration = named(PlainLabel(), "validation.calibration", tr("Calibration tried"))
         self.calibration.setWordWrap(True)
         for widget in (title, picture, task, self.calibration):
             column.addWidget(widget)
@@ -88,7 +88,7 @@ class ValidationPanel(QWidget):
         row.addWidget(self.measure, 2)
         row.addWidget(self.import_press, 1)
         column.addLayout(row)
-        self.blocked = named(QLabel(), "validation.blocked", tr("Why nothing can be measured"))
+        self.blocked = named(PlainLabel(), "validation.blocked", tr("Why nothing can be measured"))
         self.blocked.setWordWrap(True)
         column.addWidget(self.blocked)
         self.progress = named(QProgressBar(), "validation.progress", tr("Progress"))
@@ -98,9 +98,8 @@ class ValidationPanel(QWidget):
         self.progress.setSizePolicy(keep)
         self.progress.hide()
         column.addWidget(self.progress)
-        self.result = named(QLabel(), "validation.result", tr("Result"))
+        self.result = named(MarkupLabel(), "validation.result", tr("Result"))
         self.result.setWordWrap(True)
-        self.result.setTextFormat(Qt.TextFormat.RichText)
         column.addWidget(self.result)
         self.keep = named(
             QPushButton(tr("&Record this validation")),
@@ -110,7 +109,7 @@ class ValidationPanel(QWidget):
         self.keep.setMinimumHeight(34)
         self.keep.clicked.connect(self.keep_wanted)
         column.addWidget(self.keep)
-        self.verdict = named(QLabel(), "validation.verdict", tr("Validated or not"))
+        self.verdict = named(PlainLabel(), "validation.verdict", tr("Validated or not"))
         self.verdict.setWordWrap(True)
         make_bold(self.verdict)
         column.addWidget(self.verdict)
@@ -210,7 +209,7 @@ class ValidationPanel(QWidget):
                     "<b>{what}</b>: measured {m:.3f} mm, true {t:.3f} mm, error"
                     " <b>{e:+.2f} %</b>, {word} ±{limit:g} %"
                 ).format(
-                    what=c.quantity.capitalize(),
+                    what=escaped(c.quantity.capitalize()),
                     m=c.measured_mm,
                     t=c.true_mm,
                     e=c.error_percent,
@@ -219,13 +218,16 @@ class ValidationPanel(QWidget):
                 )
             )
         if trial.measurement.verdict != "ok":
-            rows.append(tr("Doubtful: {reason}").format(reason=trial.measurement.reason))
+            rows.append(escaped(tr("Doubtful: {reason}").format(reason=trial.measurement.reason)))
         passed = all(c.passed for c in trial.comparisons)
-        self.say("<br>".join(rows), "pass" if passed else "fail")
+        self._show_result("<br>".join(rows), "pass" if passed else "fail")
 
     def say(self, sentence: str, meaning: str = "") -> None:
         """Say how a trial gets on, or why it came to nothing."""
-        self.result.setText(sentence)
+        self._show_result(escaped(sentence), meaning)
+
+    def _show_result(self, markup: str, meaning: str) -> None:
+        self.result.setText(markup)
         show_meaning(self.result, meaning)
 
     def show_verdict(self, text: str, *, passed: bool) -> None:

@@ -6,7 +6,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QDockWidget,
     QHBoxLayout,
-    QLabel,
     QMainWindow,
     QStackedWidget,
     QToolBar,
@@ -28,6 +27,7 @@ from app.calibrate.steps import all_steps
 from app.calibrate.validation_panel import ValidationPanel
 from app.shell.actions import make_action
 from app.shell.context import AppContext
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
 from app.widgets.source_button import SourceButton
 from gelpolight_core.calibration.project import CalibrationProject
@@ -143,7 +143,7 @@ class WizardFrame(QMainWindow):
         )
         bar.addWidget(source)
         session = self.project.session
-        caption = QLabel(f"  {session.sensor.serial}  ·  {session.folder.name}  ")
-        caption.setToolTip(str(session.folder))
+        caption = PlainLabel(f"  {session.sensor.serial}  ·  {session.folder.name}  ")
+        caption.setToolTip(plain_tip(str(session.folder)))
         bar.addWidget(caption)
         self.addToolBar(bar)

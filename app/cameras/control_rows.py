@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from app.sources.camera.controls import CONTROLS
 from app.sources.source import Setting
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -105,7 +106,7 @@ class ControlRows(QWidget):
         box.setKeyboardTracking(False)
         tip = tr("From {low:g} to {high:g} {unit}")
         tip = tip.format(low=control.low, high=control.high, unit=control.unit)
-        box.setToolTip(tip.rstrip())
+        box.setToolTip(plain_tip(tip.rstrip()))
         box.valueChanged.connect(lambda value: self.changed.emit(control.key, value))
 
         def show(now: Setting) -> None:

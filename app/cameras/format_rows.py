@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QFormLayout, QLabel, QWidget
+from PySide6.QtWidgets import QComboBox, QFormLayout, QWidget
 
-from app.shell import theme
 from app.sources.camera.driver import Format, compression_warning
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -38,8 +39,11 @@ class FormatRows(QWidget):
         ):
             form.addRow(label, box)
             box.activated.connect(lambda _, box=box: self._on_chosen(box))
-        self.warning = named(QLabel(), "camera.compressed", tr("What speaks against the format"))
+        self.warning = named(
+            PlainLabel(), "camera.compressed", tr("What speaks against the format")
+        )
         self.warning.setWordWrap(True)
+        show_meaning(self.warning, "warn")
         form.addRow(self.warning)
         self.show_format(None, ())
 
@@ -55,7 +59,6 @@ class FormatRows(QWidget):
                 more=warning
             )
         self.warning.setText(warning.strip())
-        self.warning.setStyleSheet(f"color: {theme.colour('warn').name()};")
         self.warning.setVisible(bool(warning))
 
     def _fill(self, got: Format) -> None:

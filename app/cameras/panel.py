@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QFrame,
     QGroupBox,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QPushButton,
     QScrollArea,
@@ -20,13 +19,14 @@ from PySide6.QtWidgets import (
 from app.cameras.control_rows import ControlRows
 from app.cameras.desk import CameraDesk
 from app.cameras.format_rows import FormatRows
-from app.shell import theme
 from app.sources.camera.applying import is_locked, lock_quality
 from app.sources.camera.camera import Camera
 from app.sources.camera.camera_source import CameraSource
 from app.sources.camera.steadiness import SteadinessTest
 from app.sources.source import Rgb, Setting
 from app.sources.stream import Stream
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.quality import QualityTable, Verdict
@@ -86,11 +86,11 @@ class CameraPanel(QWidget):
         return area
 
     def _build_verdicts(self) -> QWidget:
-        self.said = named(QLabel(), "camera.said", tr("How the camera is"))
+        self.said = named(PlainLabel(), "camera.said", tr("How the camera is"))
         self.said.setWordWrap(True)
         self.said.setMinimumHeight(3 * self.said.fontMetrics().height())
         self.said.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.picture = named(QLabel(), "camera.picture", tr("The camera's picture"))
+        self.picture = named(PlainLabel(), "camera.picture", tr("The camera's picture"))
         self.picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.picture.setFixedHeight(PICTURE_HEIGHT)
         self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -123,7 +123,9 @@ class CameraPanel(QWidget):
         column = QVBoxLayout(tables)
         column.setContentsMargins(0, 0, 0, 0)
         for title, table in ((tr("Lock"), self.locks), (tr("Steadiness"), self.steady)):
-            column.addWidget(QLabel(f"<b>{title}</b>"))
+            heading = PlainLabel(title)
+            make_bold(heading)
+            column.addWidget(heading)
             column.addWidget(table)
         column.addStretch(1)
         area = named(QScrollArea(), "camera.verdicts", tr("Lock and steadiness"))
@@ -209,7 +211,7 @@ class CameraPanel(QWidget):
     def _say(self) -> None:
         text, role = self._words()
         self.said.setText(text)
-        self.said.setStyleSheet(f"color: {theme.colour(role).name()};")
+        show_meaning(self.said, role)
 
     def _words(self) -> tuple[str, str]:
         """Return how the camera is and what to do next, and in which colour."""

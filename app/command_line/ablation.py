@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import StageProgress
+from app.command_line.terminal import say
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.ablation import VARIANTS, Variant, ablate
@@ -64,9 +65,9 @@ def run(options: argparse.Namespace) -> int:
                 progress=partial(_tell_of, folder.name, tell) if len(folders) > 1 else tell,
             )
         ablations.append(ablation)
-        print(ablation_table(ablation), end="\n\n", flush=True)
+        say(ablation_table(ablation), end="\n\n", flush=True)
     written = write_ablation(ablations, options.output)
-    print(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
+    say(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
     return 0
 
 

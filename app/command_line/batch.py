@@ -14,6 +14,7 @@ from typing import Any
 from tqdm import tqdm
 
 from app.command_line.common import add_effort, add_model, load_reconstructor
+from app.command_line.terminal import say
 from gelpolight_core.batch.cluster import ClusterRunner
 from gelpolight_core.batch.plan import Selection, plan_batch
 from gelpolight_core.batch.processes import ProcessRunner
@@ -104,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
     out = options.output.absolute()
     plan = plan_batch(options.inputs, out, calibration, selection)
     for note in plan.notes:
-        print(note, file=sys.stderr)
+        say(note, file=sys.stderr)
     settings = BatchSettings(
         options.calibration.absolute(),
         calibration.identity,
@@ -175,7 +176,7 @@ def _report(progress: BatchProgress, out: Path) -> int:
             file=sys.stderr,
         )
         raise KeyboardInterrupt
-    print(
+    say(
         tr("{n} depth maps in {folder}, {before} of them from before").format(
             n=done, folder=out, before=progress.before
         )

@@ -16,6 +16,7 @@ from app.command_line.common import (
     refuse_overwriting,
     write_json,
 )
+from app.command_line.terminal import say
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.reconstruction.benchmark import benchmark_frame
 from gelpolight_core.session.session import read_picture, require_colour
@@ -47,20 +48,20 @@ def run(options: argparse.Namespace) -> int:
     frame = np.round(picture.rgb * (2**picture.bit_depth - 1)).astype(f"u{picture.bit_depth // 8}")
     result = benchmark_frame(reconstructor, frame, repeats=max(options.repeats, 1))
     rows = [*result.steps, result.total, result.plain]
-    print(f"{tr('step'):<26}{tr('median ms'):>12}{tr('p95 ms'):>10}{tr('MB'):>8}")
+    say(f"{tr('step'):<26}{tr('median ms'):>12}{tr('p95 ms'):>10}{tr('MB'):>8}")
     for row in rows:
-        print(f"{row.name:<26}{row.median_ms:12.2f}{row.p95_ms:10.2f}{row.bytes / 1e6:8.1f}")
-    print(f"{tr('copy of the bytes'):<26}{result.copy_floor_ms:12.2f}")
+        say(f"{row.name:<26}{row.median_ms:12.2f}{row.p95_ms:10.2f}{row.bytes / 1e6:8.1f}")
+    say(f"{tr('copy of the bytes'):<26}{result.copy_floor_ms:12.2f}")
     text = tr("{floor:.1f} times the copy")
     if reconstructor.model == "paper":
         text = tr("{ratio:.1f} times faster than the plain version; {floor:.1f} times the copy")
-    print(
+    say(
         text.format(
             ratio=result.plain.median_ms / result.total.median_ms,
             floor=result.total.median_ms / result.copy_floor_ms,
         )
     )
-    print("\n".join(plan_lines(result.plan)))
+    say("\n".join(plan_lines(result.plan)))
     if options.json:
         write_json(
             {

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from app.command_line.terminal import say
 from gelpolight_core.export.board_page import caption, write_board
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.translation import tr
@@ -41,5 +42,5 @@ def run(options: argparse.Namespace) -> int:
     across, down = options.corners
     board = BoardSpec((across, down), options.square)
     write_board(board, options.output)
-    print(tr("{what}: written to {path}").format(what=caption(board), path=options.output))
+    say(tr("{what}: written to {path}").format(what=caption(board), path=options.output))
     return 0

@@ -15,6 +15,7 @@ from app.command_line.common import (
     refuse_overwriting,
     write_json,
 )
+from app.command_line.terminal import say
 from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session, source_files
@@ -46,9 +47,9 @@ def run(options: argparse.Namespace) -> int:
     write_calibration(result.calibration, options.output)
     if options.json:
         write_json(run_as_json(result), options.json)
-    print(tr("camera response: {what}").format(what=result.response.summary))
-    print("\n".join(quality_lines(result.calibration.quality)))
-    print(
+    say(tr("camera response: {what}").format(what=result.response.summary))
+    say("\n".join(quality_lines(result.calibration.quality)))
+    say(
         tr("Calibration {id} written to {path}: {verdict}").format(
             id=result.calibration.identity,
             path=options.output,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import write_json
+from app.command_line.terminal import harmless, say
 from app.sources.camera.applying import is_locked
 from app.sources.camera.driver import CameraDriver, Device, Format, best_format, compression_warning
 from app.sources.source import Setting
@@ -35,10 +36,10 @@ def report(driver: CameraDriver, json: Path | None) -> int:
     found = []
     for device in driver.devices():
         formats, controls, trouble = _ask(driver, device)
-        print("\n".join(_lines(device, formats, controls, trouble)))
+        say("\n".join(_lines(device, formats, controls, trouble)))
         found.append(_entry(device, formats, controls, trouble))
     if not found:
-        print(
+        say(
             tr(
                 "No camera is plugged in, or this user may not see it. Plug one in; on Linux, look"
                 " for /dev/video0 and add the user to the group video."
@@ -69,7 +70,7 @@ def _ask(
 def _lines(
     device: Device, formats: tuple[Format, ...], controls: tuple[Setting, ...], trouble: str
 ) -> list[str]:
-    lines = [f"{device.name}  [{device.identity}]  {device.place}"]
+    lines = [f"{harmless(device.name)}  [{device.identity}]  {device.place}"]
     if trouble:
         return [*lines, f"  {trouble}"]
     best = best_format(formats)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from app.command_line.terminal import harmless
 from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
@@ -164,14 +165,14 @@ def quality_lines(tables: Mapping[str, QualityTable]) -> list[str]:
     """Return the quality tables of all stages as lines of text."""
     lines = []
     for stage, table in tables.items():
-        lines.append(f"{stage}: {table.verdict.value}")
+        lines.append(f"{harmless(stage)}: {table.verdict.value}")
         for figure in table.figures:
             mark = {Verdict.PASS: " ", Verdict.WARN: "!", Verdict.FAIL: "X"}[figure.verdict]
             limit = (
                 "" if figure.warn_limit is None else tr("limit {x:g}").format(x=figure.warn_limit)
             )
-            value = f"{figure.value:>10.4g} {figure.unit:<4}"
-            lines.append(f"  {mark} {figure.label:<58} {value} {limit}".rstrip())
+            value = f"{figure.value:>10.4g} {harmless(figure.unit):<4}"
+            lines.append(f"  {mark} {harmless(figure.label):<58} {value} {limit}".rstrip())
             if figure.verdict is not Verdict.PASS and figure.advice:
-                lines.append(f"      {figure.advice}.")
+                lines.append(f"      {harmless(figure.advice)}.")
     return lines

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import quality_lines, refuse_overwriting
+from app.command_line.terminal import say
 from gelpolight_core.design.check import check_design
 from gelpolight_core.design.reflections import Reflection
 from gelpolight_core.design.sensor_design import read_design
@@ -40,12 +41,12 @@ def run(options: argparse.Namespace) -> int:
         refuse_overwriting([options.shadows], [options.design])
         refuse_unwritable(options.shadows)
     result = check_design(read_design(options.design))
-    print("\n".join(quality_lines({tr("design"): result.quality})))
-    print("\n".join(reflection_lines(result.reflections)))
+    say("\n".join(quality_lines({tr("design"): result.quality})))
+    say("\n".join(reflection_lines(result.reflections)))
     if options.shadows:
         comparison = shadow_comparison()
         write_atomically(options.shadows, partial(draw_shadow_comparison, comparison))
-        print("\n".join(shadow_lines(comparison)))
+        say("\n".join(shadow_lines(comparison)))
     return 0
 
 

@@ -15,6 +15,7 @@ from app.command_line.common import (
     refuse_overwriting,
     write_json,
 )
+from app.command_line.terminal import say
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.reconstruction.drift import background_drift, zeroed
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     reconstructor = load_reconstructor(options.calibration)
     frame = read_frame(options.image, reconstructor)
     drift = background_drift(frame, reconstructor.calibration)
-    print("\n".join(quality_lines({tr("background"): drift.quality})))
+    say("\n".join(quality_lines({tr("background"): drift.quality})))
     if options.json:
         content = {
             "touched": drift.touched,
@@ -62,5 +63,5 @@ def run(options: argparse.Namespace) -> int:
         made = datetime.now(UTC).isoformat(timespec="seconds")
         new = zeroed(reconstructor.calibration, [frame], operator=getpass.getuser(), made=made)
         write_calibration(new, options.zero)
-        print(tr("{name} written to {path}").format(name=new.identity, path=options.zero))
+        say(tr("{name} written to {path}").format(name=new.identity, path=options.zero))
     return 0

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import StageProgress, add_model, add_workers, load_reconstructor
+from app.command_line.terminal import say
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.press_workers import Equipment
@@ -63,8 +64,8 @@ def run(options: argparse.Namespace) -> int:
 def report(evaluation: Evaluation, calibration: Calibration, output: Path, presses: Path) -> None:
     """Write the report's files and print the table; refuse where nothing could be measured."""
     written = write_evaluation_files(evaluation, output, calibration=calibration)
-    print(evaluation_table(evaluation))
-    print(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
+    say(evaluation_table(evaluation))
+    say(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
     if len(evaluation.failed) == len(evaluation.results):
         raise InputError(
             tr("none of the {n} presses could be measured ({reason})").format(

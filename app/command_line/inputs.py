@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from app.command_line.terminal import say
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.matching import recording_notes, require_match
@@ -99,7 +100,7 @@ class Inputs:
         for recording in self.recordings:
             require_match(recording, calibration)
             for note in recording_notes(recording):
-                print(f"{recording.path}: {note}", file=sys.stderr)
+                say(f"{recording.path}: {note}", file=sys.stderr)
 
     def _add_recording(self, path: Path, frames: str) -> None:
         recording = self._open.enter_context(Recording.open(path))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.command_line.common import quality_lines
+from app.command_line.terminal import harmless, say
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.response.curve import CameraResponse
@@ -59,7 +60,12 @@ def _print_recording(recording: Recording) -> None:
     rows += [(key, str(value)) for key, value in header.settings.items()]
     if header.note:
         rows.append((tr("note"), header.note))
-    print("\n".join(f"{label:<18} {value}" for label, value in rows))
+    say(_table(rows))
+
+
+def _table(rows: list[tuple[str, str]]) -> str:
+    """Return what a file says, a line each."""
+    return "\n".join(f"{harmless(label):<18} {harmless(value)}" for label, value in rows)
 
 
 def _print_calibration(path: Path) -> None:
@@ -110,5 +116,5 @@ def _print_calibration(path: Path) -> None:
                 ).strip(),
             )
         )
-    print("\n".join(f"{label:<18} {value}" for label, value in rows))
-    print("\n".join(quality_lines(c.quality)))
+    say(_table(rows))
+    say("\n".join(quality_lines(c.quality)))

@@ -16,6 +16,7 @@ from typing import NoReturn, TextIO
 
 import platformdirs
 
+from app.command_line.terminal import say
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -110,20 +111,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status: int = options.run(options)
         sys.stdout.flush()
     except InputError as error:
-        print(f"gelpolight: {error}", file=sys.stderr)
+        say(f"gelpolight: {error}", file=sys.stderr)
         return MENDABLE
     except KeyboardInterrupt:
-        print(tr("gelpolight: stopped"), file=sys.stderr)
+        say(tr("gelpolight: stopped"), file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone; nothing is left to say to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:  # a name too long, no permission, a full disk
-        print(_environment_fault(error), file=sys.stderr)
+        say(_environment_fault(error), file=sys.stderr)
         return MENDABLE
     except Exception:  # the outermost edge: a technician sees one line, the log the whole of it
-        print(_report_fault(), file=sys.stderr)
+        say(_report_fault(), file=sys.stderr)
         return OUR_FAULT
     return status
 

@@ -13,6 +13,7 @@ from app.command_line.common import (
     refuse_overwriting,
     write_json,
 )
+from app.command_line.terminal import say
 from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
@@ -84,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
             lines = [f"{tr('shape'):<12} {shape}", *lines]
     if options.json:
         write_json(content, options.json)
-    print("\n".join(lines))
+    say("\n".join(lines))
     return 0
 
 

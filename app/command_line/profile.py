@@ -14,6 +14,7 @@ from app.command_line.common import (
     read_frame,
     refuse_overwriting,
 )
+from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.export.profile_file import write_profile
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
     profile = take_profile(heightmap, start, end, width_mm=options.width)
     write_profile(profile, options.output)
-    print(
+    say(
         tr("{n} points over {length:.3f} mm written to {path}").format(
             n=profile.along_mm.size, length=profile.along_mm[-1], path=options.output
         )

@@ -17,6 +17,7 @@ from app.command_line.common import (
     refuse_overwriting,
 )
 from app.command_line.inputs import Inputs
+from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
@@ -101,7 +102,5 @@ def run(options: argparse.Namespace) -> int:
                 tqdm.write(f"{item.where}: {note}", file=sys.stderr)
             if options.pictures:
                 write_preview(heightmap, picture.rgb, options.output / f"{item.stem}.png")
-    print(
-        tr("{n} depth maps written to {folder}").format(n=len(inputs.items), folder=options.output)
-    )
+    say(tr("{n} depth maps written to {folder}").format(n=len(inputs.items), folder=options.output))
     return 0

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
@@ -44,9 +45,9 @@ def run(options: argparse.Namespace) -> int:
         )
     with Records.open(path) as records:
         if records.notice:
-            print(records.notice, file=sys.stderr)
+            say(records.notice, file=sys.stderr)
         found = records.measurements(options.sensor)
-        print("\n".join(table_lines(found)))
+        say("\n".join(table_lines(found)))
         if options.csv is not None:
             records.export_csv(options.csv, options.sensor)
     return 0
@@ -71,13 +72,13 @@ def _line(record: MeasurementRecord, quantity: Quantity) -> str:
     return _LINE.format(
         record.id if first else "",
         f"{record.time:%Y-%m-%d %H:%M}" if first else "",
-        record.serial if first else "",
-        record.shape if first else "",
-        quantity.name,
+        harmless(record.serial) if first else "",
+        harmless(record.shape) if first else "",
+        harmless(quantity.name),
         f"{quantity.value:.4f}",
         "" if quantity.sd is None else f"{quantity.sd:.4f}",
         "" if quantity.truth is None else f"{quantity.truth:.4f}",
         "" if error is None else f"{error:+.2f}",
-        record.verdict if first else "",
-        record.note.replace("\n", " ") if first else "",
+        harmless(record.verdict) if first else "",
+        harmless(record.note.replace("\n", " ")) if first else "",
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import StageProgress, refuse_overwriting
+from app.command_line.terminal import say
 from gelpolight_core.calibration.calibration import MODELS, Calibration
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.pipeline import calibrate_session, source_files
@@ -58,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     make = _of_session if options.source.is_dir() else _of_calibration
     report = make(options)
     write_report(report, options.output)
-    print(
+    say(
         tr("Report written to {path}: {verdict}").format(
             path=options.output, verdict=report.verdict.value
         )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import StageProgress
+from app.command_line.terminal import say
 from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.translation import tr
@@ -25,5 +26,5 @@ def run(options: argparse.Namespace) -> int:
     design = read_design(options.design) if options.design else SensorDesign()
     with StageProgress() as tell:
         simulate_session(design, options.output, progress=tell)
-    print(tr("Session written to {folder}").format(folder=options.output))
+    say(tr("Session written to {folder}").format(folder=options.output))
     return 0

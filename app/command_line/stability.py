@@ -9,6 +9,7 @@ from typing import Any
 from tqdm import tqdm
 
 from app.command_line.common import StageProgress
+from app.command_line.terminal import say
 from gelpolight_core.experiments.sensitivity import Sensitivity, sensitivities
 from gelpolight_core.experiments.stability import (
     CaseResult,
@@ -67,13 +68,13 @@ def run(options: argparse.Namespace) -> int:
                 progress=lambda name, share: tell(name, CASES_SHARE + (1 - CASES_SHARE) * share),
             )
     if found:
-        print("\n" + sensitivity_table(found))
-    print("\n" + summary_line(results))
+        say("\n" + sensitivity_table(found))
+    say("\n" + summary_line(results))
     written = write_stability(results, found, options.output)
-    print(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
+    say(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
     return 1 if any(result.outcome is Outcome.FAILED for result in results) else 0
 
 
 def _print_line(result: CaseResult) -> None:
     with tqdm.external_write_mode():
-        print(result_line(result), flush=True)
+        say(result_line(result), flush=True)

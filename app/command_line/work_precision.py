@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from app.command_line.common import StageProgress
+from app.command_line.terminal import say
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
@@ -104,8 +105,8 @@ def run(options: argparse.Namespace) -> int:
         tell(tr("integration"), 0.0)
         sides = SIDES if max(scales, default=0.0) >= 1.0 else SIDES[:-2]
         integrators = measure_integrators(sides=sides, repeats=repeats)
-    print(point_table(points), end="\n\n")
-    print(order_table(points, integrators), end="\n\n")
+    say(point_table(points), end="\n\n")
+    say(order_table(points, integrators), end="\n\n")
     return _write(points, integrators, options.output)
 
 
@@ -122,13 +123,13 @@ def _with_calibration(options: argparse.Namespace, chosen: Sequence[Method], rep
             points += measure_virtual(
                 calibration, SensorDesign(), chosen, repeats=repeats, progress=tell
             )
-    print(point_table(points), end="\n\n")
+    say(point_table(points), end="\n\n")
     return _write(points, (), options.output)
 
 
 def _write(points: Sequence[Point], integrators: Sequence[IntegratorPoint], folder: Path) -> int:
     written = write_work_precision(points, integrators, folder)
-    print(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
+    say(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
     return 0
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QSizePolicy, QWidget
 
-from app.shell import theme
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -37,7 +38,7 @@ class Banner(QWidget):
         named(self, "inspect.banner", tr("What to do next"))
         self._act, self._advice, self._role = "", "", ""
         self._idle = idle
-        self._text = named(QLabel(), "inspect.advice", tr("Advice"))
+        self._text = named(PlainLabel(), "inspect.advice", tr("Advice"))
         self._text.setWordWrap(True)
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._button = named(QPushButton(), "inspect.advised", tr("Do that"))
@@ -69,17 +70,12 @@ class Banner(QWidget):
             self._text.setText(tr("{title}…").format(title=title))
         self._show()
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_working"):
-            self._show()
-
     def _show(self) -> None:
-        role = "text" if self._working else self._role or "text"
+        role = "" if self._working else self._role
         if not self._working:
             self._text.setText(self._advice or self._idle)
             role = role if self._advice else "muted"
-        self._text.setStyleSheet(f"color: {theme.colour(role).name()};")
+        show_meaning(self._text, role)
         self._button.setVisible(bool(self._act) and not self._working)
         self._bar.setVisible(self._working)
         self._stop.setVisible(self._working)

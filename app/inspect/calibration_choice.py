@@ -6,13 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QSignalBlocker, Signal
+from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QComboBox, QWidget
 
 from app.inspect.advice import Known
 from app.sensors.calibration_actions import show_in_use
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from gelpolight_core.errors import InputError
@@ -44,11 +45,15 @@ class CalibrationBox(QComboBox):
             for entry in entries:
                 if entry.summary is not None:
                     size = "x".join(map(str, entry.summary.picture_size))
-                    text = f"{entry.serial}  {entry.summary.identity}"
+                    identity = entry.summary.identity
+                    named_after = identity.startswith(entry.serial)
+                    text = identity if named_after else f"{entry.serial}  {identity}"
                     self.addItem(text, str(entry.path))
-                    self.setItemData(self.count() - 1, f"{entry.path.stem}, {size}", 3)
+                    tip = plain_tip(f"{entry.path.stem}, {size}")
+                    self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
                     if entry.in_use:
                         self.setCurrentIndex(self.count() - 1)
+        self.view().setMinimumWidth(max(self.view().sizeHintForColumn(0), self.width()))
 
 
 class CalibrationChoice(QObject):

@@ -24,6 +24,7 @@ from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 FIRST_FORMATS = ("npz", "tif")
+FOLDER_WIDTH = 360
 
 
 class ExportDialog(QDialog):
@@ -64,6 +65,7 @@ class ExportDialog(QDialog):
         self._stride.setToolTip(tr("Meshes take every so many-th row and column: smaller files"))
         form.addRow(tr("Mesh: every n-th node"), self._stride)
         self._folder = named(QLineEdit(str(folder)), "inspect.export.folder", tr("Folder"))
+        self._folder.setMinimumWidth(FOLDER_WIDTH)
         self._folder.textChanged.connect(self._check)
         browse = named(QPushButton(tr("Browse…")), "inspect.export.browse", tr("Choose a folder"))
         browse.clicked.connect(self._browse)

@@ -10,10 +10,11 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter, QResizeEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.inspect.scale_bar import ScaleBar
 from app.live.picture_view import SURROUND
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 
 CURSOR = "#ffffff"
@@ -54,7 +55,7 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         self.scene().sigMouseMoved.connect(self._on_pointer)
         self.scene().sigMouseClicked.connect(self._on_click)
         self._scale = ScaleBar(self, f"{name}.scale")
-        self._words = QLabel(self)
+        self._words = PlainLabel(parent=self)
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._words.setWordWrap(True)
         self._words.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
@@ -76,6 +77,11 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
             self.box.setLimits(minXRange=0.2, xMin=-reach, xMax=reach, yMin=-reach, yMax=reach)
             self.fit()
         self._scale.setVisible(True)
+
+    @property
+    def has_picture(self) -> bool:
+        """Whether a picture is shown, and no words."""
+        return not self._extent.isNull()
 
     def say(self, text: str) -> None:
         """Show words in the place of a picture."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.inspect.actions import Deeds
 from app.inspect.advice import Situation, advise
@@ -29,6 +29,7 @@ from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.jobs import Jobs
 from app.sources.listing import picture_folders
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.recording import ENDING
@@ -60,8 +61,8 @@ class InspectPage(QWidget):
         self.banner = Banner(
             tr("Press an object into the membrane. Space lets the picture stand with all detail.")
         )
-        self._readout = named(QLabel(), "inspect.readout", tr("What is under the cursor"))
-        self._rate = named(QLabel(), "inspect.rate", tr("How fast it is shown"))
+        self._readout = named(PlainLabel(), "inspect.readout", tr("What is under the cursor"))
+        self._rate = named(PlainLabel(), "inspect.rate", tr("How fast it is shown"))
         self._cursor = (math.nan, math.nan)
         self._places: PixelPlaces | None = None
         self._shown: Shown | None = None
@@ -240,7 +241,7 @@ class InspectPage(QWidget):
     def _tell(self) -> None:
         self.ways.follow(self.link.last)
         self._rate.setText("    ".join(filter(None, (self._recorded, self.link.words()))))
-        self._rate.setToolTip(self.link.plan_words())
+        self._rate.setToolTip(plain_tip(self.link.plan_words()))
         heightmap = None if self._shown is None else self._shown.heightmap
         text = tr("Point at a view to read the depth there.")
         if heightmap is None:

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QProgressBar,
     QPushButton,
     QTableWidget,
@@ -26,9 +25,10 @@ from PySide6.QtWidgets import (
 )
 
 from app.inspect.precision_plot import PrecisionPlot, errors
-from app.shell import theme
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
+from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -79,7 +79,7 @@ class PrecisionDialog(QDialog):
     def _make_choice(self) -> None:
         self.calibrations = named(QComboBox(), "precision.calibration", tr("Calibration"))
         self.calibrations.currentIndexChanged.connect(self._on_calibration)
-        self.presses = named(QLabel(), "precision.presses", tr("Presses of known depth"))
+        self.presses = named(PlainLabel(), "precision.presses", tr("Presses of known depth"))
         self.presses.setWordWrap(True)
         self.folder = named(
             QPushButton(tr("Session folder…")), "precision.folder", tr("Choose a session folder"),
@@ -116,7 +116,7 @@ class PrecisionDialog(QDialog):
         self.table.horizontalHeader().setSectionResizeMode(mode.ResizeToContents)
         self.table.horizontalHeader().setSectionResizeMode(0, mode.Stretch)
         self.table.setMaximumHeight(170)
-        self.words = named(QLabel(), "precision.words", tr("What there is to say"))
+        self.words = named(PlainLabel(), "precision.words", tr("What there is to say"))
         self.words.setWordWrap(True)
         self.words.setMinimumHeight(2 * self.words.fontMetrics().lineSpacing())
         self.save = named(
@@ -200,7 +200,7 @@ class PrecisionDialog(QDialog):
         """Measure on the presses of a session folder."""
         self._folder = folder
         self.presses.setText(str(folder))
-        self.presses.setToolTip(str(folder))
+        self.presses.setToolTip(plain_tip(str(folder)))
         self._allow()
 
     def measure(self) -> None:
@@ -242,7 +242,7 @@ class PrecisionDialog(QDialog):
                 if column:
                     right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
                     item.setTextAlignment(right)
-                item.setToolTip(point.gap)
+                item.setToolTip(plain_tip(point.gap))
                 self.table.setItem(row, column, item)
         gaps = [f"{point.label}: {point.gap}" for point in points if point.gap]
         text = tr("The dashed line is the front: nothing beats it in both time and error.")
@@ -281,7 +281,7 @@ class PrecisionDialog(QDialog):
 
     def _say(self, text: str, role: str = "muted") -> None:
         self.words.setText(text)
-        self.words.setStyleSheet(f"color: {theme.colour(role).name()};")
+        show_meaning(self.words, role)
 
     def _show_work(self, title: str, share: float) -> None:
         self.progress.setFormat(f"{title}  %p %" if title else "")

@@ -92,6 +92,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
             self._take_theme()
 
     def _take_theme(self) -> None:
+        self.setBackground(theme.colour("base"))
         pen = theme.colour("text")
         for side in ("left", "bottom"):
             axis = self.getAxis(side)

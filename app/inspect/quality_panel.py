@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.inspect.colour_bar import ColourBar
 from app.inspect.height_panel import extent_of
 from app.inspect.map_view import MapView
 from app.inspect.place import flag_words
 from app.inspect.products import QUALITY_COLOURS, Shown
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.misfit import Misfit
@@ -42,7 +43,7 @@ class QualityPanel(QWidget):
         self._what.addItem(tr("Misfit of the picture (| |n| - 1 |)"), "misfit")
         self._what.addItem(tr("Uncertainty (when paused)"), "uncertainty")
         self._what.currentIndexChanged.connect(self._on_chosen)
-        self._legend = named(QLabel(), "inspect.quality.legend", tr("What the colours mean"))
+        self._legend = named(MarkupLabel(), "inspect.quality.legend", tr("What the colours mean"))
         self._legend.setWordWrap(True)
         self._legend.setContentsMargins(6, 2, 6, 2)
         row = QHBoxLayout()
@@ -79,12 +80,14 @@ class QualityPanel(QWidget):
         self.map.show_picture(shown.quality, extent_of(shown.heightmap))
         if self.what == "uncertainty":
             self.bar.show_range("inferno", 0.0, 1e3 * shown.quality_top, tr("um"))
+            self.bar.show()
             self._legend.setText(
                 tr("Standard deviation of repeats of this picture; one in a hundred is above.")
             )
             return
         if shown.misfit is not None:
             self.bar.show_range("inferno", 0.0, 100.0 * shown.quality_top, "%")
+            self.bar.show()
         self._count += 1
         if still or self._count % TELL_EVERY == 1:
             misfit = shown.misfit
@@ -92,13 +95,17 @@ class QualityPanel(QWidget):
             self._legend.setText(text)
 
     def _on_chosen(self) -> None:
-        self.bar.setVisible(self.what != "flags")
+        # What is shown is of another figure: neither its colours nor its words stay for this one.
+        self.bar.hide()
+        self._legend.clear()
+        if self.map.has_picture:
+            self.map.say(tr("One moment."))
         self._count = 0
         self.chosen.emit()
 
 
 def misfit_text(misfit: Misfit) -> str:
-    """Return what the misfit is, and how large in the middle of all nodes."""
+    """Return what the misfit is, and how large in the middle of all nodes, as markup."""
     if misfit.model == "paper":
         text = tr("| |n| - 1 |: length of the solved normal less 1; median {m:.1f} %.")
     else:
@@ -106,11 +113,11 @@ def misfit_text(misfit: Misfit) -> str:
             "Brightness seen less explained by the depth, of the flat membrane's; median {m:.1f} %."
         )
     known = misfit.values[np.isfinite(misfit.values)]
-    return text.format(m=100.0 * float(np.median(known)) if known.size else 0.0)
+    return escaped(text.format(m=100.0 * float(np.median(known)) if known.size else 0.0))
 
 
 def legend(flags: np.ndarray) -> str:
-    """Return the flags that are set, in their colours, with the share of the area."""
+    """Return the flags that are set, in their colours, with the share of the area, as markup."""
     some = flags[::3, ::3]
     inside = some[some & Flag.OUTSIDE.value == 0]
     words, parts = flag_words(), []

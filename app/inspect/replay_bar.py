@@ -7,7 +7,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QSlider,
     QToolButton,
     QWidget,
@@ -15,6 +14,7 @@ from PySide6.QtWidgets import (
 
 from app.shell.actions import make_action
 from app.sources.recording import Playback, RecordingSource
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -65,7 +65,7 @@ class ReplayBar(QWidget):
         )
         self._slider.valueChanged.connect(self._seek)
         row.addWidget(self._slider, 1)
-        self._words = named(QLabel(), f"{page}.replay.words", tr("Where the recording is"))
+        self._words = named(PlainLabel(), f"{page}.replay.words", tr("Where the recording is"))
         row.addWidget(self._words)
         self._loop = named(QCheckBox(tr("Loop")), f"{page}.replay.loop", tr("Begin again"))
         self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))

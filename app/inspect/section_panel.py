@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFrame,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QScrollArea,
     QVBoxLayout,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from app.inspect.cuts import Cut, Section
 from app.inspect.profile_plot import ProfilePlot
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.translation import tr
@@ -70,7 +70,7 @@ class SectionPanel(QWidget):
             tr("As a table (CSV)"),
         )  # fmt: skip
         save.clicked.connect(self.save_wanted)
-        self._figures = named(QLabel(), "inspect.section.figures", tr("Measured"))
+        self._figures = named(MarkupLabel(), "inspect.section.figures", tr("Measured"))
         self._figures.setWordWrap(True)
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         scroll = QScrollArea()
@@ -154,7 +154,9 @@ class SectionPanel(QWidget):
             self._follow_length(float(cut.profile.along_mm[-1]))
         self._plot.show_profile(cut.profile)
         self._plot.show_width(cut.width_ends)
-        self._figures.setText("<br>".join([*figure_lines(cut.figures), *cut.sentences]))
+        self._figures.setText(
+            "<br>".join([*figure_lines(cut.figures), *map(escaped, cut.sentences)])
+        )
 
     def _follow_length(self, length: float) -> None:
         """Keep the ranges at their shares of a line that became longer or shorter."""
@@ -171,7 +173,7 @@ class SectionPanel(QWidget):
 
 
 def figure_lines(figures: Sequence[Measured]) -> list[str]:
-    """Return measured values as lines; the slopes of the two ranges are told apart."""
+    """Return measured values as lines of markup; the slopes of the two ranges are told apart."""
     lines, seen = [], 0
     for figure in figures:
         where = ""
@@ -183,9 +185,9 @@ def figure_lines(figures: Sequence[Measured]) -> list[str]:
 
 
 def figure_text(figure: Measured, where: str = "") -> str:
-    """Return a measured value with its unit and standard deviation."""
+    """Return a measured value with its unit and standard deviation, as markup."""
     unit = "°" if figure.unit == DEG else f" {figure.unit}"
     digits = {"mm": 3, "um": 1}.get(figure.unit, 1)
     sd = "" if figure.sd is None else f" ± {figure.sd:.{digits}f}"
     value = round(figure.value, digits) + 0.0  # never -0.0
-    return f"{figure.label}{where}: <b>{value:.{digits}f}{sd}{unit}</b>"
+    return f"{escaped(figure.label + where)}: <b>{value:.{digits}f}{sd}{unit}</b>"

@@ -6,12 +6,13 @@ import importlib
 import logging
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QToolButton, QVBoxLayout, QWidget
 
 from app.inspect.draped import DrapedLine
 from app.inspect.map_view import MapView
 from app.inspect.surface import Surface
 from app.shell.jobs import Job, Jobs
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -64,13 +65,13 @@ class SurfacePanel(QWidget):
         self._exaggeration = 1.0
         self._lines: tuple[DrapedLine, ...] = ()
         self._stack = QStackedWidget()
-        self._words = QLabel(tr("No depth yet."))
+        self._words = PlainLabel(tr("No depth yet."))
         self._words.setWordWrap(True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._words.setMargin(20)
         self._stack.addWidget(self._words)
         self._flat: MapView | None = None
-        self._why = named(QLabel(), "inspect.surface.reason", tr("Why there is no 3D"))
+        self._why = named(PlainLabel(), "inspect.surface.reason", tr("Why there is no 3D"))
         self._why.setWordWrap(True)
         self._why.hide()
         row = QHBoxLayout()

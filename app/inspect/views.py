@@ -284,6 +284,9 @@ class Views(QMainWindow):
 
     def _on_visible(self, name: str, on: bool) -> None:
         self._visible[name] = on
+        maps = {"height": self.height, "normals": self.normals, "quality": self.quality}
+        if on and self._has_depth and name in maps and not maps[name].map.has_picture:
+            maps[name].map.say(tr("One moment."))
         if name == "section":
             self._on_section()
         else:

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QComboBox, QWidget
 from app.inspect.products import Shown
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.reconstruction.efforts import FOUND, FULL, PAPER, WAYS, Way
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -57,7 +58,7 @@ class WayBox(QComboBox):
             text = way_text(self.itemData(index), times_ms.get(self.itemData(index)))
             if text != self.itemText(index):
                 self.setItemText(index, text)
-                self.setItemData(index, text, Qt.ItemDataRole.ToolTipRole)
+                self.setItemData(index, plain_tip(text), Qt.ItemDataRole.ToolTipRole)
         widest = max((self.view().sizeHintForColumn(0), self.width()))
         self.view().setMinimumWidth(widest)
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from app.live.picture_checks import Exposure
+from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
 from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
@@ -76,9 +77,9 @@ class ChecksBar(QWidget):
         super().__init__(parent)
         named(self, "live.checks", tr("Picture checks"))
         self.focus = FocusBar()
-        self._exposure = named(QLabel(), "live.exposure", tr("Exposure"))
-        self._pixel = named(QLabel(), "live.pixel", tr("Pixel under the pointer"))
-        self._rate = named(QLabel(), "live.rate", tr("Frame rate"))
+        self._exposure = named(PlainLabel(), "live.exposure", tr("Exposure"))
+        self._pixel = named(PlainLabel(), "live.pixel", tr("Pixel under the pointer"))
+        self._rate = named(PlainLabel(), "live.rate", tr("Frame rate"))
         self._rate.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         # Long words are cut off rather than widening the window.
         self._exposure.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -117,7 +118,7 @@ class ChecksBar(QWidget):
         text = f"{SIGNS[exposure.verdict]} {exposure.advice}" if exposure else ""
         if text != self._exposure.text():
             self._exposure.setText(text)
-            self._exposure.setToolTip(text)
+            self._exposure.setToolTip(plain_tip(text))
 
     def show_pixel(self, text: str) -> None:
         """Show the value under the pointer."""
@@ -128,4 +129,4 @@ class ChecksBar(QWidget):
         """Show the frame rate and what was lost."""
         if text != self._rate.text():
             self._rate.setText(text)
-            self._rate.setToolTip(text)
+            self._rate.setToolTip(plain_tip(text))

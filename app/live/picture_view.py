@@ -13,9 +13,10 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter, QResizeEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.live.drawing import OverlayItem
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -94,7 +95,7 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self._box.sigRangeChanged.connect(self._on_range)
         self.scene().sigMouseMoved.connect(self._on_pointer)
         self.scene().sigMouseClicked.connect(self._on_click)
-        self._placeholder = QLabel(tr("No camera. Choose a source."), self)
+        self._placeholder = PlainLabel(tr("No camera. Choose a source."), self)
         self._placeholder.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._placeholder.setWordWrap(True)
         self._placeholder.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 15px;")

@@ -6,9 +6,10 @@ import math
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QIcon, QKeySequence, QPalette, QShortcut
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
 
 from app.live.icons import SIDE, tool_icon
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -55,7 +56,7 @@ class PictureTools(QWidget):
         super().__init__()
         named(self, "live.tools", tr("Picture tools"))
         self._buttons: dict[str, QToolButton] = {}
-        self._zoom = named(QLabel(), "live.zoom", tr("Magnification"))
+        self._zoom = named(PlainLabel(), "live.zoom", tr("Magnification"))
         row = QHBoxLayout(self)
         row.setContentsMargins(4, 2, 8, 2)
         row.setSpacing(2)

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDockWidget,
     QHBoxLayout,
-    QLabel,
     QMainWindow,
     QMenu,
     QScrollArea,
@@ -27,10 +26,11 @@ from app.measure.details import Details
 from app.measure.side_panel import SidePanel
 from app.measure.tool_map import ToolMap
 from app.measure.work import Work
-from app.shell import theme
 from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.jobs import Jobs
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.source_button import SourceButton
 from gelpolight_core.translation import tr
@@ -77,7 +77,7 @@ class DeskFrame(QMainWindow):
         self.replay = ReplayBar("measure")
         self.panel = SidePanel()
         self.panel.who.setText(getpass.getuser())
-        self.validated = named(QLabel(), "measure.validated", tr("Validated or not"))
+        self.validated = named(PlainLabel(), "measure.validated", tr("Validated or not"))
         self.auto = named(
             QCheckBox(tr("Hold when steady")),
             "measure.auto",
@@ -207,7 +207,7 @@ class DeskFrame(QMainWindow):
                 (tr("validated"), "pass") if entry.validated else (tr("not validated"), "warn")
             )
         self.validated.setText(f"  {text}  ")
-        self.validated.setStyleSheet(f"color: {theme.colour(role).name()};")
+        show_meaning(self.validated, role)
 
     def follow_bench(self) -> None:
         """Have the bench beside the map where the virtual sensor is the camera."""

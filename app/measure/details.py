@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QLabel, QStackedWidget, QTabWidget, QWidget
+from PySide6.QtWidgets import QStackedWidget, QTabWidget, QWidget
 
 from app.inspect.draped import DrapedLine, along
 from app.inspect.place import PixelPlaces
@@ -17,6 +17,7 @@ from app.live.picture_view import PictureView
 from app.measure.measuring import Answer
 from app.measure.tool_layer import COLOURS, DrawnTool
 from app.shell.jobs import Jobs
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
@@ -58,7 +59,7 @@ class Details(QTabWidget):
         self._drawn: tuple[DrawnTool, ...] = ()
         self._chosen = 0
         self.plot = ProfilePlot("measure.section.plot")
-        self._words = QLabel(tr("Choose a tool that reads a section: profile width (W)."))
+        self._words = PlainLabel(tr("Choose a tool that reads a section: profile width (W)."))
         self._words.setMargin(20)
         self.section = QStackedWidget()
         self.section.addWidget(self._words)

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QPushButton,
     QTableWidget,
     QTableWidgetItem,
@@ -19,8 +18,9 @@ from PySide6.QtWidgets import (
 )
 
 from app.measure.placing import INDENTERS, kind_label
-from app.shell import theme
 from app.shell.icons import icon
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
 from gelpolight_core.errors import InputError
@@ -45,9 +45,9 @@ class IndentersDialog(QDialog):
         self.resize(680, 480)
         self.indenters = indenters
         self.table = self._make_table()
-        self.problem = named(QLabel(), "measure.indenters.problem", tr("What is wrong"))
+        self.problem = named(PlainLabel(), "measure.indenters.problem", tr("What is wrong"))
         self.problem.setWordWrap(True)
-        self.problem.setStyleSheet(f"color: {theme.colour('fail').name()};")
+        show_meaning(self.problem, "fail")
         add = _button("add", tr("&Add"))
         add.clicked.connect(lambda: self.add_row(Indenter(tr("New cylinder"), "cylinder", 5.0)))
         remove = _button("remove", tr("&Remove"))
@@ -61,7 +61,7 @@ class IndentersDialog(QDialog):
         row.addWidget(remove)
         row.addStretch(1)
         row.addWidget(buttons)
-        words = QLabel(
+        words = PlainLabel(
             tr("Lengths in mm. The depth is how far it goes in until its base touches, if it has.")
         )
         words.setWordWrap(True)

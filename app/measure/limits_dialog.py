@@ -9,12 +9,12 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QDoubleSpinBox,
     QFormLayout,
-    QLabel,
     QVBoxLayout,
     QWidget,
 )
 
 from app.shell.settings import Limits
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -27,7 +27,7 @@ class LimitsDialog(QDialog):
         named(self, "measure.limits", tr("Limits of the error"))
         self.setWindowTitle(tr("Limits of the error"))
         self._limits = limits
-        words = QLabel(
+        words = PlainLabel(
             tr(
                 "A measurement passes when it is no farther from the truth than this."
                 " The paper reports 5 % in the plane and 8 % in depth of its own sensor."

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QProgressBar,
     QPushButton,
     QTableWidget,
@@ -19,6 +18,8 @@ from PySide6.QtWidgets import (
 
 from app.measure.protocol_look import object_name
 from app.shell import theme
+from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.protocol import SAME_REGION, PressWanted
 from gelpolight_core.measurement.protocol_run import RunProgress
@@ -27,6 +28,7 @@ from gelpolight_core.translation import tr
 
 WIDTH = 372
 LIVE_LINES = 3
+DOUBTFUL = Qt.ItemDataRole.UserRole
 MOST_ROWS = 200
 
 
@@ -70,15 +72,18 @@ class RunPanel(QWidget):
         self._build_foot(column)
 
     def _build_task(self, column: QVBoxLayout) -> None:
-        self.title = named(QLabel(), "protocol.title", tr("What to press next"))
+        self.title = named(PlainLabel(), "protocol.title", tr("What to press next"))
         font = self.title.font()
         font.setPointSizeF(font.pointSizeF() * 1.35)
         font.setBold(True)
         self.title.setFont(font)
         self.title.setWordWrap(True)
-        self.where = named(QLabel(), "protocol.where", tr("Where to press it"))
+        self.where = named(PlainLabel(), "protocol.where", tr("Where to press it"))
         self.where.setWordWrap(True)
-        self.live = named(QLabel(), "protocol.live", tr("What the live picture shows"))
+        self.live = named(PlainLabel(), "protocol.live", tr("What the live picture shows"))
+        font = self.live.font()
+        font.setPixelSize(15)
+        self.live.setFont(font)
         self.live.setWordWrap(True)
         self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
         # Room that is always there, so that nothing below moves when a sentence changes.
@@ -126,7 +131,9 @@ class RunPanel(QWidget):
     def _build_progress(self, column: QVBoxLayout) -> None:
         self.progress = named(QProgressBar(), "protocol.progress", tr("How far the run is"))
         self.progress.setTextVisible(False)
-        self.counts = named(QLabel(), "protocol.counts", tr("Presses done, refused and measured"))
+        self.counts = named(
+            PlainLabel(), "protocol.counts", tr("Presses done, refused and measured")
+        )
         self.counts.setWordWrap(True)
         column.addWidget(self.progress)
         column.addWidget(self.counts)
@@ -184,8 +191,7 @@ class RunPanel(QWidget):
     def show_live(self, sentence: str, *, good: bool = False) -> None:
         """Say what the live picture shows."""
         self.live.setText(sentence)
-        colour = theme.colour("pass" if good else "text").name()
-        self.live.setStyleSheet(f"color: {colour}; font-size: 15px;")
+        show_meaning(self.live, "pass" if good else "")
 
     def show_progress(self, progress: RunProgress, measured: int) -> None:
         """Say how far the run is."""
@@ -217,13 +223,24 @@ class RunPanel(QWidget):
         self.last.insertRow(0)
         for column, text in enumerate(texts):
             item = QTableWidgetItem(text)
-            item.setToolTip(tip or texts[0])
+            item.setToolTip(plain_tip(tip or texts[0]))
             if column:
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             if isinstance(outcome, str) or outcome.reason:
+                item.setData(DOUBTFUL, True)
                 item.setForeground(theme.colour("warn"))
             self.last.setItem(0, column, item)
         self.last.setRowCount(min(self.last.rowCount(), MOST_ROWS))
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Take the colours of a new theme."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "last"):
+            for row in range(self.last.rowCount()):
+                for column in range(self.last.columnCount()):
+                    item = self.last.item(row, column)
+                    if item is not None and item.data(DOUBTFUL):
+                        item.setForeground(theme.colour("warn"))
 
 
 def region_name(press: PressWanted) -> str:

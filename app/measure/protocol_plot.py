@@ -8,9 +8,10 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.shell import theme
+from app.widgets.label import MarkupLabel
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
 from gelpolight_core.measurement.evaluation import (
@@ -42,7 +43,7 @@ class Fig13(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
         head = QHBoxLayout()
-        self.legend = named(QLabel(), "protocol.legend", tr("What the signs mean"))
+        self.legend = named(MarkupLabel(), "protocol.legend", tr("What the signs mean"))
         head.addWidget(self.legend, 1)
         column.addLayout(head)
         self._grid = QGridLayout()

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QProgressBar,
     QPushButton,
     QSplitter,
@@ -24,8 +23,9 @@ from PySide6.QtWidgets import (
 
 from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
-from app.shell import theme
 from app.shell.context import AppContext
+from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from gelpolight_core.measurement.evaluation import Evaluation
@@ -60,7 +60,7 @@ class ResultView(QWidget):
         column.setContentsMargins(12, 10, 12, 10)
         column.setSpacing(8)
         column.addLayout(self._build_head())
-        self.sentence = named(QLabel(), "protocol.sentence", tr("What came out"))
+        self.sentence = named(PlainLabel(), "protocol.sentence", tr("What came out"))
         self.sentence.setWordWrap(True)
         column.addWidget(self.sentence)
         self.figure = Fig13()
@@ -81,7 +81,7 @@ class ResultView(QWidget):
 
     def _build_head(self) -> QHBoxLayout:
         row = QHBoxLayout()
-        self.verdict = named(QLabel(), "protocol.verdict", tr("Verdict"))
+        self.verdict = named(PlainLabel(), "protocol.verdict", tr("Verdict"))
         font = self.verdict.font()
         font.setPointSizeF(font.pointSizeF() * 1.45)
         font.setBold(True)
@@ -107,7 +107,7 @@ class ResultView(QWidget):
     def wait(self) -> None:
         """Say that the evaluation is on its way."""
         self.verdict.setText(tr("Measuring what is not measured yet"))
-        self.verdict.setStyleSheet("")
+        show_meaning(self.verdict, "")
 
     def show_evaluation(self, evaluation: Evaluation) -> None:
         """Show what came out."""
@@ -125,7 +125,7 @@ class ResultView(QWidget):
         )
         serial = self._work.run.content.serial
         self.verdict.setText(f"{serial}: {word} ({state})")
-        self.verdict.setStyleSheet(f"color: {theme.colour(document.verdict.value).name()};")
+        show_meaning(self.verdict, document.verdict.value)
         self.sentence.setText(document.validation.sentence + ".")
         self.figure.show_evaluation(evaluation)
         self._show_tables(document)
@@ -151,7 +151,7 @@ class ResultView(QWidget):
             table = listing_table("protocol.gauge", gauge.listings[0])
             holder = QWidget()
             inside = QVBoxLayout(holder)
-            pooled = QLabel("      ".join(f"{label}: {value}" for label, value in gauge.facts))
+            pooled = PlainLabel("      ".join(f"{label}: {value}" for label, value in gauge.facts))
             named(pooled, "protocol.pooled", tr("Repeatability of all objects"))
             pooled.setWordWrap(True)
             inside.addWidget(pooled)
@@ -212,7 +212,7 @@ def listing_table(name: str, listing: Listing) -> QTableWidget:
     for i, row in enumerate(listing.rows):
         for j, cell in enumerate(row):
             item = QTableWidgetItem(cell)
-            item.setToolTip(cell)
+            item.setToolTip(plain_tip(cell))
             if _is_number(cell):
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             table.setItem(i, j, item)

@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QScrollArea,
     QSpinBox,
@@ -22,7 +21,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell import theme
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from gelpolight_core.measurement.protocol import Protocol
@@ -89,7 +89,7 @@ class ProtocolSetup(QScrollArea):
     def _build_form(self, column: QVBoxLayout) -> None:
         column.setSpacing(10)
         column.addWidget(_heading(tr("Evaluate a sensor")))
-        said = QLabel(
+        said = PlainLabel(
             tr(
                 "Press cylinders and cuboids of known size, in one region and in random ones. The"
                 " program shows where, takes each press by itself once it is steady, and compares"
@@ -140,22 +140,23 @@ class ProtocolSetup(QScrollArea):
             box.valueChanged.connect(self._count)
             counts.addRow(label, box)
         column.addLayout(counts)
-        self.summary = named(QLabel(), "protocol.summary", tr("What this comes to"))
+        self.summary = named(PlainLabel(), "protocol.summary", tr("What this comes to"))
         self.summary.setWordWrap(True)
         column.addWidget(self.summary)
         self.begin = named(QPushButton(tr("&Begin")), "protocol.begin", tr("Begin the run"))
         self.begin.setMinimumHeight(40)
         self.begin.clicked.connect(lambda: self.begin_wanted.emit(self.calibration.currentData()))
         column.addWidget(self.begin)
-        self.problem = named(QLabel(), "protocol.problem", tr("Why it was not begun"))
+        self.problem = named(PlainLabel(), "protocol.problem", tr("Why it was not begun"))
         self.problem.setWordWrap(True)
+        show_meaning(self.problem, "fail")
         self.problem.setFixedWidth(WIDTH)
         column.addWidget(self.problem)
         column.addStretch(1)
 
     def _build_runs(self, column: QVBoxLayout) -> None:
         column.addWidget(_heading(tr("Runs so far")))
-        self._no_runs = QLabel(tr("None yet. A run can be left at any press and gone on with."))
+        self._no_runs = PlainLabel(tr("None yet. A run can be left at any press and gone on with."))
         self._no_runs.setWordWrap(True)
         self._no_runs.setFixedWidth(320)
         column.addWidget(self._no_runs)
@@ -207,7 +208,6 @@ class ProtocolSetup(QScrollArea):
     def show_problem(self, sentence: str) -> None:
         """Say why nothing was begun; empty: nothing is wrong."""
         self.problem.setText(sentence)
-        self.problem.setStyleSheet(f"color: {theme.colour('fail').name()};")
 
     def _count(self) -> None:
         """Say what the choice comes to, and allow to begin where it comes to something."""
@@ -231,8 +231,8 @@ def _duration(seconds: float) -> str:
     return tr("{n:.1f} hours").format(n=seconds / 3600.0)
 
 
-def _heading(text: str) -> QLabel:
-    label = QLabel(text)
+def _heading(text: str) -> PlainLabel:
+    label = PlainLabel(text)
     font = label.font()
     font.setPointSizeF(font.pointSizeF() * 1.45)
     font.setBold(True)

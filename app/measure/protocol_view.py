@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.measure.protocol_press import PressingView
 from app.measure.protocol_result import ResultView
@@ -18,6 +18,7 @@ from app.measure.protocol_setup import KnownRun, ProtocolSetup
 from app.measure.protocol_work import Equipped, ProtocolWork, equip
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from app.widgets.source_button import SourceButton
 from gelpolight_core.calibration.file import read_calibration
@@ -73,7 +74,7 @@ class ProtocolView(QWidget):
     def _build_bar(self) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setContentsMargins(12, 6, 12, 6)
-        self.heading = named(QLabel(), "protocol.heading", tr("The run"))
+        self.heading = named(PlainLabel(), "protocol.heading", tr("The run"))
         row.addWidget(self.heading, 1)
         row.addWidget(SourceButton(context=self.context, page="protocol", none=tr("No camera")))
         return row

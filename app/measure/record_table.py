@@ -17,6 +17,7 @@ from app.measure.figures_text import value_text
 from app.measure.placing import kind_label
 from app.shell import theme
 from app.shell.icons import icon
+from app.widgets.label import plain_tip
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord, Quantity
 from gelpolight_core.records.evaluation_entry import SHAPE as EVALUATION
 from gelpolight_core.translation import tr
@@ -129,7 +130,7 @@ class RecordModel(QAbstractTableModel):
             passed = None if quantity is None else quantity.passed
             return None if passed is None else theme.colour("pass" if passed else "fail")
         if role == Qt.ItemDataRole.ToolTipRole:
-            return _tip(record)
+            return plain_tip(_tip(record))
         return None
 
 

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QHeaderView,
-    QLabel,
     QPushButton,
     QSplitter,
     QStackedWidget,
@@ -34,6 +33,7 @@ from app.measure.record_table import (
 from app.shell.actions import make_action
 from app.shell.context import AppContext
 from app.shell.icons import icon
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.statistics import Statistics, statistics_of
@@ -63,15 +63,14 @@ class ResultsView(QWidget):
         self.shape = named(QComboBox(), "measure.results.shape", tr("What was measured"))
         self.export = _button("export", tr("&Export as CSV…"), "copy")
         self.remove = _button("remove", tr("&Delete"), "remove")
-        self.count = named(QLabel(), "measure.results.count", tr("How many are shown"))
+        self.count = named(PlainLabel(), "measure.results.count", tr("How many are shown"))
         self.table = self._make_table()
-        self.statistics = named(QLabel(), "measure.results.statistics", tr("Statistics"))
+        self.statistics = named(MarkupLabel(), "measure.results.statistics", tr("Statistics"))
         self.statistics.setWordWrap(True)
-        self.statistics.setTextFormat(Qt.TextFormat.RichText)
         self.statistics.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
         self.drift = DriftPlot()
-        self.drift_title = named(QLabel(), "measure.results.drift_title", tr("Error over time"))
+        self.drift_title = named(PlainLabel(), "measure.results.drift_title", tr("Error over time"))
         self._lay_out()
         self._connect()
         self.refresh()
@@ -100,7 +99,7 @@ class ResultsView(QWidget):
         bar = QHBoxLayout()
         bar.setContentsMargins(8, 6, 8, 6)
         for text, box in ((tr("Sensor"), self.sensor), (tr("What"), self.shape)):
-            bar.addWidget(QLabel(text))
+            bar.addWidget(PlainLabel(text))
             bar.addWidget(box)
         bar.addWidget(self.count)
         bar.addStretch(1)
@@ -125,7 +124,7 @@ class ResultsView(QWidget):
         self.split.setSizes([420, 260])
         self.split.setChildrenCollapsible(False)
         empty = named(
-            QLabel(tr("Nothing is kept yet. Measure a press, then keep it in the records.")),
+            PlainLabel(tr("Nothing is kept yet. Measure a press, then keep it in the records.")),
             "measure.results.empty",
             tr("No records"),
         )
@@ -281,7 +280,7 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
     if len(group) == 1:
         note = tr("One measurement has no spread: press it again and keep that, too.")
     table = f"<table><tr><th></th>{head}</tr>{''.join(rows)}</table>"
-    return f"<b>{title}</b><br><br>{table}<br>{note}"
+    return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
 
 
 def _row(name: str, found: Statistics, errors: list[float]) -> str:
@@ -293,7 +292,7 @@ def _row(name: str, found: Statistics, errors: list[float]) -> str:
     ]
     label = f"{label.replace('_', ' ')} ({unit})"
     return (
-        f"<tr><td>{label}</td>"
+        f"<tr><td>{escaped(label)}</td>"
         + "".join(
             f"<td align='right' style='padding-left: 12px'>{cell}</td>" for cell in (*cells, error)
         )

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFormLayout,
     QFrame,
     QHeaderView,
-    QLabel,
     QLineEdit,
     QListWidget,
     QListWidgetItem,
@@ -25,8 +23,9 @@ from app.measure.figures_text import figure_text
 from app.measure.placing import kind_label
 from app.measure.truth_form import TruthForm
 from app.measure.work import Work
-from app.shell import theme
 from app.shell.icons import icon
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
+from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.translation import tr
@@ -74,7 +73,7 @@ class SidePanel(QScrollArea):
         self.remove = _button("remove", tr("Remove the tool"), "remove", tr("(Delete)"))
         self.remove.clicked.connect(self.remove_wanted)
         self.figures = _figures_table()
-        self.reason = named(QLabel(), "measure.reason", tr("Why it is doubtful"))
+        self.reason = named(PlainLabel(), "measure.reason", tr("Why it is doubtful"))
         self.reason.setWordWrap(True)
         self.truth = TruthForm()
         self.who = named(QLineEdit(), "measure.who", tr("Who measured it"))
@@ -83,7 +82,7 @@ class SidePanel(QScrollArea):
         self.keep = _button("keep", tr("&Keep in the records"), "keep", tr("(Ctrl+Return)"))
         self.keep.setMinimumHeight(36)
         self.keep.clicked.connect(self.keep_wanted)
-        self.kept = named(QLabel(), "measure.kept", tr("What was kept last"))
+        self.kept = named(MarkupLabel(), "measure.kept", tr("What was kept last"))
         self.kept.setWordWrap(True)
         self.kept.linkActivated.connect(lambda _link: self.records_wanted.emit())
         self._lay_out()
@@ -138,9 +137,8 @@ class SidePanel(QScrollArea):
 
     def say_kept(self, text: str) -> None:
         """Say that something is in the records; empty: nothing of this picture is."""
-        colour = theme.colour("pass").name()
         link = tr("Show the records")
-        words = f"<span style='color:{colour}'>{text}</span> <a href='records'>{link}</a>"
+        words = f"<span style='color:@pass'>{escaped(text)}</span> <a href='records'>{link}</a>"
         self.kept.setText(words if text else "")
 
     def _show_tools(self, work: Work) -> None:
@@ -182,7 +180,7 @@ class SidePanel(QScrollArea):
         elif measuring and found is None:
             text = tr("Measuring…")
         self.reason.setText(text)
-        self.reason.setStyleSheet(f"color: {QColor(theme.colour(role)).name()};")
+        show_meaning(self.reason, role)
 
     def _on_tool(self, item: QListWidgetItem | None) -> None:
         if item is not None and item.data(KEY) is not None:

@@ -6,7 +6,7 @@ import math
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.inspect.height_panel import HeightPanel, extent_of
 from app.inspect.look import Look
@@ -19,6 +19,7 @@ from app.measure.placing import first_places, kinds, make_tool
 from app.measure.sheet import Placed
 from app.measure.tool_layer import DrawnTool, ToolLayer
 from app.measure.work import Work
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools import ToolResult
@@ -70,8 +71,8 @@ class ToolMap(QWidget):
         self.layer = ToolLayer()
         self.view.box.addItem(self.layer, ignoreBounds=True)
         self.tools = Palette(self)
-        self.hint = named(QLabel(), "measure.hint", tr("What to do next on the map"))
-        self.readout = named(QLabel(), "measure.readout", tr("What is under the pointer"))
+        self.hint = named(PlainLabel(), "measure.hint", tr("What to do next on the map"))
+        self.readout = named(PlainLabel(), "measure.readout", tr("What is under the pointer"))
         self._lay_out()
         self._connect()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -19,7 +18,7 @@ from PySide6.QtWidgets import (
 from app.measure.figures_text import UNITS
 from app.measure.judging import Judged, Stated
 from app.measure.placing import INDENTERS
-from app.shell import theme
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
 from gelpolight_core.measurement.tools import ToolResult
@@ -58,9 +57,8 @@ class TruthForm(QGroupBox):
             QCheckBox(tr("Depth")), "measure.truth.height_on", tr("The depth is known")
         )
         self.height = _spin("measure.truth.height", tr("True depth"), 1.0)
-        self.verdict = named(QLabel(), "measure.truth.verdict", tr("Error and verdict"))
+        self.verdict = named(MarkupLabel(), "measure.truth.verdict", tr("Error and verdict"))
         self.verdict.setWordWrap(True)
-        self.verdict.setTextFormat(Qt.TextFormat.RichText)
         self._lay_out()
         for box, spin in ((self.size_on, self.size), (self.height_on, self.height)):
             spin.setEnabled(False)
@@ -184,9 +182,7 @@ class TruthForm(QGroupBox):
         """Say how far the measurement is off; no rows: what to do to learn it."""
         if not rows:
             text = tr("State what is true to see the error.") if result is not None else ""
-            self.verdict.setText(
-                f"<span style='color:{theme.colour('muted').name()}'>{text}</span>"
-            )
+            self._say(text, "muted")
             return
         self.verdict.setText("<br>".join(_sentence(row) for row in rows))
 
@@ -195,19 +191,19 @@ class TruthForm(QGroupBox):
         self._say(sentence, "fail")
 
     def _say(self, text: str, role: str) -> None:
-        self.verdict.setText(f"<span style='color:{theme.colour(role).name()}'>{text}</span>")
+        self.verdict.setText(f"<span style='color:@{role}'>{escaped(text)}</span>")
 
 
 def _sentence(row: Judged) -> str:
     role = "pass" if row.passed else "fail"
     return tr(
-        "{label}: {error:+.3f}{unit}, <b style='color:{colour}'>{percent:+.2f} %: {word}"
+        "{label}: {error:+.3f}{unit}, <b style='color:@{role}'>{percent:+.2f} %: {word}"
         " {limit:g} %</b>"
     ).format(
-        label=row.label[:1].upper() + row.label[1:],
+        label=escaped(row.label[:1].upper() + row.label[1:]),
         error=row.error,
-        unit=UNITS.get(row.unit, row.unit),
-        colour=theme.colour(role).name(),
+        unit=escaped(UNITS.get(row.unit, row.unit)),
+        role=role,
         percent=row.error_percent,
         word=tr("within") if row.passed else tr("beyond"),
         limit=row.limit_percent,

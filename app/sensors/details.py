@@ -7,7 +7,6 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QScrollArea,
     QToolButton,
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from app.sensors.model import made_cell
 from app.shell.icons import icon
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
@@ -25,6 +25,8 @@ from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.quality import Verdict, verdict_word
 from gelpolight_core.translation import tr
 
+FACT_LINES = 5
+
 
 class Details(QWidget):
     """Shows one calibration, or what to do when none is chosen."""
@@ -32,11 +34,16 @@ class Details(QWidget):
     def __init__(self, actions: tuple[QAction, ...]) -> None:
         super().__init__()
         named(self, "sensors.details", tr("Details of the calibration"))
-        self._title = named(QLabel(self), "sensors.details.title", tr("Calibration"))
-        self._facts = named(QLabel(self), "sensors.details.facts", tr("Where it comes from"))
+        self._title = named(MarkupLabel(parent=self), "sensors.details.title", tr("Calibration"))
+        self._facts = named(
+            PlainLabel(parent=self), "sensors.details.facts", tr("Where it comes from")
+        )
         for label in (self._title, self._facts):
             label.setWordWrap(True)
+            label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        # Room for all that is said of a validated one: the buttons below stay where they are.
+        self._facts.setMinimumHeight(FACT_LINES * self._facts.fontMetrics().lineSpacing())
         buttons = QHBoxLayout()
         for action in actions:
             button = named(
@@ -68,7 +75,7 @@ class Details(QWidget):
             self._facts.setText(tr("Choose a calibration to see how good it is."))
             self._area.setWidget(QWidget())
             return
-        self._title.setText(f"<h3>{entry.path.stem}</h3>")
+        self._title.setText(f"<h3>{escaped(entry.path.stem)}</h3>")
         if entry.summary is None:
             self._facts.setText(
                 tr("This file cannot be read: {reason}").format(reason=entry.broken)
@@ -98,8 +105,8 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
     row = QHBoxLayout(heading)
     row.setContentsMargins(0, 10, 0, 0)
     row.addWidget(Sign(icon(verdict.value, verdict.value), heading))
-    row.addWidget(QLabel(f"<b>{title}</b>", heading))
-    row.addWidget(QLabel(verdict_word(verdict), heading))
+    row.addWidget(MarkupLabel(f"<b>{escaped(title)}</b>", heading))
+    row.addWidget(PlainLabel(verdict_word(verdict), heading))
     row.addStretch(1)
     return heading
 

@@ -11,6 +11,7 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelInd
 
 from app.shell import theme
 from app.shell.icons import icon
+from app.widgets.label import plain_tip
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
 from gelpolight_core.quality import verdict_word
@@ -66,7 +67,7 @@ class CellsModel(QAbstractTableModel):
             case Qt.ItemDataRole.ForegroundRole if cell.role:
                 return theme.colour(cell.role)
             case Qt.ItemDataRole.ToolTipRole:
-                return cell.tip or None
+                return plain_tip(cell.tip) or None
             case Qt.ItemDataRole.AccessibleTextRole:
                 return cell.text or cell.tip
             case Qt.ItemDataRole.UserRole:

@@ -6,11 +6,13 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
 from app.sensors.model import SessionsModel
 from app.sensors.tables import CellsTable
 from app.shell.actions import make_action
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 from app.workspace.sessions import SessionEntry
 from gelpolight_core.translation import tr
@@ -47,7 +49,8 @@ class SessionsBox(QWidget):
         button.setDefaultAction(self.go_on)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        title = QLabel(f"<b>{tr('Sessions')}</b>", self)
+        title = PlainLabel(tr("Sessions"), self)
+        make_bold(title)
         title.setBuddy(self.table)
         head = QHBoxLayout()
         head.addWidget(title)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
 from app.shell.icons import application_icon
+from app.widgets.label import MarkupLabel, PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -25,10 +26,10 @@ class Welcome(QWidget):
     def __init__(self, ways: tuple[QAction, ...]) -> None:
         super().__init__()
         named(self, "sensors.welcome", tr("Welcome"))
-        sign = QLabel(self)
+        sign = PlainLabel(parent=self)
         sign.setPixmap(application_icon().pixmap(96, 96))
-        title = QLabel(f"<h1>{tr('No sensor yet')}</h1>", self)
-        text = QLabel(
+        title = MarkupLabel(f"<h1>{tr('No sensor yet')}</h1>", self)
+        text = PlainLabel(
             tr(
                 "A sensor appears here once it is calibrated. Begin with one of these, or drop a "
                 "session folder or a calibration file onto this window."

@@ -11,13 +11,13 @@ from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QVBoxLayout,
     QWidget,
 )
 
 from app.shell.icons import application_icon, icon
+from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core import __version__
 from gelpolight_core.translation import tr
@@ -59,10 +59,10 @@ class AboutDialog(QDialog):
         super().__init__(parent)
         named(self, "about", tr("About GelPoLight Studio"))
         self.setWindowTitle(tr("About GelPoLight Studio"))
-        sign = QLabel(self)
+        sign = PlainLabel(parent=self)
         sign.setPixmap(application_icon().pixmap(64, 64))
-        title = QLabel(f"<h2>GelPoLight Studio {__version__}</h2>", self)
-        what = QLabel(
+        title = MarkupLabel(f"<h2>GelPoLight Studio {__version__}</h2>", self)
+        what = PlainLabel(
             tr("Calibrates a point-lit tactile sensor, shows its depth map, and measures."), self
         )
         what.setWordWrap(True)
@@ -73,11 +73,12 @@ class AboutDialog(QDialog):
         top.addWidget(sign, 0, Qt.AlignmentFlag.AlignTop)
         top.addLayout(words, 1)
         rows = "".join(
-            f"<tr><td>{name}&nbsp;&nbsp;</td><td>{number}</td></tr>" for name, number in versions()
+            f"<tr><td>{escaped(name)}&nbsp;&nbsp;</td><td>{escaped(number)}</td></tr>"
+            for name, number in versions()
         )
-        table = named(QLabel(f"<table>{rows}</table>", self), "about.versions", tr("Versions"))
+        table = named(MarkupLabel(f"<table>{rows}</table>", self), "about.versions", tr("Versions"))
         table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        licences = QLabel(
+        licences = PlainLabel(
             tr(
                 "Licence: BSD 3-Clause. Qt and PySide6 are used under the LGPL 3; the other parts "
                 "under BSD, MIT, Apache and PSF licences of their own."

@@ -8,6 +8,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
 from app.shell.icons import icon
+from app.widgets.label import plain_tip
 
 
 def make_action(
@@ -45,7 +46,7 @@ def make_action(
     if icon_name:
         action.setIcon(icon(icon_name))
     if tip:
-        action.setToolTip(tip)
+        action.setToolTip(plain_tip(tip))
     action.triggered.connect(lambda _checked=False: slot())
     parent.addAction(action)
     return action

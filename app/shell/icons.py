@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +14,6 @@ from PySide6.QtWidgets import QApplication
 from app.shell import theme
 
 FOLDER = Path(__file__).resolve().parents[2] / "resources" / "icons"
-ROLES = ("pass", "warn", "fail", "stale", "accent", "muted")
 
 
 def icon(name: str, role: str = "") -> QIcon:
@@ -63,8 +63,14 @@ class _Engine(QIconEngine):
         _svg(name)  # a name that does not exist is told here, not while painting
 
     def clone(self) -> QIconEngine:
-        """Return a copy."""
-        return _Engine(self._name, self._role)
+        """Return a copy for Qt, which deletes it; Qt asks for one where an icon is changed.
+
+        PySide believes the copy to be Python's and would delete it with its last reference, under
+        Qt's hands. One reference more than there are keeps it, even while the program ends.
+        """
+        copy = _Engine(self._name, self._role)
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(copy))
+        return copy
 
     def _colour(self, mode: QIcon.Mode) -> QColor:
         palette = QApplication.palette()

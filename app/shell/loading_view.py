@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QProgressBar, QVBoxLayout, QWidget
 
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -17,7 +18,7 @@ class LoadingView(QWidget):
     def __init__(self) -> None:
         super().__init__()
         named(self, "main.loading", tr("A page is being loaded"))
-        self._text = named(QLabel(), "main.loading.text", tr("What is being loaded"))
+        self._text = named(PlainLabel(), "main.loading.text", tr("What is being loaded"))
         self._text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         bar = named(QProgressBar(), "main.loading.bar", tr("A page is being loaded"))
         bar.setRange(0, 0)

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QHBoxLayout,
-    QLabel,
     QPlainTextEdit,
     QPushButton,
     QVBoxLayout,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from app.shell.icons import icon
 from app.shell.log import KEPT, Log
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -62,7 +62,7 @@ class LogWindow(QDialog):
             lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log.folder)))
         )
         row = QHBoxLayout()
-        row.addWidget(QLabel(tr("Show"), self))
+        row.addWidget(PlainLabel(tr("Show"), self))
         row.addWidget(self._levels)
         row.addStretch(1)
         row.addWidget(copy)

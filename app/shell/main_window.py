@@ -41,6 +41,7 @@ from app.shell.pages import PageEntry, all_pages
 from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet
 from app.shell.status import StatusLine
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -109,7 +110,7 @@ class MainWindow(QMainWindow):
             action.setObjectName(f"navigation.{entry.name}")
             action.setCheckable(True)
             action.setShortcut(f"Ctrl+{number}")
-            action.setToolTip(f"{entry.title} (Ctrl+{number})")
+            action.setToolTip(plain_tip(f"{entry.title} (Ctrl+{number})"))
             action.triggered.connect(lambda _=False, name=entry.name: self.show_page(name))
             group.addAction(action)
             bar.addAction(action)

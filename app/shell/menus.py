@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QMenu
 
 from app.shell.actions import make_action
 from app.shell.preferences import THEME_NAMES
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -136,7 +137,7 @@ class Menus:
         sessions = self._window.context.settings.recent_sessions
         for folder in sessions:
             action = self._recent.addAction(_short(folder))
-            action.setToolTip(str(folder))
+            action.setToolTip(plain_tip(str(folder)))
             action.triggered.connect(
                 lambda _=False, folder=folder: self._window.open_session(folder)
             )

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QWidget,
@@ -21,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from app.shell.icons import icon
 from app.shell.settings import Limits, Settings
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -88,7 +88,7 @@ class PreferencesDialog(QDialog):
         row = QHBoxLayout()
         row.addWidget(self._folder, 1)
         row.addWidget(choose)
-        label = QLabel(tr("&Workspace folder"), self)
+        label = PlainLabel(tr("&Workspace folder"), self)
         label.setBuddy(self._folder)
         self._form.addRow(label, row)
 

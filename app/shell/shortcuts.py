@@ -6,10 +6,16 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QScrollArea, QVBoxLayout, QWidget
 
+from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
+
+# What a group is called where its part of the program has another name than people know.
+TITLES = {"lut": tr("Reflectance curves"), "live": tr("Live picture"), "navigation": tr("Pages")}
+# Of the window's height.
+TALL = 0.8
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +55,14 @@ class ShortcutSheet(QDialog):
         for shortcut in self.shortcuts:
             if shortcut.group != group:
                 group = shortcut.group
-                rows.append(f"<tr><td colspan=2><h4>{group.capitalize()}</h4></td></tr>")
+                title = TITLES.get(group, group.capitalize())
+                rows.append(f"<tr><td colspan=2><h4>{escaped(title)}</h4></td></tr>")
             rows.append(
-                f"<tr><td><b>{shortcut.keys}</b>&nbsp;&nbsp;&nbsp;</td><td>{shortcut.text}</td></tr>"
+                f"<tr><td><b>{escaped(shortcut.keys)}</b>&nbsp;&nbsp;&nbsp;</td>"
+                f"<td>{escaped(shortcut.text)}</td></tr>"
             )
         sheet = named(
-            QLabel(f"<table cellpadding=2>{''.join(rows)}</table>", self),
+            MarkupLabel(f"<table cellpadding=2>{''.join(rows)}</table>", self),
             "shortcuts.table",
             tr("Shortcuts"),
         )
@@ -68,4 +76,4 @@ class ShortcutSheet(QDialog):
         layout = QVBoxLayout(self)
         layout.addWidget(area)
         layout.addWidget(buttons)
-        self.resize(420, 520)
+        self.resize(420, max(520, round(TALL * window.height())))

@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QLabel, QStatusBar
+from PySide6.QtWidgets import QStatusBar
 
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 WINDOW_S = 3.0
 LEAST_HZ = 0.2
+NUMBERS = ("rate", "processing", "dropped")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,7 @@ class StatusLine(QStatusBar):
         named(self, "main.status", tr("Status"))
         self.setSizeGripEnabled(False)
         self._labels = {
-            key: named(QLabel(self), f"main.status.{key}", accessible, tip)
+            key: named(PlainLabel(parent=self), f"main.status.{key}", accessible, tip)
             for key, accessible, tip in (
                 ("camera", tr("Camera"), tr("Where the pictures come from")),
                 ("rate", tr("Frame rate"), tr("Frames a second from the camera")),
@@ -129,6 +131,9 @@ class StatusLine(QStatusBar):
             label = self._labels[key]
             label.setText(text)
             label.setVisible(bool(text))
+            if key in NUMBERS:
+                # It keeps the room of the widest number, and those beside it their place.
+                label.setMinimumWidth(max(label.minimumWidth(), label.sizeHint().width()))
 
 
 def skipped_text(rate_hz: float) -> str:

@@ -23,6 +23,7 @@ COLOURS = {
     "muted": ("#565f69", "#a6aeb8"),
     "disabled": ("#868e97", "#767e87"),
     "line": ("#c9ced4", "#3d434b"),
+    "light": ("#ffffff", "#3d434b"),
     "highlight": ("#0b5cad", "#1f62a8"),
     "highlighted": ("#ffffff", "#ffffff"),
     "accent": ("#0b5cad", "#74b5f7"),
@@ -57,6 +58,10 @@ QToolButton:hover {{ background: {alternate}; border-color: {line}; }}
 QToolButton:pressed, QToolButton:checked {{ background: {line}; }}
 QToolButton:disabled {{ color: {disabled}; }}
 QToolButton:focus {{ border: 2px solid {accent}; padding: 3px 4px; }}
+QToolButton[popupMode="2"] {{ padding-right: 18px; }}
+QToolButton[popupMode="2"]:focus {{ padding-right: 17px; }}
+QToolButton::menu-indicator {{ subcontrol-origin: padding; subcontrol-position: center right;
+    right: 4px; }}
 QCheckBox::indicator, QGroupBox::indicator, QAbstractItemView::indicator {{
     width: 14px; height: 14px; border: 1px solid {muted}; border-radius: 3px; background: {base}; }}
 QCheckBox::indicator:hover, QCheckBox::indicator:focus, QGroupBox::indicator:hover {{
@@ -109,6 +114,8 @@ def palette_for(dark: bool) -> QPalette:
         (role.Link, "accent"),
         (role.LinkVisited, "stale"),
         (role.Mid, "line"),
+        (role.Light, "light"),
+        (role.Midlight, "button"),
     ):
         palette.setColor(to, c[name])
     for to in (role.WindowText, role.Text, role.ButtonText, role.HighlightedText):

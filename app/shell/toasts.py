@@ -9,7 +9,6 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
     QPushButton,
     QSizePolicy,
     QToolButton,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from app.shell import theme
 from app.shell.icons import icon
+from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -49,11 +49,11 @@ class Toast(QWidget):
         self.kind = kind
         self.times = 1
         named(self, "toast", f"{WORDS[kind]}: {text}")
-        self._label = QLabel(text, self)
+        self._label = PlainLabel(text, self)
         self._label.setWordWrap(True)
         self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        sign = QLabel(self)
+        sign = PlainLabel(parent=self)
         self._label.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
         sign.setPixmap(icon(*ICONS[kind]).pixmap(22, 22))
         sign.setAlignment(Qt.AlignmentFlag.AlignTop)

@@ -6,6 +6,8 @@ from typing import TypeVar
 
 from PySide6.QtWidgets import QWidget
 
+from app.widgets.label import plain_tip
+
 W = TypeVar("W", bound=QWidget)
 
 
@@ -26,5 +28,5 @@ def named(widget: W, name: str, accessible: str, tip: str = "") -> W:
     widget.setObjectName(name)
     widget.setAccessibleName(accessible)
     if tip:
-        widget.setToolTip(tip)
+        widget.setToolTip(plain_tip(tip))
     return widget

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from app.shell import theme
 from app.shell.actions import make_action
 from app.shell.icons import icon
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.quality import Figure, QualityTable, Verdict, verdict_word
 from gelpolight_core.translation import tr
@@ -150,13 +151,13 @@ class QualityTableWidget(QWidget):
         verdict = self._item(row, VERDICT_COLUMN)
         word = verdict_word(figure.verdict)
         verdict.setText("" if self._narrow else word)
-        verdict.setToolTip(word)
+        verdict.setToolTip(plain_tip(word))
         verdict.setData(Qt.ItemDataRole.AccessibleTextRole, word)
         verdict.setIcon(icon(figure.verdict.value, figure.verdict.value))
         verdict.setForeground(theme.colour(figure.verdict.value))
         label = self._item(row, LABEL_COLUMN)
         label.setText(figure.label)
-        label.setToolTip(figure.label)
+        label.setToolTip(plain_tip(figure.label))
         for column, text in (
             (VALUE_COLUMN, value_text(figure)),
             (LIMIT_COLUMN, limit_text(figure)),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRect, QSize, Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
+
+from app.widgets.label import PlainLabel
 
 HIGH = 10_000
 
 
-class RoomyLabel(QLabel):
+class RoomyLabel(PlainLabel):
     """Plain text, wrapped, with room for the longest of the texts that it may show.
 
     Parameters
@@ -18,11 +20,14 @@ class RoomyLabel(QLabel):
     """
 
     def __init__(self, *texts: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(parent=parent)
         self._texts = texts or (" ",)
-        self.setTextFormat(Qt.TextFormat.PlainText)
         self.setWordWrap(True)
         self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+
+    def hasHeightForWidth(self) -> bool:
+        """Whether the height follows from the width: also while there is no text."""
+        return True
 
     def heightForWidth(self, width: int) -> int:
         """Return the height of the longest text, or of the present one where that is higher."""

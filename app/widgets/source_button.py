@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QFileDialog, QMenu, QToolButton, QWidget
 
 from app.shell.context import AppContext
 from app.sources.source import SourceInfo
+from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
@@ -71,7 +72,7 @@ class SourceButton(QToolButton):
             action.setEnabled(bool(infos))
             if infos:
                 info = infos[number]
-                action.setToolTip(info.detail)
+                action.setToolTip(plain_tip(info.detail))
                 action.triggered.connect(lambda _=False, info=info: self.use_camera(info))
         menu.insertActions(self._cameras_end, self._found)
 

@@ -87,6 +87,15 @@ def test_capturing_again_marks_what_follows_as_stale_and_recompute_is_offered(
     assert technician.state("balls") in ("pass", "warning")
 
 
+def test_without_a_camera_the_empty_picture_says_that_captures_can_be_looked_at(
+    technician: Technician, computed_project: Made
+) -> None:
+    """A session that is opened at another desk shows nothing live, and yet is not empty."""
+    technician.begin(computed_project(), "balls")
+    view = technician.wizard.pictures.view
+    assert "Click a picture below" in view._picture._placeholder.text()
+
+
 def test_leaving_a_picture_out_greys_it_and_undo_brings_it_back(
     technician: Technician, computed_project: Made, qtbot: QtBot
 ) -> None:

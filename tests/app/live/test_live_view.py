@@ -61,8 +61,8 @@ def view(qtbot: QtBot) -> LiveView:
     made = LiveView()
     qtbot.addWidget(made)
     made.resize(900, 760)
-    made.show()
-    qtbot.waitExposed(made)
+    with qtbot.waitExposed(made):
+        made.show()
     return made
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from itertools import product
@@ -77,6 +78,44 @@ def test_an_icon_made_before_follows_the_theme(qapp: QApplication, light_again: 
     light = darkest()
     theme.apply(qapp, "dark")
     assert darkest() > light + 50
+
+
+CHANGING = """
+import gc
+from PySide6.QtGui import QIcon, QPixmap
+from app.desktop import make_application
+from app.shell.icons import icon
+
+application = make_application()
+kept = []
+for number in range(200):
+    first = icon("info", "warn")
+    second = QIcon(first)
+    second.addPixmap(QPixmap(4, 4))
+    del first
+    gc.collect(0)
+    assert not second.pixmap(16, 16).isNull()
+    if number % 2:
+        kept.append(second)
+"""
+
+
+def test_icons_that_qt_copies_live_as_long_as_it_needs_them() -> None:
+    """Also while the program ends."""
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    done = subprocess.run(
+        [sys.executable, "-c", CHANGING], cwd=ROOT, capture_output=True, text=True, timeout=60,
+        env=environment,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@THEMES
+def test_no_line_between_parts_glares(dark: bool) -> None:
+    """Fusion draws the line below tabs in the palette's light colour."""
+    palette = theme.palette_for(dark)
+    line, ground = palette.color(QPalette.ColorRole.Light), palette.color(QPalette.ColorRole.Window)
+    assert theme.contrast(line, ground) < 2.0
 
 
 @pytest.mark.parametrize("name", sorted(p.stem for p in FOLDER.glob("*.svg")))

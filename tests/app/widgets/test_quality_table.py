@@ -96,8 +96,8 @@ def test_rows_can_be_copied_by_the_keyboard(widget: QualityTableWidget, qtbot: Q
         "Pass\tReprojection error\t0.2 px\t≤ 0.3 px",
         "Pass\tViews used\t16\t≥ 8",
     ]
-    widget.activateWindow()
-    qtbot.waitActive(widget)
+    with qtbot.waitActive(widget):
+        widget.activateWindow()
     widget._grid.setFocus()
     widget._grid.selectRow(1)
     qtbot.keyClick(widget._grid, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)

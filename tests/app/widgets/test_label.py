@@ -1,0 +1,125 @@
+"""Texts of strangers are shown as they are written, and colours follow the theme."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtGui import Qt, QTextDocument
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from pytestqt.qtbot import QtBot
+
+import app
+from app.shell import theme
+from app.shell.context import AppContext
+from app.shell.main_window import MainWindow
+from app.shell.status import StatusLine, StatusModel
+from app.widgets.label import MarkupLabel, PlainLabel, escaped, plain_tip
+from app.widgets.naming import named
+
+EVIL = ["<img src=x>", "<h1>Sensor 7</h1>", "a <b>bold</b> & @pass note\nof two lines", "&lt;"]
+SOURCES = sorted(Path(app.__file__).parent.rglob("*.py"))
+
+
+def seen(html: str) -> str:
+    """Return what somebody reads where Qt shows a text that it takes for HTML."""
+    document = QTextDocument()
+    document.setHtml(html)
+    return document.toPlainText()
+
+
+@pytest.fixture
+def light_again(qapp: QApplication) -> Iterator[None]:
+    yield
+    theme.apply(qapp, "light")
+
+
+@pytest.mark.parametrize("text", EVIL)
+def test_a_label_shows_a_strangers_text_as_it_is_written(text: str, qtbot: QtBot) -> None:
+    label = PlainLabel(text)
+    qtbot.addWidget(label)
+    assert label.textFormat() is Qt.TextFormat.PlainText
+    assert label.text() == text
+
+
+@pytest.mark.parametrize("text", EVIL)
+def test_markup_shows_a_strangers_text_as_it_is_written(text: str, qtbot: QtBot) -> None:
+    label = MarkupLabel(f"<b>{escaped(text)}</b>")
+    qtbot.addWidget(label)
+    assert seen(label.text()) == text
+
+
+@pytest.mark.parametrize("text", EVIL)
+def test_a_tool_tip_shows_a_strangers_text_as_it_is_written(text: str, qtbot: QtBot) -> None:
+    widget = named(QWidget(), "a", "b", text)
+    qtbot.addWidget(widget)
+    tip = widget.toolTip()
+    assert (seen(tip) if Qt.mightBeRichText(tip) else tip) == text
+    assert plain_tip("5 < 6 mm") == "5 < 6 mm"
+
+
+def test_messages_and_the_status_bar_show_them_so(context: AppContext, qtbot: QtBot) -> None:
+    window = MainWindow(context=context)
+    qtbot.addWidget(window)
+    window.show()
+    context.toasts.show(EVIL[0])
+    context.status.update(camera=EVIL[1], calibration=EVIL[0])
+    shown = [label for label in window.findChildren(QLabel) if label.text() in EVIL]
+    assert len(shown) == 3
+    assert all(label.textFormat() is Qt.TextFormat.PlainText for label in shown)
+
+
+def test_a_status_bar_has_no_other_labels(qtbot: QtBot) -> None:
+    line = StatusLine(StatusModel())
+    qtbot.addWidget(line)
+    labels = line.findChildren(QLabel)
+    assert labels and all(isinstance(label, PlainLabel) for label in labels)
+
+
+def test_coloured_words_follow_the_theme(
+    qapp: QApplication, qtbot: QtBot, light_again: None
+) -> None:
+    label = MarkupLabel("<span style='color:@pass'>good</span> @passing")
+    qtbot.addWidget(label)
+    for dark, name in enumerate(("light", "dark")):
+        theme.apply(qapp, name)
+        assert theme.COLOURS["pass"][dark] in label.text()
+        assert "@passing" in label.text()
+
+
+def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:
+    """Yield every call of a module with the last part of its name."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else ""
+            yield (node.func.id if isinstance(node.func, ast.Name) else name), node
+
+
+def is_plain(argument: ast.expr) -> bool:
+    """Whether a tool tip's text is the program's own, or made plain."""
+    if isinstance(argument, ast.Call) and isinstance(argument.func, ast.Name):
+        return argument.func.id in ("tr", "plain_tip")
+    return isinstance(argument, ast.Constant)
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
+def test_nothing_in_the_program_shows_a_text_in_another_way(source: Path) -> None:
+    """Whoever adds a label, a tip or a message box cannot forget it."""
+    if source.name == "label.py":
+        return
+    found = list(calls(ast.parse(source.read_text("utf-8"))))
+    names = {name for name, _ in found}
+    # What guesses by the look of a text whether it is HTML, or always takes it for HTML.
+    guessing = {"QLabel", "QMessageBox", "QErrorMessage", "QProgressDialog", "QTextBrowser"}
+    assert not names & (guessing | {"setHtml", "insertHtml", "setTextFormat", "setWhatsThis"})
+    assert all(is_plain(call.args[0]) for name, call in found if name == "setToolTip")
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
+def test_no_text_keeps_the_colour_of_the_theme_it_was_written_in(source: Path) -> None:
+    """A colour in a style of its own would stay after the theme is changed."""
+    for name, call in calls(ast.parse(source.read_text("utf-8"))):
+        if name == "setStyleSheet" and source.name != "theme.py":
+            assert "theme" not in ast.unparse(call), source
