@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TextIO
 
-from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPoint, Qt, QTimer
 from PySide6.QtGui import QAction, QContextMenuEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGraphicsView,
     QLineEdit,
+    QListView,
     QMenu,
     QScrollBar,
     QTabBar,
@@ -197,11 +198,11 @@ class Person:
             self._drag(widget)
 
     def _use_items(self, view: QAbstractItemView) -> None:
-        model = view.model()
-        if model is None or model.rowCount() == 0:
+        model, top = view.model(), QModelIndex()
+        if model is None or model.rowCount(top) == 0:
             return
-        row = self.random.randrange(model.rowCount())
-        index = model.index(row, self.random.randrange(max(1, model.columnCount())))
+        column = 0 if isinstance(view, QListView) else self.random.randrange(columns_of(model))
+        index = model.index(self.random.randrange(model.rowCount(top)), column, top)
         place = view.visualRect(index).center()
         if not view.viewport().rect().contains(place):
             view.scrollTo(index)
@@ -385,6 +386,11 @@ def can_be_used(widget: QWidget) -> bool:
         and not widget.visibleRegion().isEmpty()
         and may_be_used(widget.objectName())
     )
+
+
+def columns_of(model: QAbstractItemModel) -> int:
+    """Return how many columns a table has, at least one."""
+    return max(1, model.columnCount(QModelIndex()))
 
 
 def _is_dialog(widget: QWidget) -> bool:
