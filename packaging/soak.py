@@ -26,7 +26,7 @@ from pathlib import Path
 from probes import Lateness, Spent
 from PySide6.QtCore import QTimer
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog
+from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QComboBox, QDialog
 
 EVERY_S = 30.0
 RESTS_S = 3.0
@@ -181,8 +181,12 @@ class Soak:
         self._later(MEASURED_S, self._measured)
 
     def _arrange(self) -> None:
-        action = self.window.page("inspect").findChild(QAction, "inspect.layout")
-        action.trigger()
+        page = self.window.page("inspect")
+        for name in ("inspect.layout", "inspect.look_oblique"):
+            action = page.findChild(QAction, name)
+            if action is not None:
+                action.trigger()
+        page.findChild(QCheckBox, "inspect.section.region").setChecked(False)
         bench = self.window.context.source.bench
         bench.lay("ball")
         bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
