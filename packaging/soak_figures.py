@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import logging
+import math
 import os
 import threading
 import time
@@ -10,6 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from probes import Lateness, resident_mb
@@ -36,6 +39,8 @@ class Row:
 
     minutes: float
     rss_mb: float
+    held_mb: float  # what the program has asked for; the system's allocator keeps more
+    spare_mb: float  # what the allocator keeps of what was given back
     threads: int
     files: int
     widgets: int
@@ -144,6 +149,7 @@ class Look:
         row = Row(
             (time.monotonic() - began_s) / 60.0,
             resident_mb(),
+            *allocated_mb(),
             threading.active_count(),
             len(os.listdir("/proc/self/fd")),
             len(QApplication.allWidgets()),
@@ -162,6 +168,26 @@ class Look:
         )
         self._lateness.late_ms.clear()
         return row
+
+
+class _Allocated(ctypes.Structure):
+    """``struct mallinfo2`` of the GNU C library."""
+
+    _fields_: ClassVar = [
+        (name, ctypes.c_size_t)
+        for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks",
+                     "uordblks", "fordblks", "keepcost")
+    ]  # fmt: skip
+
+
+def allocated_mb() -> tuple[float, float]:
+    """Return what the allocator has given out, and what it keeps; NaN where it does not say."""
+    ask = getattr(ctypes.CDLL(None), "mallinfo2", None)
+    if ask is None:
+        return math.nan, math.nan
+    ask.restype = _Allocated
+    found = ask()
+    return (found.uordblks + found.hblkhd) / 1e6, found.fordblks / 1e6
 
 
 def disk_mb(folder: Path) -> float:
@@ -189,7 +215,17 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
     warm = [row for row in rows if row.minutes >= warm_up]
     said, wrong = [], []
     minutes = [row.minutes for row in warm]
-    for name in ("rss_mb", "threads", "files", "widgets", "objects", "timers", "windows"):
+    for name in (
+        "rss_mb",
+        "held_mb",
+        "spare_mb",
+        "threads",
+        "files",
+        "widgets",
+        "objects",
+        "timers",
+        "windows",
+    ):
         values = [float(getattr(row, name)) for row in warm]
         slope, low, high = trend(minutes, values)
         said.append(
