@@ -108,7 +108,7 @@ class Soak:
         self.person.rest()
         self.person.note("rest")
         self._rests_by_s = time.monotonic() + LONGEST_UNREST_S
-        self._shown_before = self.counts.shown
+        self._shown_before, self._arranged = self.counts.shown, False
         self._settle()
 
     def _settle(self) -> None:
@@ -164,8 +164,13 @@ class Soak:
             source.choose_virtual_sensor()
         if page.link.stream is not None and page.link.stream.figures().lost:
             page.link.open()
+        if not self._arranged:
+            self._arranged = True
+            self._arrange()
         if self.counts.shown - self._shown_before < 5:
             return "nothing is shown"
+        if page.link.last is None or not page.link.last.frame.settled:
+            return "the pictures do not settle"
         return ""
 
     def _trouble(self, sentence: str) -> None:
@@ -176,7 +181,6 @@ class Soak:
     def _measure(self) -> None:
         from soak_figures import Look
 
-        self._arrange()
         self._looked = Look(self.counts, self.lateness)
         self._later(MEASURED_S, self._measured)
 
@@ -226,6 +230,8 @@ def conclude(soak: Soak, status: int, hung: Path) -> bool:
     print(f"threads at the end: {', '.join(left) or 'none but the first'}")
     for text, count in soak.log.warnings.most_common():
         print(f"warning, {count} times: {text}")
+    for text, count in soak.log.told.most_common():
+        print(f"told, {count} times: {text}")
     print("\n".join(said))
     print("\n".join(f"WRONG: {sentence}" for sentence in wrong) or "Nothing is wrong.")
     return not wrong

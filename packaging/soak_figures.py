@@ -31,6 +31,11 @@ WARM_UP_S = 600.0
 WARM_UP_SHARE = 0.2
 MOST_GROWTH_MB_PER_H = 30.0
 LEAST_RATE = 0.9
+# What a person is told that something cannot be done is no error of the program.
+TOLD, FAULT = " app.shell.toasts: ", "fault of this program"
+COUNTED = (
+    "rss_mb", "held_mb", "spare_mb", "threads", "files", "widgets", "objects", "timers", "windows",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,13 +114,16 @@ class LogWatch:
     def __init__(self, log: Log) -> None:
         self._log, self._seen = log, 0
         self.errors: list[str] = []
+        self.told: Counter[str] = Counter()
         self.warnings: Counter[str] = Counter()
 
     def look(self) -> None:
         """Take what is new."""
         for record in self._log.recent.since(self._seen):
             self._seen = record.number
-            if record.level >= logging.ERROR:
+            if TOLD in record.text and FAULT not in record.text:
+                self.told[record.text.partition(TOLD)[2].strip()[:200]] += 1
+            elif record.level >= logging.ERROR:
                 self.errors.append(record.text)
             elif record.level >= logging.WARNING:
                 # After the time, the level and the thread's name.
