@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QCloseEvent, QShowEvent
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QCheckBox,
@@ -295,14 +295,10 @@ class PrecisionDialog(QDialog):
         self.stop.setEnabled(busy)
         self.save.setEnabled(bool(self.points) and not busy)
 
-    def closeEvent(self, event: QCloseEvent) -> None:
-        """Measure no longer."""
-        self.jobs.close()
-        super().closeEvent(event)
-
     def reject(self) -> None:
-        """Close by Escape, as by the window's own button."""
-        self.close()
+        """Measure no longer; Qt comes here from Escape and from every way of closing."""
+        self.jobs.close()
+        super().reject()
 
 
 def _digits(value: float) -> str:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QSize, Qt, QUrl
+from PySide6.QtCore import QSize, Qt, QTimer, QUrl
 from PySide6.QtGui import (
     QAction,
     QActionGroup,
@@ -36,6 +36,7 @@ from app.shell.icons import icon
 from app.shell.loader import Loader
 from app.shell.loading_view import LoadingView
 from app.shell.log_window import LogWindow
+from app.shell.memory import give_back
 from app.shell.menus import Menus
 from app.shell.pages import PageEntry, all_pages
 from app.shell.preferences import PreferencesDialog
@@ -52,6 +53,8 @@ SOURCES = ("app.sources.listing", "app.sources.bench")
 FIRST_SIZE = QSize(1280, 800)
 # Raised when toolbars change, so that an older layout is not forced onto a newer window.
 LAYOUT_VERSION = 1
+# After another page is shown: what the one before had is let go by then.
+TIDY_MS = 3000
 
 
 class MainWindow(QMainWindow):
@@ -95,6 +98,10 @@ class MainWindow(QMainWindow):
         requests.begin_demo.connect(self.begin_demo)
         context.source.changed.connect(self._remember_source)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
+        self._tidy = QTimer(self)
+        self._tidy.setSingleShot(True)
+        self._tidy.setInterval(TIDY_MS)
+        self._tidy.timeout.connect(give_back)
         self._restore_layout()
 
     def _build_navigation(self) -> dict[str, QAction]:
@@ -182,6 +189,7 @@ class MainWindow(QMainWindow):
         _call(before, "leave")
         self._stack.setCurrentWidget(after)
         _call(after, "enter")
+        self._tidy.start()
 
     def open_path_in(self, name: str, path: str) -> None:
         """Show a page and let it open a folder or file."""
@@ -342,6 +350,7 @@ class MainWindow(QMainWindow):
         settings.keep_window_state(self.saveGeometry(), self.saveState(LAYOUT_VERSION))
         settings.save()
         self.loader.stop()
+        self._tidy.stop()
         self.context.toasts.clear()
         for page in self._made.values():
             page.close()

@@ -253,7 +253,11 @@ class Workspace:
         target = _copy_new(source, folder / f"{folder_name(source.stem)}{ENDING}")
         beside = validation_path(source)
         if beside.is_file():
-            _copy(beside, validation_path(target))
+            try:
+                _copy(beside, validation_path(target))
+            except InputError:
+                target.unlink(missing_ok=True)
+                raise
         return target
 
     def remove(self, path: Path) -> Removal:

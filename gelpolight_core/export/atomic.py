@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import secrets
@@ -129,7 +130,11 @@ def _place_new(temporary: Path, target: Path) -> None:
         raise
     except OSError:  # a disk without links: the name is taken first
         target.open("xb").close()
-        os.replace(temporary, target)
+        try:
+            os.replace(temporary, target)
+        except OSError:
+            target.unlink(missing_ok=True)
+            raise
     else:
         temporary.unlink()
 
@@ -153,6 +158,20 @@ def _write_and_place(
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+    sync_folder(target.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names in a folder to the disk: without, a power cut takes away a new file whole."""
+    if os.name != "posix":
+        return  # no other system opens folders
+    # Some network disks refuse this; the files' bytes are safe all the same.
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def cannot_write(error: OSError, path: Path) -> InputError:

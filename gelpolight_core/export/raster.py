@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 import zlib
@@ -83,8 +84,10 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
     import tifffile
 
     per_centimetre = 10.0 / heightmap.pitch_mm
+    # Not into the file: NumPy's own writing does not say when the disk is full.
+    held = io.BytesIO()
     tifffile.imwrite(
-        file,
+        held,
         heightmap.depth_mm.astype(np.float32, copy=False),
         byteorder="<",
         photometric="minisblack",
@@ -94,6 +97,7 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
         metadata=None,
         software="GelPoLight Studio",
     )
+    file.write(held.getbuffer())
 
 
 def write_png16(heightmap: HeightMap, file: BinaryIO) -> None:

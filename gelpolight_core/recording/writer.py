@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import time
@@ -11,7 +12,7 @@ from types import TracebackType
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import cannot_write
+from gelpolight_core.export.atomic import cannot_write, sync_folder
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.pixels import pack_pixels
 from gelpolight_core.recording.recording import VERSION, RecordingHeader, Rgb
@@ -69,6 +70,7 @@ class RecordingWriter:
         try:
             self._append(head)
             self._sync()
+            sync_folder(path.parent)
         except InputError:
             os.close(self._file)
             path.unlink()
@@ -169,7 +171,9 @@ class RecordingWriter:
             self._write(data, self.size_bytes)
         except InputError:
             assert self._file is not None
-            os.ftruncate(self._file, self.size_bytes)  # the part of a frame is of no use
+            # The part of a frame is of no use, and does no harm where the disk lets it not go.
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self.size_bytes)
             raise
         self.size_bytes += len(data)
 

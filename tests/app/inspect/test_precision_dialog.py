@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.inspect import precision_dialog
@@ -97,3 +99,40 @@ def test_a_calibration_is_measured_by_the_ways_that_people_choose_between(
     assert all(p.median_ms and p.rms_um for p in points)
     assert {m.name for m in chosen_methods(False)} == set(USUAL)
     assert len(chosen_methods(True)) > len(USUAL)
+
+
+@pytest.mark.parametrize("way", ["escape", "close"])
+def test_it_goes_away_when_it_is_closed_and_can_be_shown_again(
+    dialog: PrecisionDialog, way: str, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
+    for _ in range(2):
+        if way == "escape":
+            qtbot.keyClick(dialog, Qt.Key.Key_Escape)
+        else:
+            dialog.close()
+        assert not dialog.isVisible()
+        dialog.show()
+    dialog.start.click()
+    qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
+
+
+def test_closing_it_ends_what_is_measured(
+    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    begun = threading.Event()
+
+    def measure(*_arguments: object, progress: Callable[..., object], **_: object) -> object:
+        begun.set()
+        while True:
+            progress("press", 0.5)
+
+    monkeypatch.setattr(precision_dialog, "measure_virtual", measure)
+    dialog.start.click()
+    assert begun.wait(20.0)
+    qtbot.keyClick(dialog, Qt.Key.Key_Escape)
+    assert not dialog.isVisible()
+    assert not dialog.jobs.busy
+    dialog.show()
+    assert dialog.start.isEnabled()
+    assert not dialog.stop.isEnabled()

@@ -1,0 +1,279 @@
+"""Let a random person use the program for an hour, and print whether it bears that.
+
+    xvfb-run -a -s "-screen 0 1920x1200x24" python packaging/soak.py --minutes 60 --seed 1
+    ... --calibration sensor.gplcal    of the virtual sensor; without it there is no live depth
+
+The real program runs on the virtual sensor, whose camera makes 15 frames a second. Every half
+minute it is brought to the same state and left in peace for some seconds, in which it is measured:
+memory, threads, open files, objects and timers, frames made, processed and shown in a second, how
+late the user interface is, what the log says, and the room on disk. Every action is written to
+actions.log in the scratch folder. The exit status is 1 where memory grows, the rate drifts, or the
+log holds an error; the files are kept then.
+"""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from probes import Lateness, Spent
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QComboBox, QDialog
+
+EVERY_S = 30.0
+RESTS_S = 3.0
+MEASURED_S = 6.0
+# A rest that is not reached by then is a fault.
+LONGEST_UNREST_S = 40.0
+HUNG_S = 60.0
+LOOK_MS = 100
+RATE_HZ = 15.0
+KEPT_RECORDINGS = 4
+SIZE = 1400, 900
+
+
+class Soak:
+    """Acts and rests by turns until the time is over.
+
+    Parameters
+    ----------
+    options : Namespace
+        Of the command.
+    scratch : Path
+        Folder for everything that is written.
+    hung : file
+        Takes where the program hangs.
+    """
+
+    def __init__(self, options: argparse.Namespace, scratch: Path, hung: int) -> None:
+        # Heavy, and only after the folders of the user are set.
+        from soak_figures import HEAD, Counts
+
+        self.options, self.scratch, self._hung = options, scratch, hung
+        self.rows: list = []
+        self.troubles: list[str] = []
+        self.counts = Counts()
+        self.spent = Spent()
+        self._began_s = time.monotonic()
+        print(HEAD, flush=True)
+
+    def begin(self) -> None:
+        """Take the window, and let a person come."""
+        from soak_figures import LogWatch
+        from soak_person import Person
+
+        from app.shell.main_window import MainWindow
+        from app.sources.bench import Bench
+
+        windows = QApplication.topLevelWidgets()
+        self.window = next(w for w in windows if isinstance(w, MainWindow))
+        context = self.window.context
+        self.log = LogWatch(context.log)
+        (self.scratch / "saved").mkdir()
+        self._actions = (self.scratch / "actions.log").open("w", encoding="utf-8")
+        self.person = Person(self.window, self.scratch, self._actions, self.options.seed)
+        context.source.bench = Bench()
+        context.source.bench.adjust(rate_hz=RATE_HZ)
+        if self.options.calibration is not None:
+            context.workspace.use(context.workspace.import_calibration(self.options.calibration))
+        self.window.show_page("inspect")
+        self.lateness = Lateness()
+        self._watched = False
+        self._look_after = QTimer(self.window)
+        self._look_after.timeout.connect(self._still_alive)
+        self._look_after.start(1000)
+        self._rest()
+
+    def _still_alive(self) -> None:
+        faulthandler.dump_traceback_later(HUNG_S, file=self._hung)
+
+    def _later(self, seconds: float, what: object) -> None:
+        QTimer.singleShot(int(1e3 * seconds), self.window, what)
+
+    def _work(self) -> None:
+        self.person.begin()
+        self._later(EVERY_S - RESTS_S - MEASURED_S, self._rest)
+
+    # Rest
+
+    def _rest(self) -> None:
+        self.person.rest()
+        self.person.note("rest")
+        self._rests_by_s = time.monotonic() + LONGEST_UNREST_S
+        self._shown_before, self._arranged = self.counts.shown, False
+        self._settle()
+
+    def _settle(self) -> None:
+        """Close what is open, one thing at a time, until the program looks as at every rest."""
+        undone = self._undone()
+        if undone and time.monotonic() < self._rests_by_s:
+            self._later(1e-3 * LOOK_MS, self._settle)
+            return
+        if undone:
+            self._trouble(f"it does not come to rest: {undone}")
+        self._later(RESTS_S, self._measure)
+
+    def _undone(self) -> str:
+        """Do the next thing that is not as at rest; return what it is, empty when all is."""
+        popup = QApplication.activePopupWidget()
+        if popup is not None:
+            popup.close()
+            return "a menu is open"
+        dialogs = [w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog)]
+        dialogs = [w for w in dialogs if w.isVisible()]
+        if dialogs:
+            (QApplication.activeModalWidget() or dialogs[-1]).close()
+            return f"the dialog {dialogs[-1].objectName() or dialogs[-1].windowTitle()} is open"
+        if self.window.page_name != "inspect":
+            self.person.press("navigation.button.inspect")
+            return f"the page is {self.window.page_name or 'being loaded'}"
+        return self._undone_at_inspect()
+
+    def _undone_at_inspect(self) -> str:
+        page, source = self.window.page("inspect"), self.window.context.source
+        if not self._watched:
+            self._watched = True
+            self.counts.watch(page)
+        if page.recorder.busy:
+            page.recorder.stop()
+            return "it records"
+        if self.window.isFullScreen() or (self.window.width(), self.window.height()) != SIZE:
+            self.window.showNormal()
+            self.window.resize(*SIZE)
+        if page.link.paused:
+            page.pause_action.trigger()
+        for name in ("inspect.stop", "precision.stop"):
+            for button in self.window.findChildren(QAbstractButton, name):
+                if button.isVisible():
+                    button.click()
+        ways = page.findChild(QComboBox, "inspect.way")
+        if ways is not None and ways.isEnabled() and ways.currentIndex() != 0:
+            ways.setCurrentIndex(0)
+            ways.activated.emit(0)
+        for fault in tuple(source.bench.conditions.faults):
+            source.bench.switch(fault, False)
+        if source.info is None or source.info.kind != "virtual":
+            source.choose_virtual_sensor()
+        if page.link.stream is not None and page.link.stream.figures().lost:
+            page.link.open()
+        if not self._arranged:
+            self._arranged = True
+            self._arrange()
+        if self.counts.shown - self._shown_before < 5:
+            return "nothing is shown"
+        if page.link.last is None or not page.link.last.frame.settled:
+            return "the pictures do not settle"
+        return ""
+
+    def _trouble(self, sentence: str) -> None:
+        where = f"after {(time.monotonic() - self._began_s) / 60.0:.1f} minutes"
+        self.troubles.append(f"{where}: {sentence}")
+        print(self.troubles[-1], flush=True)
+
+    def _measure(self) -> None:
+        from soak_figures import Look
+
+        self._looked = Look(self.counts, self.lateness)
+        self._later(MEASURED_S, self._measured)
+
+    def _arrange(self) -> None:
+        page = self.window.page("inspect")
+        for name in ("inspect.layout", "inspect.look_oblique"):
+            action = page.findChild(QAction, name)
+            if action is not None:
+                action.trigger()
+        page.findChild(QCheckBox, "inspect.section.region").setChecked(False)
+        bench = self.window.context.source.bench
+        bench.lay("ball")
+        bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
+
+    def _measured(self) -> None:
+        self.rows.append(self._looked.row(self._began_s, self.log, self.scratch))
+        print(self.rows[-1].told(), flush=True)
+        self._forget_recordings()
+        if self.rows[-1].minutes >= self.options.minutes:
+            self.lateness.timer.stop()
+            self._look_after.stop()
+            self.log.look()
+            self.person.note("close")
+            self.window.close()
+            return
+        self._work()
+
+    def _forget_recordings(self) -> None:
+        found = sorted(self.scratch.rglob("*.gplrec"), key=lambda path: path.stat().st_mtime)
+        for path in found[:-KEPT_RECORDINGS]:
+            path.unlink()
+
+
+def conclude(soak: Soak, status: int, hung: Path) -> bool:
+    """Print what came out; return whether all is well."""
+    from soak_figures import conclude as conclude_figures
+
+    said, wrong = conclude_figures(soak.rows)
+    wrong += soak.troubles
+    wrong += [f"in the log: {text}" for text in soak.log.errors]
+    if status != 0:
+        wrong.append(f"the program's exit status is {status}")
+    if hung.stat().st_size:
+        wrong.append(f"it hung for {HUNG_S:.0f} s:\n{hung.read_text()}")
+    left = [t.name for t in threading.enumerate() if t is not threading.main_thread()]
+    print(f"{soak.person.actions} actions in {len(soak.rows)} rounds; {soak.spent.told()}")
+    print(f"threads at the end: {', '.join(left) or 'none but the first'}")
+    for text, count in soak.log.warnings.most_common():
+        print(f"warning, {count} times: {text}")
+    for text, count in soak.log.told.most_common():
+        print(f"told, {count} times: {text}")
+    print("\n".join(said))
+    print("\n".join(f"WRONG: {sentence}" for sentence in wrong) or "Nothing is wrong.")
+    return not wrong
+
+
+def main() -> None:
+    """Run the program, and exit with 1 where something is wrong."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=0, help="of the actions")
+    parser.add_argument("--calibration", type=Path, help="of the virtual sensor")
+    parser.add_argument("--scratch", type=Path, help="folder for all that is written, kept")
+    options = parser.parse_args()
+    scratch = options.scratch or Path(tempfile.mkdtemp(prefix="gelpolight-soak-"))
+    scratch.mkdir(parents=True, exist_ok=True)
+    for variable, folder in (
+        ("HOME", "."),
+        ("XDG_CONFIG_HOME", "config"),
+        ("XDG_DATA_HOME", "data"),
+        ("XDG_STATE_HOME", "state"),
+        ("XDG_CACHE_HOME", "cache"),
+        ("XDG_DOCUMENTS_DIR", "documents"),
+    ):
+        (scratch / folder).mkdir(exist_ok=True)
+        os.environ[variable] = str(scratch / folder)
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+    from app import desktop
+
+    hung = scratch / "hung.log"
+    application = desktop.make_application()
+    with hung.open("w") as place:
+        soak = Soak(options, scratch, place.fileno())
+        QTimer.singleShot(2000, application, soak.begin)
+        status = desktop.run([])
+        faulthandler.cancel_dump_traceback_later()
+    well = conclude(soak, status, hung)
+    if well and options.scratch is None:
+        shutil.rmtree(scratch)
+    else:
+        print(f"kept: {scratch}")
+    sys.exit(0 if well else 1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,212 @@
+"""Every kind of file that the program writes: how an older and a newer one of it are written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+import scene
+from recorded import noisy
+
+from app.workspace.indenters import first_indenters, write_indenters
+from app.workspace.validation import Comparison, Validation, write_validation
+from app.workspace.workspace import Workspace
+from gelpolight_core.batch.ledger import BatchLedger, FrameRow
+from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
+from gelpolight_core.batch.summary import write_summary
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.export.board_page import write_board
+from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
+from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.profile import take_profile
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_file import ProtocolFile, write_protocol_file
+from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.table import write_csv
+from gelpolight_core.report.build import calibration_report
+from gelpolight_core.report.document import Report
+from gelpolight_core.report.file import write_report
+from gelpolight_core.session.capture import write_picture
+from gelpolight_core.session.decisions import Decisions, write_decisions
+from gelpolight_core.session.description import write_description
+from gelpolight_core.session.session import BoardSpec, Session, read_session
+from gelpolight_core.simulation.session import session_toml
+
+RECORD = MeasurementRecord("A", "c", "ball", (Quantity("diameter_mm", 3.0, 0.1, 3.0),))
+TRIAL = Validation("c", "2026-01-02", "me", "ball", (Comparison("height", 1.0, 1.0, 8.0),))
+
+
+@dataclass(frozen=True)
+class Written:
+    """A kind of file.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    write : callable
+        Writes the file into a folder: the older one (0) or the newer one (1), which is another.
+    """
+
+    name: str
+    write: Callable[[Path, int], object]
+
+
+def _workspace(folder: Path, which: int) -> None:
+    workspace = Workspace(folder)
+    path = workspace.sensor_folder("T-1") / "c.gplcal"
+    if not path.exists():
+        path.parent.mkdir(parents=True)
+        write_calibration(calibration(), path)
+    workspace.use(path if which else None)
+
+
+def _import(folder: Path, which: int) -> None:
+    source = folder / "elsewhere" / f"{which}.gplcal"
+    for k in (0, 1):
+        path = folder / "elsewhere" / f"{k}.gplcal"
+        if not path.exists():
+            path.parent.mkdir(exist_ok=True)
+            sensor = replace(calibration().sensor, serial=f"S-{k}")
+            write_calibration(replace(calibration(), sensor=sensor), path)
+            write_validation(TRIAL, path)
+    (folder / "library" / "sensors" / "S-1").mkdir(parents=True, exist_ok=True)
+    Workspace(folder / "library").import_calibration(source)
+
+
+def _session(folder: Path) -> Session:
+    if not (folder / "session.toml").exists():
+        (folder / "session.toml").write_text(session_toml(SensorDesign()))
+    return read_session(folder)
+
+
+def _description(folder: Path, which: int) -> None:
+    session = _session(folder)
+    write_description(replace(session, ball_radii_mm={f"ball_{k}.png": 2.0 for k in range(which)}))
+
+
+def _decisions(folder: Path, which: int) -> None:
+    write_decisions(Decisions(frozenset({f"balls/{which}.png"})), folder)
+
+
+def _capture(folder: Path, which: int) -> None:
+    write_picture(noisy(which), folder / "balls" / f"ball_{which}.png", new=True, inside=folder)
+
+
+def _heights(name: str, folder: Path, which: int) -> None:
+    write_heightmap(heightmap(0.5 + which), folder, formats=[name])
+
+
+def _profile(folder: Path, which: int) -> None:
+    write_profile(take_profile(heightmap(0.5 + which), (-1.0, 0.0), (1.0, 0.0)), folder / "p.csv")
+
+
+def _table(folder: Path, which: int) -> None:
+    write_csv([replace(RECORD, note=f"note {which}")] * 3, folder / "records.csv")
+
+
+def _report(ending: str, folder: Path, which: int) -> None:
+    write_report(replace(report(), title=f"Report {which}"), folder / f"report.{ending}")
+
+
+def _board(folder: Path, which: int) -> None:
+    write_board(BoardSpec((9 - which, 6), 3.0), folder / "board.pdf")
+
+
+def _protocol(folder: Path, which: int) -> None:
+    write_protocol_file(ProtocolFile(Protocol(repeats=1 + which, regions=2), "A", "c"), folder)
+
+
+def _press(folder: Path, which: int) -> None:
+    if not which:
+        begin_run(folder, Protocol(repeats=1, regions=2), serial="A", calibration="c")
+    run = open_run(folder)
+    run.accept(run.wanted[which], [noisy(which)])
+
+
+def _refusal(folder: Path, which: int) -> None:
+    if not which:
+        begin_run(folder, Protocol(repeats=1, regions=2), serial="A", calibration="c")
+    run = open_run(folder)
+    run.refuse(run.wanted[which], "nothing is pressed")
+
+
+def _ledger(folder: Path, which: int) -> None:
+    Ledger(folder / "measured.jsonl", "c").keep(f"k{which}", "no object is pressed")
+
+
+def _rows(folder: Path, which: int) -> None:
+    BatchLedger(folder / "frames.jsonl").keep([FrameRow(f"a{which}", "s", "a.png")])
+
+
+def _summary(folder: Path, which: int) -> None:
+    path = folder / "frames.jsonl"
+    if not path.exists():
+        BatchLedger(path).keep([FrameRow(f"a{k}", "s", "a.png") for k in range(3)])
+    write_summary(BatchLedger(path), folder, measured=bool(which))
+
+
+def _settings(folder: Path, which: int) -> None:
+    (folder / f"{which}").mkdir(exist_ok=True)
+    settings = BatchSettings(folder / "c", "c", "full", "fast", ("npz",), program=str(which))
+    begin_or_go_on(settings, folder / f"{which}")
+
+
+@cache
+def calibration() -> Calibration:
+    """Return a calibration of a small sensor."""
+    return scene.calibration()
+
+
+@cache
+def report() -> Report:
+    """Return its report, of the first page only."""
+    return replace(calibration_report(calibration()), sections=())
+
+
+def heightmap(depth_mm: float) -> HeightMap:
+    """Return a small dent."""
+    x_mm = np.linspace(-1.5, 1.5, 25)
+    x, y = np.meshgrid(x_mm, x_mm)
+    normals = np.zeros((*x.shape, 3), np.float32)
+    normals[..., 2] = -1.0
+    depth = (depth_mm * np.exp(-(x**2) - y**2)).astype(np.float32)
+    return HeightMap(
+        depth_mm=depth, x_mm=x_mm, y_mm=x_mm, pitch_mm=0.125, normals=normals,
+        flags=np.zeros(x.shape, np.uint8), calibration_id="c", model="full", source="press.png",
+    )  # fmt: skip
+
+
+KINDS = (
+    Written("calibration", lambda f, k: write_calibration(
+        replace(calibration(), noise=np.full(3, 1e-3 * (k + 1))), f / "c.gplcal")),
+    Written("library", _import),
+    Written("calibration in use", _workspace),
+    Written("validation", lambda f, k: write_validation(
+        replace(TRIAL, indenter=f"ball {k}"), f / "c.gplcal")),
+    Written("indenters", lambda f, k: write_indenters(first_indenters()[k:], f)),
+    Written("session", _description),
+    Written("decisions", _decisions),
+    Written("capture", _capture),
+    *(Written(f"heights as {name}", partial(_heights, name)) for name in FORMATS),
+    Written("profile", _profile),
+    Written("table of records", _table),
+    Written("report as HTML", partial(_report, "html")),
+    Written("report as PDF", partial(_report, "pdf")),
+    Written("board", _board),
+    Written("protocol", _protocol),
+    Written("press of a protocol", _press),
+    Written("refusal of a press", _refusal),
+    Written("measurements of a run", _ledger),
+    Written("frames of a batch", _rows),
+    Written("summary of a batch", _summary),
+    Written("settings of a batch", _settings),
+)  # fmt: skip
