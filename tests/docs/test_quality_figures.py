@@ -17,6 +17,7 @@ from chapter import DOCS
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.quality import Figure
+from gelpolight_core.reconstruction.heightmap import FLAG_NAMES
 
 ROOT = DOCS.parent
 NOTHING = "\N{EN DASH}"
@@ -56,6 +57,9 @@ NOTES = {
     "FLAGGED_SHARE": "gelpolight_core/measurement/tool.py",
     "PRESSED_SHARE": "gelpolight_core/measurement/steadiness.py",
     "CONTACT_CHANGE": "gelpolight_core/measurement/steadiness.py",
+    "SATURATED_WARN": "app/live/picture_checks.py",
+    "SATURATED_FAIL": "app/live/picture_checks.py",
+    "DARK_SHARE_OF_SCALE": "app/live/picture_checks.py",
 }
 
 
@@ -233,3 +237,20 @@ def test_notes_and_doubts_are_stated_with_the_limits_of_the_source(name: str) ->
     before = CHAPTER[: CHAPTER.index(f"`{name}`")]
     sentence = before[before.rindex("|") :] if "|" in before[-120:] else before[-120:]
     assert re.search(rf"(?<![\d.]){re.escape(percent)}", sentence), (name, percent, sentence)
+
+
+def test_the_limits_of_a_validation_are_those_of_a_new_installation() -> None:
+    """The chapter says when a calibration counts as validated, and when as old."""
+    # By its text: the module needs a window library, which this folder does without.
+    source = (ROOT / "app/shell/settings.py").read_text("utf-8")
+    limit = {k: float(v) for k, v in re.findall(r"^    (\w+): float = ([\d.]+)$", source, re.M)}
+    text = " ".join(CHAPTER.split())
+    assert f"height is right to {limit['height_percent']:g} % and its size to" in text
+    assert f"its size to {limit['size_percent']:g} %" in text
+    assert f"older than {limit['age_days']:g} days" in text
+
+
+@pytest.mark.parametrize("flag", FLAG_NAMES)
+def test_every_flag_is_explained(flag: str) -> None:
+    """People meet the flags in files and in Inspect."""
+    assert f"| `{flag}` |" in CHAPTER
