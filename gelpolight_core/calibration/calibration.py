@@ -248,7 +248,20 @@ class Calibration:
 
 
 def sensor_stack(sensor: SensorData, plane: TopPlane) -> LayerStack:
-    """Return the layers of a sensor below its measured top surface."""
+    """Return the layers of a sensor below its measured top surface.
+
+    Parameters
+    ----------
+    sensor : SensorData
+        Thicknesses and indices, as its maker states them.
+    plane : TopPlane
+        The top surface.
+
+    Raises
+    ------
+    InputError
+        If the layers are thicker than the distance to the camera.
+    """
     return build_stack(
         plane.distance_mm,
         elastomer_thickness_mm=sensor.elastomer_thickness_mm,

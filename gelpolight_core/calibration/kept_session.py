@@ -135,6 +135,13 @@ class KeptSession:
         """Leave out pictures that came together, as if they had not.
 
         What they had taken the place of is in use again. The pictures themselves stay.
+
+        Parameters
+        ----------
+        stage : Stage
+            Whose.
+        names : sequence of str
+            File names.
         """
         with self._lock:
             taken, former = self._taken(stage, names)
@@ -144,7 +151,13 @@ class KeptSession:
             self.decide(replace(now, excluded=excluded, spots_px=spots))
 
     def take_again(self, stage: Stage, names: Sequence[str]) -> None:
-        """Take in what was taken back."""
+        """Take in what was taken back.
+
+        Parameters
+        ----------
+        stage, names
+            As for :meth:`take_back`.
+        """
         with self._lock:
             taken, former = self._taken(stage, names)
             now = self._session.decisions
@@ -198,7 +211,17 @@ class KeptSession:
             self._session = replace(self._session, decisions=decisions)
 
     def exclude(self, stage: Stage, name: str, excluded: bool = True) -> None:
-        """Leave a picture out, or take it in again."""
+        """Leave a picture out, or take it in again.
+
+        Parameters
+        ----------
+        stage : Stage
+            Whose picture.
+        name : str
+            Its file name.
+        excluded : bool, optional
+            False: take it in again.
+        """
         with self._lock:
             key = f"{FOLDERS[stage]}/{name}"
             names = self._session.decisions.excluded
@@ -206,13 +229,29 @@ class KeptSession:
             self.decide(replace(self._session.decisions, excluded=names))
 
     def place_spot(self, led: int, place: Point | None) -> None:
-        """Set an LED's mirror spot by hand; None goes back to what was detected."""
+        """Set an LED's mirror spot by hand; None goes back to what was detected.
+
+        Parameters
+        ----------
+        led : int
+            0, 1, 2: red, green, blue.
+        place : (u, v) or None
+            In pixels of the mirror's picture.
+        """
         with self._lock:
             spots = _with(self._session.decisions.spots_px, led, place)
             self.decide(replace(self._session.decisions, spots_px=spots))
 
     def place_ball(self, name: str, circle: PlacedCircle | None) -> None:
-        """Set the contact in a picture of a ball by hand; None goes back to what was detected."""
+        """Set the contact in a picture of a ball by hand; None goes back to what was detected.
+
+        Parameters
+        ----------
+        name : str
+            The picture's file name.
+        circle : PlacedCircle or None
+            In pixels of the raw picture.
+        """
         with self._lock:
             balls = _with(self._session.decisions.balls, name, circle)
             self.decide(replace(self._session.decisions, balls=balls))
@@ -244,7 +283,15 @@ class KeptSession:
                 self._describe(replace(self._session, camera_settings=settings))
 
     def set_ball_radius(self, name: str, radius_mm: float | None) -> None:
-        """State the radius of the ball in one picture; None goes back to the usual one."""
+        """State the radius of the ball in one picture; None goes back to the usual one.
+
+        Parameters
+        ----------
+        name : str
+            The picture's file name.
+        radius_mm : float or None
+            Of the ball, not its diameter.
+        """
         with self._lock:
             radii = _with(self._session.ball_radii_mm, name, radius_mm)
             self._describe(replace(self._session, ball_radii_mm=radii))

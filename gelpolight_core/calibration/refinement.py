@@ -26,7 +26,20 @@ CHECKED_BALLS = 4
 
 
 def refine(session: Session, results: StageResults) -> StageResults:
-    """Refine LEDs and membrane, and say how sure the lengths are."""
+    """Refine LEDs and membrane, and say how sure the lengths are.
+
+    Parameters
+    ----------
+    session : Session
+        Whose ball pictures are reconstructed to check the result.
+    results : StageResults
+        Of all earlier stages.
+
+    Raises
+    ------
+    InputError
+        If an earlier stage was not run.
+    """
     refined = refine_with(results)
     assert refined.joint is not None and refined.full is not None
     scale = _scale_sd(session, refined, refined.joint, refined.full)
@@ -104,6 +117,13 @@ def _scale_sd(
 
 def bare_calibration(session: Session, results: StageResults) -> Calibration:
     """Return what a reconstruction needs of the results, without figures and provenance.
+
+    Parameters
+    ----------
+    session : Session
+        What is stated of the sensor.
+    results : StageResults
+        Of all stages; without the joint one the calibration is for the paper's model.
 
     Raises
     ------

@@ -49,7 +49,15 @@ class StageStatus:
 
 
 def judged(stage: Stage, results: StageResults) -> StageStatus:
-    """Return how a stage with a present result stands: by its figures."""
+    """Return how a stage with a present result stands: by its figures.
+
+    Parameters
+    ----------
+    stage : Stage
+        Which.
+    results : StageResults
+        Those of the session so far.
+    """
     if stage is Stage.BALLS:
         for ball in results.balls:
             if ball.fault is not None:
@@ -66,7 +74,13 @@ def judged(stage: Stage, results: StageResults) -> StageStatus:
 
 
 def quality_of(stage: Stage, results: StageResults) -> QualityTable:
-    """Return the quality table of a stage's result; an empty one where there is none."""
+    """Return the quality table of a stage's result; an empty one where there is none.
+
+    Parameters
+    ----------
+    stage, results
+        As for :func:`judged`. Of the ball presses each figure is given where it is worst.
+    """
     figures: list[Any] = []
     parts: tuple[Any, ...] = {
         Stage.RESPONSE: (results.response,),

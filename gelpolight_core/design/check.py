@@ -146,7 +146,15 @@ def light_condition(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:
 
 
 def flat_irradiance(design: SensorDesign, x_mm: Array, y_mm: Array) -> Array:
-    """Return (..., 3): irradiance of each LED on the flat membrane, 1/r^2 with lobe and cosine."""
+    """Return (..., 3): irradiance of each LED on the flat membrane, 1/r^2 with lobe and cosine.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The sensor.
+    x_mm, y_mm : (...)
+        Sensor frame.
+    """
     shares = []
     for led in design.leds:
         r2 = (led.x_mm - x_mm) ** 2 + (led.y_mm - y_mm) ** 2 + led.height_mm**2
@@ -255,7 +263,17 @@ def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> 
 
 
 def gloss_share(design: SensorDesign, lamp: PointLamp, at_mm: tuple[float, float]) -> float:
-    """Return the metallic share of the flat membrane's brightness at a mirror point."""
+    """Return the metallic share of the flat membrane's brightness at a mirror point.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        The sensor.
+    lamp : PointLamp
+        Whose mirror point it is.
+    at_mm : (float, float)
+        That point (x, y) on the membrane.
+    """
     material = Material.of_membrane(design.membrane)
     if material.specular <= 0.0:
         return 0.0

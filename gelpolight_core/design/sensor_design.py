@@ -245,7 +245,20 @@ def read_design(path: Path) -> SensorDesign:
 
 
 def design_from_table(table: dict[str, Any], *, where: str) -> SensorDesign:
-    """Build a checked design from nested plain values (see :func:`read_design`)."""
+    """Build a checked design from nested plain values (see :func:`read_design`).
+
+    Parameters
+    ----------
+    table : dict
+        As a design file's TOML gives it.
+    where : str
+        What a message names.
+
+    Raises
+    ------
+    InputError
+        If a key is unknown, a value has another kind, or the design does not hold together.
+    """
     _refuse_unknown(table, {"serial", *_PARTS, *_LISTS}, where=where)
     values: dict[str, Any] = {}
     if "serial" in table:

@@ -163,7 +163,15 @@ class _AppendedArrays:
 
 
 def write_ply(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a binary PLY with normals, depth and flags on each point."""
+    """Write a binary PLY with normals, depth and flags on each point.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        What is written.
+    file : binary file
+        Open for writing.
+    """
     from trimesh.exchange.ply import export_ply  # heavy, and needed for this alone
 
     surface = _as_trimesh(mesh)
@@ -173,7 +181,15 @@ def write_ply(mesh: Mesh, file: BinaryIO) -> None:
 
 
 def write_stl(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a binary STL: the bare triangles."""
+    """Write a binary STL: the bare triangles.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        What is written.
+    file : binary file
+        Open for writing.
+    """
     from trimesh.exchange.stl import export_stl
 
     file.write(export_stl(_as_trimesh(mesh)))

@@ -71,6 +71,13 @@ def _draw_depth(
 def write_preview(heightmap: HeightMap, frame: NDArray[np.floating[Any]], path: Path) -> None:
     """Write the preview as a PNG file, whole or not at all.
 
+    Parameters
+    ----------
+    heightmap, frame
+        As for :func:`preview_figure`.
+    path : Path
+        The file.
+
     Raises
     ------
     InputError

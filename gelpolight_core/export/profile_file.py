@@ -19,6 +19,13 @@ def write_profile(profile: Profile, path: Path) -> None:
     One row for each point: distance from the start, place, depth, its standard deviation and the
     flags. A cell is empty where the depth or its deviation is not known.
 
+    Parameters
+    ----------
+    profile : Profile
+        What is written.
+    path : Path
+        The file.
+
     Raises
     ------
     InputError

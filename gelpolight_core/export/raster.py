@@ -51,6 +51,13 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
 
     The standard deviations are described in :class:`HeightMap`. The examples of noise stay in the
     program.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        What is written.
+    file : binary file
+        Open for writing.
     """
     arrays: dict[str, Any] = {
         "depth_mm": heightmap.depth_mm.astype(np.float32, copy=False),
@@ -80,6 +87,13 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
 
     The pitch is in the resolution tags (pixels per centimetre), and, with the place of the first
     pixel and the calibration, in the description as JSON.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        What is written.
+    file : binary file
+        Open for writing.
     """
     import tifffile
 
@@ -106,6 +120,13 @@ def write_png16(heightmap: HeightMap, file: BinaryIO) -> None:
     ``depth = offset_mm + step_mm * value``, right to within half a step; the value 0 stands for a
     depth that is not known. The scale is in the picture's text (keyword ``GelPoLight``) as JSON,
     with what a TIFF says too; the pitch is in its resolution as well.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        What is written.
+    file : binary file
+        Open for writing.
 
     References
     ----------
@@ -135,6 +156,13 @@ def write_gsf(heightmap: HeightMap, file: BinaryIO) -> None:
     """Write a Gwyddion Simple Field: the depth in metres, as its format asks for.
 
     Its lengths are those of the pixels' outline, half a pixel beyond the outermost centres.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        What is written.
+    file : binary file
+        Open for writing.
 
     References
     ----------

@@ -40,7 +40,15 @@ class FactorResult:
 
 
 def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
-    """Return cos(theta_k) (rows, columns, 3) on the undeformed membrane."""
+    """Return cos(theta_k) (rows, columns, 3) on the undeformed membrane.
+
+    Parameters
+    ----------
+    table : ResamplingTable
+        Whose grid the membrane has.
+    led_positions_mm : (3, 3)
+        Sensor frame.
+    """
     points = table.grid.points_mm()
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
     directions, _ = light_directions(led_positions_mm, at_top)

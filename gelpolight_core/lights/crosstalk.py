@@ -199,5 +199,13 @@ def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
 
 
 def unmix(rgb: NDArray[np.float32], crosstalk: Array) -> NDArray[np.float32]:
-    """Remove crosstalk from linear light (..., 3)."""
+    """Remove crosstalk from linear light (..., 3).
+
+    Parameters
+    ----------
+    rgb : (..., 3) float32
+        Linear light as the camera's channels saw it.
+    crosstalk : (3, 3)
+        M of ``I_raw = M I_true``.
+    """
     return np.asarray(rgb @ np.linalg.inv(crosstalk).T, dtype=np.float32)

@@ -55,6 +55,15 @@ def locate_led(
 
     The mirror lies on the top surface, in air: the camera's ray meets it at the bright point and
     leaves it mirrored; the LED is where that line reaches `led_height_mm` below the surface.
+
+    Parameters
+    ----------
+    spot_px : (2,)
+        Centroid (u, v) of its mirror spot.
+    camera, plane
+        Lens and top surface.
+    led_height_mm : float
+        Z1: the light-emitting point to the top surface.
     """
     ray = plane.rotation @ camera.directions(np.asarray(spot_px))
     bright = ray * (plane.distance_mm / ray[2]) - np.array([0.0, 0.0, plane.distance_mm])
@@ -177,7 +186,15 @@ def light_directions(led_positions_mm: Array, points_mm: Array) -> tuple[Array, 
 
 
 def direction_condition(led_positions_mm: Array, points_mm: Array) -> float:
-    """Return the largest condition number of [l1; l2; l3] over membrane points (..., 2)."""
+    """Return the largest condition number of [l1; l2; l3] over membrane points (..., 2).
+
+    Parameters
+    ----------
+    led_positions_mm : (3, 3)
+        Sensor frame.
+    points_mm : (..., 2)
+        Places (x, y) on the flat membrane.
+    """
     points = np.asarray(points_mm, dtype=np.float64)
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
     directions, _ = light_directions(led_positions_mm, at_top)

@@ -64,7 +64,13 @@ class Rectangle:
         return self.place(along, across)
 
     def place(self, along_mm: Array, across_mm: Array) -> Array:
-        """Return sensor coordinates (..., 2) of places along and across the first side."""
+        """Return sensor coordinates (..., 2) of places along and across the first side.
+
+        Parameters
+        ----------
+        along_mm, across_mm : (...)
+            From the rectangle's centre.
+        """
         cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
         x = self.centre_mm[0] + cos * along_mm - sin * across_mm
         y = self.centre_mm[1] + sin * along_mm + cos * across_mm
@@ -100,6 +106,13 @@ class AreaNodes:
 
 def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
     """Return the nodes inside a rectangle.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The map.
+    rectangle : Rectangle
+        In the sensor frame.
 
     Raises
     ------

@@ -66,7 +66,15 @@ class Crossing:
     height_mm: float
 
     def holds(self, truth: Truth, direction: str) -> bool:
-        """Return whether an object belongs to the series of a direction."""
+        """Return whether an object belongs to the series of a direction.
+
+        Parameters
+        ----------
+        truth : Truth
+            Of the object.
+        direction : str
+            ``planar`` or ``depth``.
+        """
         if direction == "planar":
             return math.isclose(truth.height_mm, self.height_mm, abs_tol=1e-6)
         return math.isclose(truth.size_mm, self.size_mm, abs_tol=1e-6)
@@ -201,7 +209,15 @@ class Evaluation:
     def series(
         self, direction: str, results: Sequence[PressResult] | None = None
     ) -> tuple[PressResult, ...]:
-        """Return those of `results` (by default all) that count in one direction."""
+        """Return those of `results` (by default all) that count in one direction.
+
+        Parameters
+        ----------
+        direction : str
+            ``planar`` or ``depth``.
+        results : sequence of PressResult, optional
+            To choose from.
+        """
         return _series(self.results if results is None else results, direction, self.crossing)
 
 

@@ -155,7 +155,18 @@ def find_object(
     depth_sd_mm: NDArray[np.floating] | float | None = None,
     edge_radius_mm: float = EDGE_RADIUS_MM,
 ) -> FoundObject:
-    """Find the object that is to be measured; parameters and errors as :func:`measure_object`."""
+    """Find the object that is to be measured; parameters and errors as :func:`measure_object`.
+
+    Parameters
+    ----------
+    depth_mm, x_mm, y_mm, seed_mm, flags, depth_sd_mm, edge_radius_mm
+        As for :func:`measure_object`.
+
+    Raises
+    ------
+    InputError
+        As :func:`measure_object`, but for the shape.
+    """
     depth, x, y, weight = _checked(depth_mm, x_mm, y_mm, flags, depth_sd_mm)
     regions = find_pressed_regions(depth, x, y, weight > 0.0)
     region = _chosen_region(regions, x, y, seed_mm)

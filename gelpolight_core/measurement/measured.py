@@ -166,21 +166,45 @@ def measured(
 
 
 def index_of(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> tuple[Array, Array]:
-    """Return fractional (column, row) of places."""
+    """Return fractional (column, row) of places.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The map.
+    x_mm, y_mm : (...)
+        Places in the sensor frame.
+    """
     column = (np.asarray(x_mm, np.float64) - heightmap.x_mm[0]) / heightmap.pitch_mm
     row = (np.asarray(y_mm, np.float64) - heightmap.y_mm[0]) / heightmap.pitch_mm
     return column, row
 
 
 def value_at(heightmap: HeightMap, values: NDArray[np.floating], x_mm: Array, y_mm: Array) -> Array:
-    """Return the values of a map (rows, columns) at places, bilinear; beyond it the nearest."""
+    """Return the values of a map (rows, columns) at places, bilinear; beyond it the nearest.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The map whose grid `values` has.
+    values : (rows, columns)
+        What is read.
+    x_mm, y_mm : (...)
+        Places in the sensor frame.
+    """
     column, row = index_of(heightmap, x_mm, y_mm)
     place = np.stack([row, column])
     return np.asarray(map_coordinates(values, place, order=1, mode="nearest"), np.float64)
 
 
 def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
-    """Return the depth at places, bilinear; NaN outside the map and its working area."""
+    """Return the depth at places, bilinear; NaN outside the map and its working area.
+
+    Parameters
+    ----------
+    heightmap, x_mm, y_mm
+        As for :func:`value_at`.
+    """
     outside = (heightmap.flags & int(Flag.OUTSIDE)) != 0
     known = np.where(outside, np.nan, heightmap.depth_mm.astype(np.float64))
     column, row = index_of(heightmap, x_mm, y_mm)
@@ -190,7 +214,13 @@ def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
 
 
 def flags_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> NDArray[np.uint8]:
-    """Return the flags of the nearest nodes; ``OUTSIDE`` beyond the map."""
+    """Return the flags of the nearest nodes; ``OUTSIDE`` beyond the map.
+
+    Parameters
+    ----------
+    heightmap, x_mm, y_mm
+        As for :func:`value_at`.
+    """
     column, row = (np.round(index).astype(int) for index in index_of(heightmap, x_mm, y_mm))
     rows, columns = heightmap.flags.shape
     there = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)

@@ -130,7 +130,18 @@ class Angle:
     second_mm: Point
 
     def apply(self, heightmap: HeightMap) -> ToolResult:
-        """Measure; in space, the arms end on the surface."""
+        """Measure; in space, the arms end on the surface.
+
+        Parameters
+        ----------
+        heightmap : HeightMap
+            What is measured.
+
+        Raises
+        ------
+        InputError
+            If two of the places are one, or one lies outside the map.
+        """
         places = np.array([self.first_mm, self.apex_mm, self.second_mm])
         arms = places[[0, 2]] - places[1]
         if not (np.isfinite(arms).all() and np.hypot(*arms.T).min() > 0.0):

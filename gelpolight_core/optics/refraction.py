@@ -51,6 +51,15 @@ def build_stack(
 ) -> LayerStack:
     """Return the stack below a top surface at `distance_mm`; layers of no thickness are left out.
 
+    Parameters
+    ----------
+    distance_mm : float
+        From the optical centre to the top surface, along its normal.
+    elastomer_thickness_mm, window_thickness_mm : float
+        0: there is none.
+    elastomer_index, window_index : float
+        Refractive indices.
+
     Raises
     ------
     InputError

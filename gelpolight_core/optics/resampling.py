@@ -144,7 +144,13 @@ def build_resampling_table(
 
 
 def paraxial_footprint_mm(camera: Camera, stack: LayerStack) -> float:
-    """Return the size of one raw pixel on the membrane at the sensor frame's origin."""
+    """Return the size of one raw pixel on the membrane at the sensor frame's origin.
+
+    Parameters
+    ----------
+    camera, stack
+        Lens, and layers below the top surface.
+    """
     apparent = sum(t / n for t, n in zip(stack.thicknesses_mm, stack.indices, strict=True))
     return apparent / max(camera.fx, camera.fy)
 

@@ -46,6 +46,13 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     Floats are limited to 0..1, so that no wild value spreads to its neighbours: below there is no
     light, above the pixel is saturated. What is not a number stays so and counts as missing.
 
+    Parameters
+    ----------
+    frame : array
+        Any numbers.
+    name : str
+        What a message calls it.
+
     Raises
     ------
     InputError

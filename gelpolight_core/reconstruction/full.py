@@ -145,6 +145,19 @@ def coarse_depth(
 ) -> tuple[Map, tuple[tuple[float, ...], str]]:
     """Run the near-light rounds at quarter scale.
 
+    Parameters
+    ----------
+    field : ShadedField
+        At full scale.
+    full : FullModel
+        The sensor's.
+    pitch_mm : float
+        Distance between the field's nodes.
+    workers : int
+        Threads.
+    terms : Terms, optional
+        What is reckoned with.
+
     Returns
     -------
     depth_mm : (rows, columns) float32
@@ -282,7 +295,13 @@ def _rim_weights(field: ShadedField, weight: Map, pitch_mm: float) -> tuple[Map,
 def shaded_field(
     rgb: Map, calibration: Calibration, full: FullModel, *, terms: Terms = ALL_TERMS
 ) -> ShadedField:
-    """Resample a raw picture and compare it with the background."""
+    """Resample a raw picture and compare it with the background.
+
+    Parameters
+    ----------
+    rgb, calibration, full, terms
+        As for :func:`reconstruct_full`.
+    """
     table = calibration.table
     seen = table.apply(rgb)
     bad = ~np.isfinite(seen)

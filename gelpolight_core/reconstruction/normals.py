@@ -240,7 +240,13 @@ def _steps(lookup: Map) -> NDArray[np.uint64]:
 
 
 def normals_from_slopes(slope_x: Map, slope_y: Map) -> Map:
-    """Return unit normals (rows, columns, 3) towards the camera (z < 0), sensor frame."""
+    """Return unit normals (rows, columns, 3) towards the camera (z < 0), sensor frame.
+
+    Parameters
+    ----------
+    slope_x, slope_y : (rows, columns) float32
+        d(depth)/dx and d(depth)/dy.
+    """
     normals = np.empty((*slope_x.shape, 3), dtype=np.float32)
     scale = -1.0 / np.sqrt(1.0 + slope_x**2 + slope_y**2)
     normals[..., 0] = slope_x * scale

@@ -56,6 +56,16 @@ def place_on_grid(
 
 
 def resample(values: Map, column: Map, row: Map, *, nearest: bool = False) -> Map:
-    """Return values of the ray grid at the places found by :func:`place_on_grid`."""
+    """Return values of the ray grid at the places found by :func:`place_on_grid`.
+
+    Parameters
+    ----------
+    values : (rows, columns) float32
+        On the ray grid.
+    column, row : (rows, columns) float32
+        Where to read them.
+    nearest : bool, optional
+        Take the nearest value, as for flags; else bilinear.
+    """
     how = cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR
     return np.asarray(cv2.remap(values, column, row, how, borderMode=cv2.BORDER_REPLICATE))

@@ -173,6 +173,11 @@ class Reconstructor:
     def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
         """Return the depth's slopes of a raw frame (height, width, 3), RGB.
 
+        Parameters
+        ----------
+        frame, name
+            As in :meth:`depth`. The paper's model is used, whatever the reconstructor's is.
+
         Raises
         ------
         InputError

@@ -14,6 +14,13 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
     A recording that names no sensor goes with any; which of a sensor's calibrations was in use
     when it was recorded does not matter.
 
+    Parameters
+    ----------
+    recording : Recording
+        An open one.
+    calibration : Calibration
+        That it shall be reconstructed with.
+
     Raises
     ------
     InputError

@@ -177,6 +177,13 @@ class Records:
     def update_note(self, number: int, note: str) -> None:
         """Change what the person wrote of a measurement.
 
+        Parameters
+        ----------
+        number : int
+            Of the measurement, as :meth:`add` gave it.
+        note : str
+            The new text.
+
         Raises
         ------
         InputError
@@ -263,6 +270,13 @@ class Records:
     def export_csv(self, path: Path, serial: str | None = None) -> int:
         """Write a table with one line per measured value; return how many measurements it holds.
 
+        Parameters
+        ----------
+        path : Path
+            The file.
+        serial : str, optional
+            Of one sensor only.
+
         Raises
         ------
         InputError
@@ -285,6 +299,13 @@ class Records:
         self, identity: str, serial: str, *, model: str = "", made: str = "", verdict: str = ""
     ) -> None:
         """Keep what is known of a calibration beside its measurements.
+
+        Parameters
+        ----------
+        identity, serial : str
+            Of the calibration and its sensor.
+        model, made, verdict : str, optional
+            ``paper`` or ``full``; ISO 8601 time; ``pass``, ``warn`` or ``fail``.
 
         Raises
         ------

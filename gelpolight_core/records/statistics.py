@@ -50,6 +50,11 @@ def statistics_of(values: Sequence[float]) -> Statistics:
     values : sequence of float
         At least one.
 
+    Raises
+    ------
+    ValueError
+        If there is no value.
+
     References
     ----------
     ISO 5725-6, 4.1: the repeatability limit, 2.8 standard deviations.

@@ -38,12 +38,28 @@ class ReflectanceTable:
     coverage: Array
 
     def response(self, channel: int, cosine: Array) -> Array:
-        """Return G(cos theta) of one channel (Eq. 6); clipped to cosines 0..1."""
+        """Return G(cos theta) of one channel (Eq. 6); clipped to cosines 0..1.
+
+        Parameters
+        ----------
+        channel : int
+            0, 1, 2: red, green, blue.
+        cosine : (...)
+            Of the angle between light and normal.
+        """
         curve = PchipInterpolator(self.cosines[channel], self.values[channel])
         return np.asarray(curve(np.clip(cosine, 0.0, 1.0)))
 
     def cosine(self, channel: int, value: Array) -> Array:
-        """Return R(I / (rho |L|)) of one channel (Eq. 7); clipped to cosines 0..1."""
+        """Return R(I / (rho |L|)) of one channel (Eq. 7); clipped to cosines 0..1.
+
+        Parameters
+        ----------
+        channel : int
+            0, 1, 2: red, green, blue.
+        value : (...)
+            Processed pixel value I / (rho |L|).
+        """
         nodes = self.values[channel]
         curve = PchipInterpolator(nodes, self.cosines[channel])
         return np.asarray(curve(np.clip(value, nodes[0], nodes[-1])))

@@ -33,6 +33,13 @@ def refuse_other_endings(path: Path) -> None:
 def write_report(report: Report, path: Path) -> None:
     """Write a report as HTML or PDF.
 
+    Parameters
+    ----------
+    report : Report
+        What it says.
+    path : Path
+        Ending in ``.html`` or ``.pdf``.
+
     Raises
     ------
     InputError

@@ -77,7 +77,13 @@ class CameraResponse:
 
 
 def distance(light: Array, other: Array) -> Array:
-    """Return how far light is from another measure of it at the best common gain."""
+    """Return how far light is from another measure of it at the best common gain.
+
+    Parameters
+    ----------
+    light, other : (...)
+        Of one shape.
+    """
     gain = float((light * other).sum() / (other**2).sum())
     return np.asarray(light / gain - other)
 

@@ -98,6 +98,13 @@ def read_decisions(folder: Path) -> Decisions:
 def write_decisions(decisions: Decisions, folder: Path) -> None:
     """Write a session's decisions, whole or not at all.
 
+    Parameters
+    ----------
+    decisions : Decisions
+        What a person decided.
+    folder : Path
+        The session's.
+
     Raises
     ------
     InputError

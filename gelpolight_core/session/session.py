@@ -126,7 +126,18 @@ class Session:
         return found
 
     def pictures(self, stage: str) -> tuple[Picture, ...]:
-        """Return the pictures of a stage; all must have one size."""
+        """Return the pictures of a stage; all must have one size.
+
+        Parameters
+        ----------
+        stage : str
+            Its folder, such as ``whiteboard``.
+
+        Raises
+        ------
+        InputError
+            If there are none, one cannot be read, or they have different sizes.
+        """
         pictures = tuple(self.picture(path) for path in self.files(stage))
         for picture in pictures[1:]:
             if picture.size != pictures[0].size:
@@ -142,7 +153,13 @@ class Session:
         return pictures
 
     def picture(self, path: Path) -> Picture:
-        """Return one of the session's pictures as linear light."""
+        """Return one of the session's pictures as linear light.
+
+        Raises
+        ------
+        InputError
+            As :func:`read_picture`.
+        """
         return read_picture(path, response=self.response)
 
     def series(self) -> tuple[tuple[Picture, ...], tuple[float, ...]]:
@@ -192,7 +209,13 @@ class Session:
         return average(self.pictures(stage), name=f"{stage}")
 
     def ball_radius_mm(self, name: str) -> float:
-        """Return the radius of the ball pressed in the picture `name`."""
+        """Return the radius of the ball pressed in the picture `name`.
+
+        Raises
+        ------
+        InputError
+            If ``session.toml`` states none for it and no default.
+        """
         radius = self.ball_radii_mm.get(name, self.ball_default_radius_mm)
         if name not in self.ball_radii_mm:
             self._refuse_misspelt_ball(name)
@@ -223,7 +246,15 @@ class Session:
 
 
 def average(pictures: Sequence[Picture], *, name: str) -> Picture:
-    """Average frames of one view; a lone frame is passed on."""
+    """Average frames of one view; a lone frame is passed on.
+
+    Parameters
+    ----------
+    pictures : sequence of Picture
+        Of one size, at least one.
+    name : str
+        What the average is called.
+    """
     if len(pictures) == 1:
         return pictures[0]
     mean = np.asarray(np.mean([p.rgb for p in pictures], axis=0, dtype=np.float64), np.float32)
@@ -271,6 +302,13 @@ def read_picture(path: Path, *, response: CameraResponse | None = None) -> Pictu
 
 def require_colour(picture: Picture, *, where: str) -> None:
     """Refuse a grey picture where the three LEDs' colours are needed.
+
+    Parameters
+    ----------
+    picture : Picture
+        To be looked at.
+    where : str
+        What a message names.
 
     Raises
     ------

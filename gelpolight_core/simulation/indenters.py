@@ -51,7 +51,13 @@ class Ball:
         return self.depth_mm - self.radius_mm + root, radius_mm / root
 
     def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
-        """Return the ball's depth at points around its axis."""
+        """Return the ball's depth at points around its axis.
+
+        Parameters
+        ----------
+        x_mm, y_mm : (...)
+            From its middle, before it is turned.
+        """
         inside = self.radius_mm**2 - x_mm**2 - y_mm**2
         root = np.sqrt(np.maximum(inside, 0.0))
         return np.where(inside > 0.0, self.depth_mm - self.radius_mm + root, NOWHERE_MM)
@@ -76,7 +82,13 @@ class Cylinder:
         return self.depth_mm - float(drop), float(fall)
 
     def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
-        """Return the cylinder's depth at points around its axis."""
+        """Return the cylinder's depth at points around its axis.
+
+        Parameters
+        ----------
+        x_mm, y_mm : (...)
+            From its middle, before it is turned.
+        """
         inside = self.reach_mm - np.hypot(x_mm, y_mm)
         drop, _ = _rounding(inside, self.edge_radius_mm)
         return np.where(inside >= 0.0, self.depth_mm - drop, NOWHERE_MM)
@@ -96,7 +108,13 @@ class Cuboid:
         return 0.5 * self.side_mm
 
     def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
-        """Return the block's depth in its own frame."""
+        """Return the block's depth in its own frame.
+
+        Parameters
+        ----------
+        x_mm, y_mm : (...)
+            From its middle, before it is turned.
+        """
         inside = self.reach_mm - np.maximum(np.abs(x_mm), np.abs(y_mm))
         drop, _ = _rounding(inside, self.edge_radius_mm)
         return np.where(inside >= -1e-9, self.depth_mm - drop, NOWHERE_MM)
@@ -126,7 +144,13 @@ class Relief:
         return 0.5 * self.pitch_mm * float(max(self.height_mm.shape) - 1)
 
     def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
-        """Return the relief's depth around its middle."""
+        """Return the relief's depth around its middle.
+
+        Parameters
+        ----------
+        x_mm, y_mm : (...)
+            From its middle, before it is turned.
+        """
         rows, columns = self.height_mm.shape
         place = [
             y_mm / self.pitch_mm + 0.5 * (rows - 1),
@@ -337,7 +361,17 @@ def _ramp(inside_mm: Array, width_mm: float) -> Array:
 
 
 def coin(diameter_mm: float = 8.0, depth_mm: float = 0.6, *, pitch_mm: float = PITCH_MM) -> Relief:
-    """Return a coin with a raised rim, a ring of beads and a six-petalled flower."""
+    """Return a coin with a raised rim, a ring of beads and a six-petalled flower.
+
+    Parameters
+    ----------
+    diameter_mm : float, optional
+        Of the coin.
+    depth_mm : float, optional
+        Of its highest point when pressed.
+    pitch_mm : float, optional
+        Distance between its heights.
+    """
     radius = 0.5 * diameter_mm
     flank = 0.02 * diameter_mm
 
@@ -358,7 +392,15 @@ def coin(diameter_mm: float = 8.0, depth_mm: float = 0.6, *, pitch_mm: float = P
 def nut(
     across_flats_mm: float = 5.5, depth_mm: float = 0.8, *, pitch_mm: float = PITCH_MM
 ) -> Relief:
-    """Return a hexagonal nut with a bevelled crown and a countersunk hole."""
+    """Return a hexagonal nut with a bevelled crown and a countersunk hole.
+
+    Parameters
+    ----------
+    across_flats_mm : float, optional
+        Width between opposite sides.
+    depth_mm, pitch_mm : float, optional
+        As for :func:`coin`.
+    """
     flat = 0.5 * across_flats_mm
     hole = 0.55 * flat
 

@@ -180,7 +180,15 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
 
 
 def checkerboard_poses(design: SensorDesign, seed: int = 0) -> tuple[BoardPose, ...]:
-    """Return how the board is held in the lens views of a session."""
+    """Return how the board is held in the lens views of a session.
+
+    Parameters
+    ----------
+    design : SensorDesign
+        Whose camera looks at it.
+    seed : int, optional
+        Of the poses.
+    """
     rng = np.random.default_rng([seed, 2])
     return board_views(design.camera, rng, inner_corners=_INNER_CORNERS, square_mm=_VIEW_SQUARE_MM)
 

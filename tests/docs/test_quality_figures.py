@@ -1,0 +1,256 @@
+"""The chapter on quality figures names every figure that the program judges, and its limits."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from chapter import DOCS
+
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.quality import Figure
+from gelpolight_core.reconstruction.heightmap import FLAG_NAMES
+
+ROOT = DOCS.parent
+NOTHING = "\N{EN DASH}"
+CHAPTER = (DOCS / "quality-figures.md").read_text("utf-8")
+# Of a development report, not of a sensor: how many of its own cases went wrong.
+ELSEWHERE = {"gelpolight_core/experiments/stability_report.py"}
+HIGHER_IS_BETTER = {"axis_ratio", "coverage", "signal_to_noise"}  # of a ball's contact
+# What the chapter says of limits that depend on the picture or the ball; its numbers are filled in
+# from the module.
+IN_WORDS = {
+    "camera.width / 500.0": "width / 500",
+    "camera.width / 50.0": "width / 50",
+    "edge_limit_px(view.picture_size[0])": "width / 200, at least 3 px",
+    "LED_OFF_OF_WIDTH * rgb.shape[1]": "{LED_OFF_OF_WIDTH:g} widths",
+    "worst_residual": "{100_LARGEST_RESIDUAL:g} %, or {_ALLOWED_RESIDUAL_PX:g} px",
+    "lowest": "{100_LEAST_COVERAGE:g} %",
+    "0.9 * radius_mm": "0.9 ball radii",
+    "0.15 * contact_mm": "0.15 contact radii",
+    "0.4 * contact_mm": "0.4 contact radii",
+    "limits[direction]": (
+        "{PAPER_PERCENT[planar]:g} % in the plane, {PAPER_PERCENT[depth]:g} % in depth"
+    ),
+    "warn": "0.1 %, of the background 1 %",
+    "fail": "10 %, of the background 20 %",
+}
+NOTES = {
+    "MOST_DRIFT": "gelpolight_core/reconstruction/acceptance.py",
+    "LEAST_FITTING": "gelpolight_core/reconstruction/acceptance.py",
+    "RIM_CHANGE": "gelpolight_core/reconstruction/acceptance.py",
+    "UNSOLVED_SHARE": "gelpolight_core/reconstruction/acceptance.py",
+    "LONGEST_STEP": "gelpolight_core/reconstruction/full.py",
+    "BETTER_SHAPE": "gelpolight_core/measurement/doubt.py",
+    "GOOD_RESIDUAL": "gelpolight_core/measurement/doubt.py",
+    "POOR_RESIDUAL": "gelpolight_core/measurement/doubt.py",
+    "LARGEST_SD": "gelpolight_core/measurement/doubt.py",
+    "SMALLEST_GROUND": "gelpolight_core/measurement/doubt.py",
+    "FLAGGED_SHARE": "gelpolight_core/measurement/tool.py",
+    "PRESSED_SHARE": "gelpolight_core/measurement/steadiness.py",
+    "CONTACT_CHANGE": "gelpolight_core/measurement/steadiness.py",
+    "SATURATED_WARN": "app/live/picture_checks.py",
+    "SATURATED_FAIL": "app/live/picture_checks.py",
+    "DARK_SHARE_OF_SCALE": "app/live/picture_checks.py",
+}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A figure as the source judges it; limits are expressions of the module."""
+
+    module: str
+    key: str
+    unit: str
+    warn: str
+    fail: str
+    higher_is_better: bool
+
+    def __str__(self) -> str:
+        """Return where it is, for a test's name."""
+        return f"{self.module}:{self.key}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the chapter."""
+
+    key: str
+    warn: str
+    fail: str
+
+
+def figures_of(path: Path) -> Iterator[Judged]:
+    """Return the figures that a module judges, by its text."""
+    module = str(path.relative_to(ROOT))
+    for call in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name)):
+            continue
+        named = {k.arg: ast.unparse(k.value) for k in call.keywords}
+        if (
+            call.func.id == "judge"
+            and len(call.args) >= 3
+            and not isinstance(call.args[0], ast.Name)
+        ):
+            unit = call.args[3].value if len(call.args) > 3 else ""  # type: ignore[attr-defined]
+            warn, fail = named.get("warn", "None"), named.get("fail", "None")
+            high = named.get("higher_is_better") == "True"
+            yield Judged(module, _key(call.args[0]), unit, warn, fail, high)
+        if call.func.id == "figure" and module.endswith("indentation_checks.py"):
+            key, unit = (ast.literal_eval(call.args[n]) for n in (0, 2))
+            warn, fail = (ast.unparse(call.args[n]) for n in (3, 4))
+            yield Judged(module, key, unit, warn, fail, key in HIGHER_IS_BETTER)
+
+
+def _key(expression: ast.expr) -> str:
+    """Return a figure's key, with * for what is filled in."""
+    if isinstance(expression, ast.Constant):
+        return str(expression.value)
+    assert isinstance(expression, ast.JoinedStr)
+    return "".join(
+        str(part.value) if isinstance(part, ast.Constant) else "*" for part in expression.values
+    )
+
+
+@cache
+def all_figures() -> tuple[Judged, ...]:
+    """Return the figures of core and program."""
+    found = []
+    for folder in ("gelpolight_core", "app"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            if str(path.relative_to(ROOT)) not in {"gelpolight_core/quality.py", *ELSEWHERE}:
+                found += figures_of(path)
+    return tuple(found)
+
+
+@cache
+def rows() -> dict[str, list[Row]]:
+    """Return the chapter's rows by the modules that the lines above their tables name."""
+    found: dict[str, list[Row]] = {}
+    modules: list[str] = []
+    for section in re.split(r"^## ", CHAPTER, flags=re.MULTILINE)[1:]:
+        head, _, table = section.partition("\n| figure |")
+        modules = re.findall(r"`((?:gelpolight_core|app)/[\w/]+\.py)`", head)
+        listed = []
+        for line in table.splitlines():
+            cells = [cell.strip() for cell in line.split("|")]
+            key = re.search(r"`([\w*]+)`", cells[1]) if len(cells) > 5 else None
+            if key is not None:
+                listed.append(Row(key[1], cells[2], cells[3]))
+        for module in modules:
+            found.setdefault(module, []).extend(listed)
+    return found
+
+
+def limit_text(figure: Judged, expression: str) -> str | float:
+    """Return what the chapter has to say of a limit: a number, or words."""
+    if expression == "None":
+        return NOTHING
+    names = vars(importlib.import_module(figure.module.removesuffix(".py").replace("/", ".")))
+    try:
+        return float(eval(expression, dict(names)))
+    except NameError:
+        words = IN_WORDS[expression]
+        filled = {f"100{name}": 100.0 * names[name] for name in names if name.startswith("_L")
+                  and isinstance(names[name], float)}  # fmt: skip
+        return words.format(**{**names, **filled}) if "{" in words else words
+
+
+@pytest.mark.parametrize("figure", all_figures(), ids=str)
+def test_the_chapter_states_every_figure_with_its_limits(figure: Judged) -> None:
+    """A limit that is changed in the source is changed in the chapter."""
+    listed = [row for row in rows().get(figure.module, []) if row.key == figure.key]
+    wanted = [limit_text(figure, x) for x in (figure.warn, figure.fail)]
+    sign = "<" if figure.higher_is_better else ">"
+    for row in listed:
+        if all(map(_says, (row.warn, row.fail), wanted, 2 * [sign], 2 * [figure.unit])):
+            return
+    pytest.fail(f"{figure} wants {sign} {wanted} {figure.unit}, the chapter has {listed}")
+
+
+def _says(cell: str, limit: str | float, sign: str, unit: str) -> bool:
+    if limit == NOTHING:
+        return cell == NOTHING
+    if isinstance(limit, str):
+        return cell == f"{sign} {limit}"
+    number = re.fullmatch(rf"{sign} (\d+(?:\.(\d+))?)(?: (\S+))?", cell)
+    if number is None or (number[3] or "") != unit:
+        return False
+    return float(number[1]) == round(limit, len(number[2] or ""))
+
+
+def test_every_row_of_the_chapter_is_a_figure_of_its_module() -> None:
+    """What was taken out of the program is taken out of the chapter."""
+    known = {(figure.module, figure.key) for figure in all_figures()}
+    modules = {figure.module for figure in all_figures()}
+    assert set(rows()) - modules <= {str(path) for path in NOTES.values()}
+    for section in {tuple(found) for found in rows().values() if found}:
+        sharing = [module for module, found in rows().items() if tuple(found) == section]
+        for row in section:
+            assert any((module, row.key) in known for module in sharing), row
+
+
+def test_a_calibration_has_no_figure_that_the_chapter_leaves_out(
+    small_calibration: Calibration,
+) -> None:
+    """The source's text may be read wrongly; what comes out of it cannot be."""
+    patterns = {row.key for found in rows().values() for row in found}
+    figures = [f for table in small_calibration.quality.values() for f in table.figures]
+    assert len(figures) > 40
+    for figure in figures:
+        assert figure.key in patterns
+        assert _known(figure), figure
+
+
+def _known(figure: Figure) -> bool:
+    """Return whether the limits of a made figure are those of one that was read in the source."""
+    for judged in all_figures():
+        if judged.key != figure.key:
+            continue
+        limits = zip(
+            (judged.warn, judged.fail), (figure.warn_limit, figure.fail_limit), strict=True
+        )
+        if all(_same(limit_text(judged, text), value) for text, value in limits):
+            return True
+    return False
+
+
+def _same(stated: str | float, value: float | None) -> bool:
+    if isinstance(stated, str):
+        return (value is None) == (stated == NOTHING)
+    return value is not None and math.isclose(stated, value)
+
+
+@pytest.mark.parametrize("name", NOTES)
+def test_notes_and_doubts_are_stated_with_the_limits_of_the_source(name: str) -> None:
+    """The sentences beside a depth map or a measurement, too, have limits that are explained."""
+    module: Any = importlib.import_module(NOTES[name].removesuffix(".py").replace("/", "."))
+    percent = f"{100.0 * getattr(module, name):g} %"
+    before = CHAPTER[: CHAPTER.index(f"`{name}`")]
+    sentence = before[before.rindex("|") :] if "|" in before[-120:] else before[-120:]
+    assert re.search(rf"(?<![\d.]){re.escape(percent)}", sentence), (name, percent, sentence)
+
+
+def test_the_limits_of_a_validation_are_those_of_a_new_installation() -> None:
+    """The chapter says when a calibration counts as validated, and when as old."""
+    # By its text: the module needs a window library, which this folder does without.
+    source = (ROOT / "app/shell/settings.py").read_text("utf-8")
+    limit = {k: float(v) for k, v in re.findall(r"^    (\w+): float = ([\d.]+)$", source, re.M)}
+    text = " ".join(CHAPTER.split())
+    assert f"height is right to {limit['height_percent']:g} % and its size to" in text
+    assert f"its size to {limit['size_percent']:g} %" in text
+    assert f"older than {limit['age_days']:g} days" in text
+
+
+@pytest.mark.parametrize("flag", FLAG_NAMES)
+def test_every_flag_is_explained(flag: str) -> None:
+    """People meet the flags in files and in Inspect."""
+    assert f"| `{flag}` |" in CHAPTER
