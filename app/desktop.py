@@ -23,6 +23,7 @@ from app.shell.faults import Faults
 from app.shell.icons import application_icon
 from app.shell.log import Log
 from app.shell.main_window import MainWindow
+from app.shell.memory import keep_arenas_few
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
@@ -150,6 +151,7 @@ def make_application() -> QApplication:
     before = QApplication.instance()
     if isinstance(before, QApplication):
         return before
+    keep_arenas_few()
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(
         Qt.HighDpiScaleFactorRoundingPolicy.PassThrough
     )

@@ -18,7 +18,7 @@ from gelpolight_core.batch.ledger import FILE as LEDGER
 from gelpolight_core.batch.ledger import BatchLedger, FrameRow
 from gelpolight_core.batch.plan import BatchPlan, Job
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
-from gelpolight_core.batch.stopping import Stopped, workers_may_go_on
+from gelpolight_core.batch.stopping import Stopped, never, workers_may_go_on
 from gelpolight_core.batch.summary import write_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import make_folder
@@ -69,14 +69,18 @@ class BatchProgress:
         )
 
 
+def _tell_nobody(progress: BatchProgress) -> None:
+    """Let the work go on without a word."""
+
+
 def run_batch(
     plan: BatchPlan,
     settings: BatchSettings,
     out: Path,
     runner: Runner,
     *,
-    tell: Callable[[BatchProgress], None],
-    stopped: Stopped,
+    tell: Callable[[BatchProgress], None] = _tell_nobody,
+    stopped: Stopped = never,
 ) -> BatchProgress:
     """Do the frames of a plan that have no result yet; write the summary when none is left.
 
@@ -93,9 +97,9 @@ def run_batch(
     runner : callable
         What does them: a :class:`~gelpolight_core.batch.processes.ProcessRunner` or a
         :class:`~gelpolight_core.batch.cluster.ClusterRunner`.
-    tell : callable
+    tell : callable, optional
         Told how far it is, at the beginning and after each frame.
-    stopped : callable
+    stopped : callable, optional
         Whether to stop; the frames at hand are brought to their end.
 
     Raises
@@ -135,8 +139,8 @@ def _do(
     progress: BatchProgress,
     ledger: BatchLedger,
     runner: Runner,
-    tell: Callable[[BatchProgress], None],
-    stopped: Stopped,
+    tell: Callable[[BatchProgress], None] = _tell_nobody,
+    stopped: Stopped = never,
 ) -> BatchProgress:
     halt: Halt | None = None
     try:

@@ -14,6 +14,11 @@ Stopped = Callable[[], bool]
 """Returns whether no new frame shall be begun."""
 
 
+def never() -> bool:
+    """Let a run come to its end."""
+    return False
+
+
 def tell_workers(out: Path) -> None:
     """Let no worker that sees a run's folder begin another frame.
 
