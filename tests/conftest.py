@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 
 # The same examples on every machine, so that a verdict can be repeated; look further, now and then,
-# with --hypothesis-profile=explore.
-settings.register_profile("repeatable", derandomize=True, database=None)
-settings.register_profile("explore", print_blob=True)
+# with --hypothesis-profile=explore. How long an example takes is for other tools to say.
+settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
+settings.register_profile("explore", print_blob=True, deadline=None)
 settings.load_profile("repeatable")
 
 # What pyproject.toml sets for the window's tests means nothing where Qt is not installed.
