@@ -11,7 +11,7 @@ cd "$(dirname "$0")/.."
 
 how=${1:-whole}
 needs_windows=tests/strangers/test_any_spoilt_file.py # it also spoils the settings of the window
-core="tests/batch tests/command_line/test_cameras_command.py tests/command_line/test_commands.py
+core="tests/batch tests/command_line/test_cameras_command.py
     tests/command_line/test_without_window_libraries.py tests/export tests/optics tests/reconstruction/test_poisson.py
     tests/reconstruction/test_live_kernels.py tests/reconstruction/test_paper_kernel.py tests/recording tests/records
     tests/report tests/session tests/test_house.py"
