@@ -1,8 +1,22 @@
 #!/bin/sh
-# Makes both lock files again from pyproject.toml, with the newest versions that it allows.
+# Makes the lock files again from pyproject.toml: two with the newest versions that it allows, and requirements-oldest
+# with the oldest (packaging/oldest.sh tests with these).
+#
+#     sh packaging/lock.sh         every version anew
+#     sh packaging/lock.sh keep    versions that are locked stay; only what is missing or no longer allowed changes
+#
 # Needs Python 3.11 to 3.13 with venv, and the network. The tool that resolves (uv) lives in a folder that is thrown away.
 set -eu
 cd "$(dirname "$0")/.."
+
+case ${1:-anew} in
+anew | keep) ;;
+*)
+    echo "packaging/lock.sh: unknown argument \"$1\"; use keep, or nothing." >&2
+    exit 2
+    ;;
+esac
+how=${1:-anew}
 
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -21,10 +35,13 @@ lock() { # FILE WHAT [OPTION...]
     file=$1
     what=$2
     shift 2
+    # uv prefers the versions that it finds in the file it is to write.
+    rm -f "$scratch/lock.txt"
+    [ "$how" != keep ] || [ ! -f "$file" ] || cp "$file" "$scratch/lock.txt"
     # One set of versions on every supported Python, so that a fault seen on one machine is seen on all.
     "$scratch/venv/bin/uv" pip compile --quiet --no-config --universal --python-version 3.11 \
         --fork-strategy fewest --generate-hashes --no-annotate --no-header \
-        "$@" pyproject.toml "$scratch/build.txt" >"$scratch/lock.txt"
+        "$@" pyproject.toml "$scratch/build.txt" --output-file "$scratch/lock.txt" >/dev/null
     {
         echo "# $what, exact versions by hash, for Python 3.11 to 3.13. Made by packaging/lock.sh; do not edit."
         cat "$scratch/lock.txt"
@@ -35,3 +52,8 @@ lock() { # FILE WHAT [OPTION...]
 lock packaging/requirements.lock "What the program needs"
 lock packaging/requirements-dev.lock "What the program and its tests need" --extra dev \
     --constraint packaging/requirements.lock
+
+# The tools that run the tests are not what is tested with the oldest versions: they stay as they are locked.
+grep -E '^(pytest|hypothesis)' packaging/requirements-dev.lock | sed 's/ .*//' >"$scratch/tools.txt"
+lock packaging/requirements-oldest.lock "The oldest versions that the program allows, and what tests it" --extra dask \
+    --resolution lowest-direct "$scratch/tools.txt"

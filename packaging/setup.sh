@@ -121,8 +121,9 @@ missing_for_a_window() {
 install_what_windows_need() {
     # shellcheck disable=SC2046 # names of packages hold no spaces
     set -- $(missing_for_a_window)
-    if [ "$kind" = test ] && ! command -v Xvfb >/dev/null 2>&1; then
-        set -- "$@" xvfb
+    if [ "$kind" = test ]; then
+        command -v Xvfb >/dev/null 2>&1 || set -- "$@" xvfb
+        command -v pdftotext >/dev/null 2>&1 || set -- "$@" poppler-utils
     fi
     [ $# -eq 0 ] || install_packages "$@"
 }

@@ -25,6 +25,8 @@ check "import contracts" .venv/bin/lint-imports
 # Two processes share the cores, so that neither needs threads of its own for small matrices.
 # Files stay whole, so that what their tests share is made once.
 check "tests" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile "$@"
+# Not where only some tests are asked for.
+[ $# -gt 0 ] || check "oldest libraries, and the core without Qt" sh packaging/oldest.sh thin
 
 echo
 if [ -n "$failed" ]; then

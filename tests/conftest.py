@@ -22,12 +22,22 @@ if TYPE_CHECKING:
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 
 # The same examples on every machine, so that a verdict can be repeated; look further, now and then,
-# with --hypothesis-profile=explore.
-settings.register_profile("repeatable", derandomize=True, database=None)
-settings.register_profile("explore", print_blob=True)
+# with --hypothesis-profile=explore. How long an example takes is for other tools to say.
+settings.register_profile("repeatable", derandomize=True, database=None, deadline=None)
+settings.register_profile("explore", print_blob=True, deadline=None)
 settings.load_profile("repeatable")
 
+# What pyproject.toml sets for the window's tests means nothing where Qt is not installed.
+SETTINGS_OF_PYTEST_QT = ("qt_api", "qt_log_level_fail")
+
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
+    """Let the core's tests run without Qt and the plugin that needs it."""
+    if not pluginmanager.has_plugin("pytest-qt"):
+        for name in SETTINGS_OF_PYTEST_QT:
+            parser.addini(name, "of pytest-qt, which is not here")
 
 
 @pytest.fixture(scope="session")

@@ -121,18 +121,18 @@ class _FrameWorker:
 
     def work(self, job: Job) -> Outcome:
         """Reconstruct a frame, and write its files."""
-        began = time.thread_time()
+        began = time.process_time()
         try:
             row, heightmap = self._reconstruct(job)
             self._write(heightmap, job)
         except InputError as error:
-            return failed(job, str(error), seconds=time.thread_time() - began)
+            return failed(job, str(error), seconds=time.process_time() - began)
         except _CannotWrite as error:
             return error.halt
         except Exception:  # one frame's fault of ours shall not keep a million others waiting
-            seconds = time.thread_time() - began
+            seconds = time.process_time() - began
             return failed(job, traceback.format_exc(), seconds=seconds, ours=True)
-        return replace(row, seconds=time.thread_time() - began)
+        return replace(row, seconds=time.process_time() - began)
 
     def _reconstruct(self, job: Job) -> tuple[FrameRow, HeightMap]:
         row = FrameRow(job.output, job.stamp, str(job.path), job.index)

@@ -16,10 +16,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QSettings
 from recorded import write_recording
 
-from app.shell.settings import Settings
 from app.workspace.indenters import read_indenters
 from app.workspace.sessions import read_session_entry
 from app.workspace.validation import read_validation
@@ -153,23 +151,6 @@ def test_a_pickle_in_an_array_is_never_run(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"version|magic"):
         array_of(pickle.dumps(Harm()))
     assert not (tmp_path / "harm").exists()
-
-
-def test_settings_that_hold_objects_are_put_aside_and_nothing_of_them_is_run(
-    tmp_path: Path,
-) -> None:
-    class Harm:
-        def __reduce__(self) -> tuple[object, tuple[str]]:
-            return os.mkdir, (str(tmp_path / "harm"),)
-
-    made = QSettings(str(tmp_path / "made.ini"), QSettings.Format.IniFormat)
-    made.setValue("theme", Harm())
-    made.sync()
-    (tmp_path / "desktop.ini").write_bytes((tmp_path / "made.ini").read_bytes())
-    settings = Settings(tmp_path / "desktop.ini")
-    assert settings.theme == "system"
-    assert not (tmp_path / "harm").exists()
-    assert (tmp_path / "desktop.ini.refused").exists()
 
 
 @pytest.mark.parametrize(("order", "big"), [("<", False), (">", False), ("<", True)])

@@ -1,0 +1,69 @@
+#!/bin/sh
+# Tests the oldest versions of the libraries that pyproject.toml allows, in an environment of its own, .venv-oldest:
+# first the core and the commands, before Qt and VTK are installed, then the windows and what reads their files.
+#
+#     sh packaging/oldest.sh         all of the core, and a choice of the windows
+#     sh packaging/oldest.sh thin    of the core what touches the libraries most; a few minutes
+#
+# Needs what "sh packaging/setup.sh test" installs from the system. PYTHON=/path/to/python chooses another Python.
+set -eu
+cd "$(dirname "$0")/.."
+
+how=${1:-whole}
+# These also spoil, and write, the settings of the window.
+needs_windows="tests/strangers/test_any_spoilt_file.py tests/strangers/test_real_disks.py"
+core="tests/batch tests/command_line/test_cameras_command.py
+    tests/command_line/test_without_window_libraries.py tests/export tests/optics tests/reconstruction/test_poisson.py
+    tests/reconstruction/test_live_kernels.py tests/reconstruction/test_paper_kernel.py tests/recording tests/records
+    tests/report tests/session tests/test_house.py"
+windows="tests/app/test_desktop.py tests/app/shell/test_settings.py
+    tests/app/calibrate/test_wizard.py::test_a_capture_is_on_disk_when_it_is_told_with_the_radius_stated
+    tests/app/calibrate/test_wizard.py::test_leaving_a_picture_out_greys_it_and_undo_brings_it_back
+    tests/app/inspect/test_inspect_page.py::test_depth_is_shown_in_3d_once_for_each_frame
+    tests/app/inspect/test_inspect_page.py::test_the_cursor_is_in_all_views_and_read_below
+    tests/export/test_heightmap_files.py"
+case $how in
+thin) ;;
+whole)
+    core="tests --ignore tests/app"
+    for file in $needs_windows; do core="$core --ignore $file"; done
+    windows="$windows $needs_windows"
+    ;;
+*)
+    echo "packaging/oldest.sh: unknown argument \"$how\"; use thin, or nothing." >&2
+    exit 2
+    ;;
+esac
+
+venv=.venv-oldest
+lock=packaging/requirements-oldest.lock
+window_libraries='^(pyside6-essentials|shiboken6|pyqtgraph|vtk|pytest-qt)=='
+
+install() { # as standard input, lines of the lock
+    "$venv/bin/python" -m pip --disable-pip-version-check --no-input install --quiet --no-deps --require-hashes \
+        --only-binary :all: --requirement /dev/stdin
+}
+
+entries() { # PROGRAM: the lock's entries whose first line it chooses, with their hashes
+    awk "/^[^ #]/ { wanted = $1 } wanted" "$lock"
+}
+
+run_tests() { # PYTEST-ARGUMENT...
+    # Functions that another numba has compiled are of no use to this one, nor the other way round.
+    env OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$PWD/$venv/compiled" "$venv/bin/python" -m pytest \
+        -p no:cacheprovider --numprocesses 2 --dist loadfile "$@"
+}
+
+echo "Making $venv with the oldest libraries, without those of windows."
+rm -rf "$venv"
+"${PYTHON:-.venv/bin/python}" -m venv "$venv"
+entries "\$0 !~ /$window_libraries/" | install
+"$venv/bin/python" -m pip --disable-pip-version-check --no-input install --quiet --no-deps --no-build-isolation \
+    --no-index --editable .
+# shellcheck disable=SC2086 # no path of a test holds a space
+run_tests --no-xvfb $core
+
+echo "Adding the libraries of windows."
+entries "\$0 ~ /$window_libraries/" | install
+# shellcheck disable=SC2086
+run_tests $windows

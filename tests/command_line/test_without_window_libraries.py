@@ -1,0 +1,81 @@
+"""The commands on a machine that has no Qt, no pyqtgraph and no VTK."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Python imports a module of this name by itself, in every process that is started from here on.
+BLOCK = """
+import sys
+
+BLOCKED = {"PySide6", "shiboken6", "pyqtgraph", "vtk", "vtkmodules"}
+
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in BLOCKED:
+            raise ImportError(name + " is not here")
+
+sys.meta_path.insert(0, Blocker())
+"""
+COMMANDS = """
+import shlex, sys
+from app.command_line.main import main
+
+if __name__ == "__main__":
+    for line in sys.stdin:
+        assert main(shlex.split(line)) == 0, line
+"""
+
+
+@pytest.fixture
+def blocked(tmp_path: Path) -> dict[str, str]:
+    """Return an environment in which neither a process nor its children can import them."""
+    (tmp_path / "block").mkdir()
+    (tmp_path / "block" / "sitecustomize.py").write_text(BLOCK)
+    path = os.pathsep.join([str(tmp_path / "block"), str(ROOT)])
+    return os.environ | {"PYTHONPATH": path, "HOME": str(tmp_path)}
+
+
+@pytest.mark.parametrize("module", ["PySide6.QtCore", "pyqtgraph", "vtkmodules.util", "numpy"])
+def test_only_window_libraries_are_blocked_in_a_process_and_its_children(
+    blocked: dict[str, str], module: str
+) -> None:
+    """The test below can fail."""
+    call = f"[sys.executable, '-c', 'import {module}']"
+    child = f"import subprocess, sys; sys.exit(subprocess.call({call}))"
+    done = subprocess.run(
+        [sys.executable, "-c", child], env=blocked, capture_output=True, text=True
+    )
+    assert (done.returncode == 0) == (module == "numpy")
+    assert ("is not here" in done.stderr) == (module != "numpy")
+
+
+def test_a_sensor_is_calibrated_and_its_presses_measured(
+    blocked: dict[str, str], small_session: Path, tmp_path: Path
+) -> None:
+    press = small_session / "presses" / "cylinder_s5_d100.png"
+    (tmp_path / "commands.py").write_text(COMMANDS)
+    lines = f"""calibrate {small_session} -o c.gplcal
+reconstruct c.gplcal {press} -o depth --format npz,vtp,tif --pictures
+measure c.gplcal {press} --shape cylinder --json measured.json
+batch c.gplcal {press} {press.parent / "object_coin.png"} -o batch --workers 2
+benchmark c.gplcal {press} --json times.json --model paper
+"""
+    done = subprocess.run(
+        [sys.executable, "commands.py"],
+        cwd=tmp_path,
+        env=blocked,
+        input=lines,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    for name in ("measured.json", "times.json", "batch/batch.csv", f"depth/{press.stem}.vtp"):
+        assert (tmp_path / name).stat().st_size > 0, name
