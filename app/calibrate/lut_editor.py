@@ -101,7 +101,7 @@ class LutEditor(QWidget):
         self.plot = named(CurvePlot(scatter), "lut.plot", tr("Reflectance curve"))
         self.plot.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.live = None if effect is None else LivePanel(start, scatter.names, effect)
-        self._repaint = QTimer(self, interval=0, singleShot=True)
+        self._repaint = QTimer(self, interval=1, singleShot=True)
         self._repaint.timeout.connect(self._follow_theme)
         self._notice = named(RoomyLabel(), "lut.notice", tr("What was done"))
         self._hint = named(

@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QImage, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
@@ -199,9 +199,12 @@ class _PanelView(QWidget):
         make_bold(self._title)
         for label in (self._title, self._caption):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        # The words stay at the picture, which is as high as its width lets it be.
+        column.addStretch(1)
         column.addWidget(self._title)
-        column.addWidget(self._picture, 1)
+        column.addWidget(self._picture, 1000)
         column.addWidget(self._caption)
+        column.addStretch(1)
         self._pixmap = QPixmap()
 
     def show_panel(self, panel: Panel) -> None:
@@ -219,11 +222,16 @@ class _PanelView(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        if not self._pixmap.isNull():
-            self._picture.setPixmap(
-                self._pixmap.scaled(
-                    self._picture.size(),
-                    Qt.AspectRatioMode.KeepAspectRatio,
-                    Qt.TransformationMode.SmoothTransformation,
-                )
-            )
+        if self._pixmap.isNull():
+            return
+        words = self._title.sizeHint().height() + self._caption.sizeHint().height()
+        around = self.layout().contentsMargins()
+        gaps = around.top() + around.bottom() + 4 * self.layout().spacing()
+        room = QSize(
+            self.width() - around.left() - around.right(), self.height() - words - gaps
+        ).expandedTo(self._picture.minimumSize())
+        shown = self._pixmap.scaled(
+            room, Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+        )
+        self._picture.setMaximumHeight(max(shown.height(), self._picture.minimumHeight()))
+        self._picture.setPixmap(shown)

@@ -206,7 +206,11 @@ class StepPanel(QWidget):
 
     def show_step(self, step: Step, *, following: str) -> None:
         """Show another step's task; `following`: the title of the step after it, if any."""
-        self._step, self.finished = step, False
+        if step is not self._step:
+            # What is said of the step before is not of this one, not even while it is computed.
+            self._show_figures(())
+        self._step = step
+        self._show_finished(False)
         self.title.setText(step.title)
         self.task.setText(step.task)
         self.assembly.show_assembly(step.assembly)
@@ -274,10 +278,16 @@ class StepPanel(QWidget):
         if recompute:
             sentence = tr("{sentence}. Press Recompute.").format(sentence=sentence.rstrip("."))
         self.sentence.setText(sentence)
+        self._show_figures(tables)
+        self.recompute.setVisible(recompute)
+        self._show_finished(finished)
+
+    def _show_figures(self, tables: Sequence[QualityTable]) -> None:
         figures = tuple(figure for table in tables for figure in table.figures)
         self.quality.set_table(QualityTable(figures))
         self.quality.setVisible(bool(figures))
-        self.recompute.setVisible(recompute)
+
+    def _show_finished(self, finished: bool) -> None:
         self.finished = finished
         self.next.setStyleSheet("font-weight: bold;" if finished else "")
 

@@ -105,8 +105,9 @@ class Wizard(WizardFrame):
         """Draw the signs anew in another theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "standing"):
-            # Not at once: Qt walks over all widgets, and none may be made or lost meanwhile.
-            QTimer.singleShot(0, self, self.standing.refresh)
+            # Not at once: Qt walks over all widgets, and none may be made or lost meanwhile. A
+            # timer of no time at all would wait until nothing else is left to be painted.
+            QTimer.singleShot(1, self, self.standing.refresh)
 
     def enter(self) -> None:
         """Look at the camera, as the wizard is shown."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from gelpolight_core.translation import tr
 
 Size = tuple[int, int]
+GETTING_READY = tr("Getting the calibration ready: one moment.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,8 @@ class Situation:
         Why there are no pictures or no depth.
     drift : str
         How far the background has moved.
+    reading : bool
+        Whether the calibration in use is being read.
     """
 
     kind: str = ""
@@ -50,6 +53,7 @@ class Situation:
     calibrations: tuple[Known, ...] = ()
     trouble: str = ""
     drift: str = ""
+    reading: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,8 @@ def advise(now: Situation) -> Advice:
             tr("Use the virtual sensor"),
             usable=False,
         )
+    if now.used is None and now.reading:
+        return Advice(GETTING_READY, usable=False)
     if now.used is None:
         text = tr("No calibration is in use: only the camera's picture can be shown.")
         return Advice(text, *_remedy(now), usable=False)

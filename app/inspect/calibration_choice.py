@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,6 +82,7 @@ class CalibrationChoice(QObject):
         self._jobs, self._box, self._context = jobs, box, context
         self._path: Path | None = None
         self._state: tuple[object, ...] = ()
+        self._reading: Job | None = None
         self.entries: tuple[Entry, ...] = ()
         box.activated.connect(self._on_chosen)
         context.requests.calibrations_changed.connect(self.refresh)
@@ -103,6 +105,12 @@ class CalibrationChoice(QObject):
             self.loaded.emit(None, None)
             return
         self._read(used.path)
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether the calibration in use is being read; not where that came to nothing."""
+        future = None if self._reading is None else self._reading.future
+        return future is not None and not future.done()
 
     def refer_cameras(self, live: Reconstructor | None) -> None:
         """Hold the cameras to how they were set for a calibration."""
@@ -148,4 +156,6 @@ class CalibrationChoice(QObject):
                 self.loaded.emit(*found[1:])
 
         title = tr("Getting the calibration ready")
-        self._jobs.submit(Job(title, work, done, lambda s: self._context.toasts.show(s, "fail")))
+        failed = partial(self._context.toasts.show, kind="fail")
+        self._reading = Job(title, work, done, failed)
+        self._jobs.submit(self._reading)

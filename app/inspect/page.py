@@ -123,6 +123,8 @@ class InspectPage(QWidget):
         self.link.switched.connect(self._on_switched)
         self.recorder.told.connect(self._on_recorded)
         self.jobs.progressed.connect(self.banner.show_work)
+        # Where work has ended, it may have come to nothing.
+        self.jobs.progressed.connect(lambda title, _share: title or self._advise())
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self.banner.stop_wanted.connect(self.jobs.cancel)
         self.banner.act_wanted.connect(self._on_act)

@@ -47,4 +47,5 @@ def situation_of(
         calibrations=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
         trouble=trouble,
         drift=drift,
+        reading=calibrations.is_reading,
     )

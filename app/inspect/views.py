@@ -150,7 +150,7 @@ class Views(QMainWindow):
             Qt.Orientation.Horizontal,
         )
         self.resizeDocks([docks["surface"], docks["section"]], [460, 200], Qt.Orientation.Vertical)
-        self.resizeDocks([docks["look"], docks["bench"]], [290, 400], Qt.Orientation.Vertical)
+        self.resizeDocks([docks["look"], docks["bench"]], [240, 600], Qt.Orientation.Vertical)
         self.follow_source()
 
     def _connect(self) -> None:

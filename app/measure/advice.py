@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.inspect.advice import Advice, Situation, advise
+from app.inspect.advice import GETTING_READY, Advice, Situation, advise
 from gelpolight_core.translation import tr
 
 
@@ -24,6 +24,8 @@ def measuring_advice(
     """
     live = advise(now)
     if now.used is None and (held or not now.kind):
+        if now.reading:
+            return Advice(GETTING_READY, usable=False)
         text = tr("No calibration is in use: depth cannot be measured without one.")
         return Advice(text, "sensors", tr("Choose or calibrate a sensor"), usable=False)
     if held:

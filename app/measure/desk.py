@@ -67,6 +67,8 @@ class Desk(DeskFrame):
         self._shown: Shown | None = None
         self._trouble = self._refused = ""
         self._connect()
+        # Where work has ended, it may have come to nothing.
+        jobs.progressed.connect(lambda title, _share: title or self._advise())
         self.restore()
 
     def _connect(self) -> None:

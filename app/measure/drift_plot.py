@@ -98,6 +98,8 @@ class DriftPlot(QWidget):
             self._plot.getAxis(name).setPen(theme.colour("line"))
             self._plot.getAxis(name).setTextPen(text)
         self._legend.setLabelTextColor(text)
+        for _, label in self._legend.items:
+            label.setText(label.text)  # or it would keep the colour that it was drawn in
         self._zero.setPen(pg.mkPen(theme.colour("line")))
         for name, pair in (("plane", PLANE), ("depth", DEPTH)):
             colour = pair[dark]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent
+from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
@@ -51,6 +51,8 @@ class Fig13(QWidget):
         column.addLayout(self._grid, 1)
         self._plots: list[pg.PlotWidget] = []
         self._evaluation: Evaluation | None = None
+        self._repaint = QTimer(self, interval=1, singleShot=True)
+        self._repaint.timeout.connect(self._draw)
 
     def show_evaluation(self, evaluation: Evaluation) -> None:
         """Draw an evaluation."""
@@ -59,12 +61,14 @@ class Fig13(QWidget):
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and self._evaluation is not None:
-            self._draw()
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_repaint"):
+            # Not at once: Qt walks over all widgets, and none may be made or lost meanwhile.
+            self._repaint.start()
 
     def _draw(self) -> None:
         evaluation = self._evaluation
-        assert evaluation is not None
+        if evaluation is None:
+            return
         for old in self._plots:
             self._grid.removeWidget(old)
             old.deleteLater()

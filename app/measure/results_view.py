@@ -98,6 +98,7 @@ class ResultsView(QWidget):
         self.setLayout(QVBoxLayout())
         bar = QHBoxLayout()
         bar.setContentsMargins(8, 6, 8, 6)
+        bar.setSpacing(8)
         for text, box in ((tr("Sensor"), self.sensor), (tr("What"), self.shape)):
             bar.addWidget(PlainLabel(text))
             bar.addWidget(box)

@@ -32,6 +32,8 @@ from gelpolight_core.translation import tr
 
 WIDTH = 340
 LIST_HEIGHT = 96
+# In a tall window: nine tools without scrolling.
+TALL_LIST = 240
 KEY = Qt.ItemDataRole.UserRole
 
 
@@ -68,7 +70,8 @@ class SidePanel(QScrollArea):
         self.propose = _button("propose", tr("&What is pressed?"), "propose", tr("(Q)"))
         self.propose.clicked.connect(self.propose_wanted)
         self.tools = named(QListWidget(), "measure.tools", tr("Tools on the picture"))
-        self.tools.setFixedHeight(LIST_HEIGHT)
+        self.tools.setMinimumHeight(LIST_HEIGHT)
+        self.tools.setMaximumHeight(TALL_LIST)
         self.tools.currentItemChanged.connect(self._on_tool)
         self.remove = _button("remove", tr("Remove the tool"), "remove", tr("(Delete)"))
         self.remove.clicked.connect(self.remove_wanted)
@@ -102,7 +105,7 @@ class SidePanel(QScrollArea):
             self.reason,
             self.truth,
         ):
-            column.addWidget(widget)
+            column.addWidget(widget, 1 if widget is self.tools else 0)
         column.addLayout(form)
         column.addWidget(self.keep)
         column.addWidget(self.kept)

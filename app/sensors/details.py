@@ -57,6 +57,7 @@ class Details(QWidget):
         self._area = named(QScrollArea(self), "sensors.details.stages", tr("Quality of the stages"))
         self._area.setWidgetResizable(True)
         self._area.setFrameShape(QFrame.Shape.NoFrame)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(12, 0, 0, 0)
         self.busy = named(QProgressBar(self), "sensors.busy", tr("The report is being written"))

@@ -42,3 +42,9 @@ def test_a_calibration_of_another_sensor_or_size_is_named() -> None:
     assert "A" in other and "B" in other
     size = advise(Situation("folder", size=(640, 480), used=MINE)).text
     assert "640x480" in size and "1280x960" in size
+
+
+def test_a_calibration_that_is_being_read_is_not_called_missing() -> None:
+    for now in (Situation("camera", reading=True), Situation("virtual", "V", reading=True)):
+        advice = advise(now)
+        assert "ready" in advice.text and not advice.usable and not advice.act

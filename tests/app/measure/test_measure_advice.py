@@ -30,3 +30,9 @@ def test_with_everything_there_a_press_is_asked_for_and_a_held_one_is_left_in_pe
     assert measuring_advice(ready, held=True, refused="").text == ""
     refused = measuring_advice(ready, held=True, refused="it is grey")
     assert (refused.text, refused.act) == ("it is grey", "live")
+
+
+def test_a_calibration_that_is_being_read_is_not_called_missing() -> None:
+    for held in (False, True):
+        found = measuring_advice(Situation(reading=True), held=held, refused="")
+        assert "ready" in found.text and not found.act

@@ -104,22 +104,25 @@ def is_plain(argument: ast.expr) -> bool:
     return isinstance(argument, ast.Constant)
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
-def test_nothing_in_the_program_shows_a_text_in_another_way(source: Path) -> None:
+# What guesses by the look of a text whether it is HTML, or always takes it for HTML.
+GUESSING = {"QLabel", "QMessageBox", "QErrorMessage", "QProgressDialog", "QTextBrowser"}
+GUESSING |= {"setHtml", "insertHtml", "setTextFormat", "setWhatsThis"}
+
+
+def test_nothing_in_the_program_shows_a_text_in_another_way() -> None:
     """Whoever adds a label, a tip or a message box cannot forget it."""
-    if source.name == "label.py":
-        return
-    found = list(calls(ast.parse(source.read_text("utf-8"))))
-    names = {name for name, _ in found}
-    # What guesses by the look of a text whether it is HTML, or always takes it for HTML.
-    guessing = {"QLabel", "QMessageBox", "QErrorMessage", "QProgressDialog", "QTextBrowser"}
-    assert not names & (guessing | {"setHtml", "insertHtml", "setTextFormat", "setWhatsThis"})
-    assert all(is_plain(call.args[0]) for name, call in found if name == "setToolTip")
+    for source in SOURCES:
+        if source.name == "label.py":
+            continue
+        found = list(calls(ast.parse(source.read_text("utf-8"))))
+        assert not {name for name, _ in found} & GUESSING, source
+        tips = [call.args[0] for name, call in found if name == "setToolTip"]
+        assert all(map(is_plain, tips)), source
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.stem)
-def test_no_text_keeps_the_colour_of_the_theme_it_was_written_in(source: Path) -> None:
+def test_no_text_keeps_the_colour_of_the_theme_it_was_written_in() -> None:
     """A colour in a style of its own would stay after the theme is changed."""
-    for name, call in calls(ast.parse(source.read_text("utf-8"))):
-        if name == "setStyleSheet" and source.name != "theme.py":
-            assert "theme" not in ast.unparse(call), source
+    for source in SOURCES:
+        for name, call in calls(ast.parse(source.read_text("utf-8"))):
+            if name == "setStyleSheet" and source.name != "theme.py":
+                assert "theme" not in ast.unparse(call), source

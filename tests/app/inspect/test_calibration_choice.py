@@ -1,0 +1,56 @@
+"""Which calibration is looked through, and how its reading fares."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.inspect.calibration_choice import CalibrationBox, CalibrationChoice
+from app.shell.context import AppContext
+from app.shell.jobs import Job
+
+
+class Waiting:
+    """Stands for Jobs; nothing begins."""
+
+    def submit(self, job: Job) -> None:
+        job.future = Future()
+        self.job = job
+
+
+def test_a_reading_that_was_stopped_is_over(context: AppContext, qtbot: QtBot) -> None:
+    """Otherwise the page would say for ever that it takes a moment."""
+    box, jobs = CalibrationBox(), Waiting()
+    qtbot.addWidget(box)
+    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    assert not choice.is_reading
+    choice._read(Path("a.gplcal"))
+    assert choice.is_reading
+    assert jobs.job.future is not None
+    jobs.job.future.set_exception(RuntimeError("stopped"))
+    assert not choice.is_reading
+
+
+@pytest.mark.parametrize(("serial", "shown"), [("A", "A-12ab"), ("B", "B  A-12ab")])
+def test_a_calibration_is_named_once_and_can_be_told_from_others(
+    serial: str, shown: str, qtbot: QtBot
+) -> None:
+    class Entry:
+        path = Path("/lab/<b>x.gplcal")
+        in_use = True
+
+        class summary:
+            identity, picture_size = "A-12ab", (8, 6)
+
+    entry: Any = Entry()
+    entry.serial = serial
+    box = CalibrationBox()
+    qtbot.addWidget(box)
+    box.show_entries((entry,))
+    assert box.currentText() == shown
+    assert "&lt;b&gt;" in box.itemData(1, Qt.ItemDataRole.ToolTipRole)
