@@ -119,7 +119,8 @@ def test_who_decides_second_is_told_in_a_sentence(
     """A decision is never written over one that was not seen."""
     root, done = worked
     said = {sentence for program in done for sentence in program["refused"]}
-    assert {sentence for sentence in said if "changed by something else" not in sentence} == set()
+    known = ("changed by something else", "another program is holding the records")
+    assert [sentence for sentence in said if not any(part in sentence for part in known)] == []
     assert read_session(root / "session").decisions.excluded
 
 
