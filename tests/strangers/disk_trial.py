@@ -17,7 +17,7 @@ from pathlib import Path
 
 from recorded import noisy
 from test_every_file_written import tree
-from written import KINDS, RECORD, Written
+from written import DRAWN, KINDS, RECORD, Written
 
 from app.shell.log import Log
 from app.shell.settings import Settings
@@ -128,7 +128,7 @@ def lock(folder: Path) -> str:
 
 def begin(root: Path) -> None:
     """Write the older file of every kind."""
-    for kind in KINDS:
+    for kind in (*KINDS, *DRAWN):
         (root / kind.name).mkdir()
         kind.write(root / kind.name, 0)
     for name in ("records", "recording", "settings", "log", "run"):
@@ -146,7 +146,7 @@ def begin(root: Path) -> None:
 
 def all_tried(root: Path) -> dict[str, str]:
     """Try to write every kind; return what was said."""
-    said = {kind.name: file_kind(kind, root / kind.name) for kind in KINDS}
+    said = {kind.name: file_kind(kind, root / kind.name) for kind in (*KINDS, *DRAWN)}
     said["records"] = record(root / "records")
     said["new records"] = tried(lambda: Workspace(root / "run" / "workspace").records)
     said["recording"] = go_on_recording(root / "recording")
