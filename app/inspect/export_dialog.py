@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
@@ -51,6 +51,7 @@ class ExportDialog(QDialog):
         super().__init__(parent)
         named(self, "inspect.export.dialog", tr("Export"))
         self.setWindowTitle(tr("Export the depth"))
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._formats: dict[str, QCheckBox] = {}
         column = QVBoxLayout(self)
         for name, words in format_words().items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
@@ -35,6 +35,7 @@ class ScreenshotDialog(QDialog):
         super().__init__(parent)
         named(self, "inspect.screenshot.dialog", tr("Screenshot"))
         self.setWindowTitle(tr("Screenshot"))
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._what = named(QComboBox(), "inspect.screenshot.what", tr("What is pictured"))
         if has_surface:
             self._what.addItem(tr("The surface in 3D"), "surface")

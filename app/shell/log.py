@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import logging
 import tempfile
@@ -80,12 +81,16 @@ class Log:
         root.addHandler(self._file)
         logging.captureWarnings(True)
         crash = self.folder / CRASHES
-        left = crash.read_text("utf-8", "replace") if crash.is_file() else ""
+        left = ""
+        try:
+            left = crash.read_text("utf-8", "replace") if crash.is_file() else ""
+            # A crash inside a library cannot be caught; its place can be written down.
+            self._crashes = crash.open("w", encoding="utf-8")
+            faulthandler.enable(self._crashes)
+        except OSError as error:  # the program runs all the same
+            logging.getLogger(__name__).warning("Crashes are not written down: %s", error)
         if left:
             logging.getLogger(__name__).error("The last run ended in a crash:\n%s", left)
-        # A crash inside a library cannot be caught; its place can be written down.
-        self._crashes = crash.open("w", encoding="utf-8")
-        faulthandler.enable(self._crashes)
         logging.getLogger(__name__).info("GelPoLight Studio %s starts", __version__)
         return left
 
@@ -96,20 +101,23 @@ class Log:
         root.removeHandler(self.recent)
         root.removeHandler(self._file)
         root.setLevel(self._level_before)
-        self._file.close()
+        with contextlib.suppress(OSError):  # of a full disk all was told that can be
+            self._file.close()
         if self._crashes is not None:
             faulthandler.disable()
             self._crashes.close()
             self._crashes = None
 
 
-def _open_file(folder: Path | None) -> tuple[Path, RotatingFileHandler]:
+def _open_file(folder: Path | None) -> tuple[Path, logging.Handler]:
     wanted = folder or platformdirs.user_log_path("gelpolight")
-    try:
+    # A full disk, a home that can only be read: then the temporary folder, or no file at all.
+    with contextlib.suppress(OSError):
         return wanted, _handler(wanted)
-    except OSError:  # a full disk, a home that can only be read
+    with contextlib.suppress(OSError):
         spare = Path(tempfile.mkdtemp(prefix="gelpolight-log-"))
         return spare, _handler(spare)
+    return wanted, logging.NullHandler()
 
 
 def _handler(folder: Path) -> RotatingFileHandler:

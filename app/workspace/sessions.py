@@ -50,7 +50,15 @@ def read_session_entry(folder: Path) -> SessionEntry:
         for path in stage.iterdir()
     )
     newest = max(path.stat().st_mtime for path in (folder / DESCRIPTION, *stages))
-    return SessionEntry(folder, _serial(folder), count, datetime.fromtimestamp(newest, UTC))
+    return SessionEntry(folder, _serial(folder), count, file_time(newest))
+
+
+def file_time(seconds: float) -> datetime:
+    """Return a file's time; of one that no calendar has, as some archives say, the nearest."""
+    try:
+        return datetime.fromtimestamp(seconds, UTC)
+    except (OverflowError, ValueError, OSError):
+        return (datetime.max if seconds > 0.0 else datetime.min).replace(tzinfo=UTC)
 
 
 def _serial(folder: Path) -> str:

@@ -57,9 +57,13 @@ class RunLock:
                 where=str(folder),
                 advice=tr("Leave the run there first, or begin another one"),
             ) from error
-        os.ftruncate(self._handle, 0)
-        os.lseek(self._handle, 0, os.SEEK_SET)
-        os.write(self._handle, _name().encode())
+        try:
+            os.ftruncate(self._handle, 0)
+            os.lseek(self._handle, 0, os.SEEK_SET)
+            os.write(self._handle, _name().encode())
+        except OSError as error:
+            self.release()
+            raise unwritable(error, path) from error
 
     def __enter__(self) -> RunLock:
         """Hold it for a block."""

@@ -10,7 +10,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.reading import open_file
 from gelpolight_core.translation import tr
 
-_Mark = tuple[int, int]
+_Mark = tuple[int, ...]
 
 
 class KnownFiles:
@@ -67,12 +67,15 @@ class KnownFiles:
 
 
 def _mark(path: Path) -> _Mark | None:
-    """Return size and time of a file, which cost less to look at than what it holds."""
+    """Return what changes with a file, and costs less to look at than what it holds.
+
+    Its times alone do not tell: clocks are set back, and some disks count in steps of two seconds.
+    """
     try:
         stat = path.stat()
     except OSError:
         return None
-    return stat.st_size, stat.st_mtime_ns
+    return stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino
 
 
 def _digest(path: Path) -> bytes | None:

@@ -6,6 +6,7 @@ said of each kind: a sentence, nothing where it was written after all, or what s
 
 from __future__ import annotations
 
+import gc
 import json
 import logging
 import os
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from recorded import noisy
 from test_every_file_written import tree
-from written import KINDS, RECORD, Written
+from written import DRAWN, KINDS, RECORD, Written
 
 from app.shell.log import Log
 from app.shell.settings import Settings
@@ -127,7 +128,7 @@ def lock(folder: Path) -> str:
 
 def begin(root: Path) -> None:
     """Write the older file of every kind."""
-    for kind in KINDS:
+    for kind in (*KINDS, *DRAWN):
         (root / kind.name).mkdir()
         kind.write(root / kind.name, 0)
     for name in ("records", "recording", "settings", "log", "run"):
@@ -145,7 +146,7 @@ def begin(root: Path) -> None:
 
 def all_tried(root: Path) -> dict[str, str]:
     """Try to write every kind; return what was said."""
-    said = {kind.name: file_kind(kind, root / kind.name) for kind in KINDS}
+    said = {kind.name: file_kind(kind, root / kind.name) for kind in (*KINDS, *DRAWN)}
     said["records"] = record(root / "records")
     said["new records"] = tried(lambda: Workspace(root / "run" / "workspace").records)
     said["recording"] = go_on_recording(root / "recording")
@@ -155,6 +156,14 @@ def all_tried(root: Path) -> dict[str, str]:
     return said
 
 
+def left_open(root: Path) -> list[str]:
+    """Return the files of the disk that are still open."""
+    gc.collect()
+    handles = Path("/proc/self/fd").iterdir()
+    names = [os.readlink(handle) for handle in handles if handle.exists()]
+    return [name for name in names if name.startswith(str(root))]
+
+
 def main() -> None:
     """Try both disks."""
     root = Path(sys.argv[1])
@@ -162,8 +171,12 @@ def main() -> None:
     begin(root)
     filler = fill(root)
     full = all_tried(root)
+    full["open files"] = "; ".join(left_open(root)) and f"FAULT: left open: {left_open(root)}"
     filler.unlink()
-    subprocess.run(["mount", "-o", "remount,ro", str(root)], check=True)
+    remounted = subprocess.run(["mount", "-o", "remount,ro", str(root)], check=False)
+    if remounted.returncode:
+        print(json.dumps({"full": full, "read-only": {}}))
+        return
     print(json.dumps({"full": full, "read-only": all_tried(root)}))
 
 

@@ -200,8 +200,6 @@ KINDS = (
     Written("profile", _profile),
     Written("table of records", _table),
     Written("report as HTML", partial(_report, "html")),
-    Written("report as PDF", partial(_report, "pdf")),
-    Written("board", _board),
     Written("protocol", _protocol),
     Written("press of a protocol", _press),
     Written("refusal of a press", _refusal),
@@ -210,3 +208,6 @@ KINDS = (
     Written("summary of a batch", _summary),
     Written("settings of a batch", _settings),
 )  # fmt: skip
+
+# Of these the drawing takes long; they are tried on the real disks only.
+DRAWN = (Written("report as PDF", partial(_report, "pdf")), Written("board", _board))

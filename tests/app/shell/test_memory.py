@@ -1,11 +1,79 @@
-"""The C library is kept from hoarding memory."""
+"""Memory goes back to the system, and threads share what is kept of it."""
 
 from __future__ import annotations
 
+import ctypes
 import subprocess
 import sys
+import threading
+from pathlib import Path
 
 import pytest
+from pytestqt.qtbot import QtBot
+
+from app.shell import main_window
+from app.shell.context import AppContext
+from app.shell.main_window import MainWindow
+from app.shell.memory import give_back
+from app.shell.pages import PageEntry
+
+PIECE, PIECES = 60_000, 3000
+
+
+def resident_mb() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
+
+
+@pytest.mark.skipif(
+    not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="a call of the GNU C library"
+)
+def test_what_a_thread_has_given_back_goes_to_the_system() -> None:
+    """The last piece is still in use: without the call all below it would stay."""
+    library = ctypes.CDLL(None)
+    library.malloc.restype = ctypes.c_void_p
+    library.free.argtypes = [ctypes.c_void_p]
+    pieces: list[int] = []
+
+    def work() -> None:
+        for _ in range(PIECES):
+            pieces.append(library.malloc(PIECE))
+            ctypes.memset(pieces[-1], 1, PIECE)
+        for piece in pieces[:-1]:
+            library.free(piece)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    before_mb = resident_mb()
+    give_back()
+    assert before_mb - resident_mb() > 0.5e-6 * PIECE * PIECES
+    library.free(pieces[-1])
+
+
+def test_nothing_happens_where_there_is_no_such_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(ctypes, "CDLL", None)
+    give_back()
+
+
+def test_the_window_does_so_when_another_page_is_shown(
+    context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(main_window, "TIDY_MS", 0)
+    given: list[bool] = []
+    monkeypatch.setattr(main_window, "give_back", lambda: given.append(True))
+    pages = tuple(
+        PageEntry(name, name, "sensors", "app.sensors.page:SensorsPage") for name in ("one", "two")
+    )
+    window = MainWindow(context=context, pages=pages)
+    qtbot.addWidget(window)
+    window.show_page("one")
+    qtbot.waitUntil(lambda: window.page_name == "one" and bool(given), timeout=20_000)
+    given.clear()
+    window.show_page("two")
+    qtbot.waitUntil(lambda: bool(given), timeout=20_000)
+    window.close()
+
 
 HOARD = """
 import ctypes, sys, threading

@@ -1,0 +1,39 @@
+"""Dialogs of the Inspect page: opened a thousand times, none of them is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtWidgets import QApplication, QDialog, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.inspect.export_dialog import ExportDialog
+from app.inspect.screenshot import ScreenshotDialog
+
+MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
+    "export": lambda host: ExportDialog(Path("depth"), count=3, at=1, parent=host),
+    "screenshot": lambda host: ScreenshotDialog(400, 300, True, parent=host),
+}
+
+
+@pytest.mark.parametrize("name", MAKERS)
+@pytest.mark.parametrize("way", ["escape", "accepted"])
+def test_nothing_of_a_dialog_is_left_when_it_is_closed(name: str, way: str, qtbot: QtBot) -> None:
+    host = QWidget()
+    qtbot.addWidget(host)
+    host.show()
+    before = len(QApplication.allWidgets())
+    for _ in range(3):
+        dialog = MAKERS[name](host)
+        dialog.open()
+        if way == "escape":
+            qtbot.keyClick(dialog, Qt.Key.Key_Escape)
+        else:
+            dialog.accept()
+        del dialog
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    assert len(QApplication.allWidgets()) == before
+    assert host.findChildren(QDialog) == []

@@ -1,0 +1,130 @@
+"""The clock is set back while the program runs, or files come from another time."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from types import ModuleType
+from typing import Self
+
+import pytest
+from recorded import noisy
+from written import calibration
+
+from app.inspect import record_control
+from app.workspace import workspace as workspace_module
+from app.workspace.sessions import file_time
+from app.workspace.workspace import Workspace
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.measurement import protocol_run
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.session.outside import KnownFiles
+
+NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
+
+
+class Clock(datetime):
+    """A clock that a test sets."""
+
+    shown = NOW
+
+    @classmethod
+    def now(cls, tz: object = None) -> Self:
+        """Return what it shows."""
+        return cls.fromtimestamp(cls.shown.timestamp(), tz or UTC)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> type[Clock]:
+    modules: tuple[ModuleType, ...] = (workspace_module, record_control, protocol_run)
+    for module in modules:
+        monkeypatch.setattr(module, "datetime", Clock)
+    monkeypatch.setattr(Clock, "shown", NOW)
+    return Clock
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    return Workspace(tmp_path / "workspace")
+
+
+def kept(workspace: Workspace, name: str, created: datetime) -> Path:
+    """Put a calibration of some time into the library."""
+    origin = replace(calibration().provenance, created=created.isoformat())
+    path = workspace.calibration_path("T-1", name)
+    write_calibration(replace(calibration(), provenance=origin), path)
+    return path
+
+
+def test_a_calibration_of_tomorrow_is_new_and_stands_first(workspace: Workspace) -> None:
+    kept(workspace, "older", NOW - timedelta(days=10))
+    tomorrow = kept(workspace, "newer", NOW + timedelta(days=1))
+    entries = workspace.entries()
+    assert entries[0].path == tomorrow
+    assert [round(entry.age_days(NOW) or 0.0) for entry in entries] == [0, 10]
+
+
+def test_two_things_removed_in_the_same_second_can_both_be_put_back(
+    workspace: Workspace, clock: type[Clock]
+) -> None:
+    paths = [kept(workspace, name, NOW) for name in ("a", "b")]
+    contents = [path.read_bytes() for path in paths]
+    removed = [workspace.remove(path) for path in paths]
+    clock.shown = NOW - timedelta(hours=1)
+    kept(workspace, "c", NOW)
+    for removal in removed:
+        workspace.restore(removal)
+    assert [path.read_bytes() for path in paths] == contents
+
+
+def test_a_recording_never_takes_the_name_of_one_of_the_same_second(
+    workspace: Workspace, clock: type[Clock]
+) -> None:
+    first = workspace.recording_path("A")
+    first.write_bytes(b"one")
+    also = record_control.recording_path(workspace, "A")
+    also.write_bytes(b"two")
+    clock.shown = NOW + timedelta(hours=1)
+    workspace.recording_path("A").write_bytes(b"three")
+    clock.shown = NOW
+    assert not workspace.recording_path("A").exists()
+    assert not record_control.recording_path(workspace, "A").exists()
+    assert len(list(first.parent.iterdir())) == 3
+
+
+def test_a_run_goes_on_where_it_was_left(tmp_path: Path, clock: type[Clock]) -> None:
+    begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
+    run = open_run(tmp_path)
+    for hours, press in enumerate(run.wanted[:3]):
+        clock.shown = NOW - timedelta(hours=hours)
+        run.refuse(press, "nothing is pressed")
+        run.accept(press, [noisy(hours)])
+    again = open_run(tmp_path)
+    assert again.done == run.wanted[:3]
+    assert again.next() == run.wanted[3]
+    assert again.progress.refused == 3
+    twice = [again.take_back(run.wanted[0])]
+    again.accept(run.wanted[0], [noisy(7)])
+    clock.shown += timedelta(microseconds=1)
+    twice.append(again.take_back(run.wanted[0]))
+    assert all(path is not None and path.is_file() for path in twice)
+    assert twice[0] != twice[1]
+
+
+def test_a_file_that_was_replaced_is_noticed_whatever_its_time_says(tmp_path: Path) -> None:
+    path, other = tmp_path / "decisions.toml", tmp_path / "other"
+    path.write_text("a = 1\n")
+    known = KnownFiles([path])
+    other.write_text("a = 2\n")
+    os.utime(other, ns=(path.stat().st_atime_ns, path.stat().st_mtime_ns))
+    os.replace(other, path)
+    assert known.changed() == (path,)
+
+
+@pytest.mark.parametrize("seconds", [1e12, -1e12, 1e300])
+def test_a_file_of_no_time_that_calendars_have_has_a_time(seconds: float) -> None:
+    """Some disks keep whatever time an archive says; a session from there is listed."""
+    assert (file_time(seconds) > NOW) == (seconds > 0.0)

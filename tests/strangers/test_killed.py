@@ -1,0 +1,119 @@
+"""The program is killed at any moment: what it said was kept is there, and the rest is whole."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from app.workspace.indenters import read_indenters
+from app.workspace.workspace import Workspace
+from gelpolight_core.batch.ledger import BatchLedger
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.protocol_run import open_run
+from gelpolight_core.session.session import read_picture, read_session
+
+HERE = Path(__file__).resolve().parent
+LONGEST_S = 0.5
+
+AT_WORK = """
+import sys
+from dataclasses import replace
+from pathlib import Path
+from recorded import noisy
+from written import calibration
+from app.workspace.indenters import first_indenters, write_indenters
+from app.workspace.workspace import Workspace
+from gelpolight_core.batch.ledger import BatchLedger, FrameRow
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_run import begin_run
+from gelpolight_core.session.description import write_description
+from gelpolight_core.session.session import read_session
+from gelpolight_core.simulation.session import session_toml
+
+root = Path(sys.argv[1])
+for name in ("run", "session"):
+    (root / name).mkdir()
+(root / "session" / "session.toml").write_text(session_toml(SensorDesign()))
+run = begin_run(root / "run", Protocol(), serial="A", calibration="c")
+ledger, rows = Ledger(root / "measured.jsonl", "c"), BatchLedger(root / "frames.jsonl")
+session, workspace = read_session(root / "session"), Workspace(root / "workspace")
+made = calibration()
+
+def tell(kind, number):
+    print(kind, number, flush=True)
+
+for number, press in enumerate(run.wanted):
+    run.accept(press, [noisy(number)])
+    tell("press", press.file)
+    run.refuse(press, "nothing is pressed")
+    tell("refusal", number)
+    ledger.keep(f"k{number}", "no object is pressed")
+    tell("measurement", number)
+    rows.keep([FrameRow(f"a{number}", "s", "a.png")])
+    tell("frame", number)
+    radii = {f"ball_{k}.png": 2.0 for k in range(number + 1)}
+    write_description(replace(session, ball_radii_mm=radii))
+    tell("radius", number)
+    write_indenters(first_indenters()[number % 3 :], workspace.folder)
+    tell("indenters", number % 3)
+    path = workspace.calibration_path("T-1", f"c{number}")
+    write_calibration(replace(made, noise=made.noise * (number + 1)), path)
+    workspace.use(path)
+    tell("calibration", path.name)
+"""
+
+
+def told_until_killed(root: Path, seed: int) -> list[list[str]]:
+    """Let a program write, kill it at a moment that the seed says; return what it has told."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", AT_WORK, str(root)],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (HERE, *HERE.parents[:2])))},
+        text=True,
+    )
+    assert process.stdout is not None
+    with process:
+        first = process.stdout.readline()
+        end = threading.Timer(random.Random(seed).uniform(0.0, LONGEST_S), process.kill)
+        end.start()
+        rest = process.stdout.read()
+        end.join()
+    assert process.returncode == -9, "it ended by itself"
+    # A line that was cut off was not told.
+    return [line.split() for line in (first + rest).split("\n")[:-1]]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_was_told_is_there_and_all_files_are_whole(seed: int, tmp_path: Path) -> None:
+    told = told_until_killed(tmp_path, seed)
+    by_kind: dict[str, list[str]] = {}
+    for kind, name in told:
+        by_kind.setdefault(kind, []).append(name)
+    run = open_run(tmp_path / "run")
+    assert set(by_kind["press"]) <= {press.file for press in run.done}
+    for press in run.done:
+        read_picture(run.picture(press))
+    assert run.progress.refused >= len(by_kind.get("refusal", []))
+    ledger = Ledger(tmp_path / "measured.jsonl", "c")
+    assert all(ledger.find(f"k{number}") for number in by_kind.get("measurement", []))
+    rows = BatchLedger(tmp_path / "frames.jsonl")
+    assert all(rows.has(f"a{number}", "s") for number in by_kind.get("frame", []))
+    session = read_session(tmp_path / "session")
+    assert len(session.ball_radii_mm) >= len(by_kind.get("radius", []))
+    workspace = Workspace(tmp_path / "workspace")
+    if "indenters" in by_kind:
+        assert read_indenters(workspace.folder)
+    entries = {entry.path.name for entry in workspace.entries() if not entry.broken}
+    assert set(by_kind.get("calibration", [])) <= entries
+    if workspace.in_use is not None:
+        read_calibration(workspace.in_use)

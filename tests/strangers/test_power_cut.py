@@ -1,0 +1,189 @@
+"""The power is cut in the middle of a write: the older file or the newer one, never a mixture."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from recorded import noisy, write_recording
+from written import KINDS, RECORD, Written, calibration
+
+from app.workspace.workspace import Workspace
+from gelpolight_core.batch.ledger import BatchLedger, FrameRow
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_run import begin_run, open_run
+from gelpolight_core.recording import layout
+from gelpolight_core.recording.reader import Recording
+from gelpolight_core.records.records import NAME, Records
+
+BLOCK = 64
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_bytes_are_on_the_disk_before_their_name_and_the_name_before_all_else(
+    kind: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kind.write(tmp_path, 0)
+    calls: list[tuple[str, str]] = []
+
+    def noted(name: str, act: Callable[..., Any]) -> Callable[..., Any]:
+        def call(first: Any, *others: Any, **options: Any) -> Any:
+            where = os.readlink(f"/proc/self/fd/{first}") if name == "fsync" else str(first)
+            calls.append((name, where))
+            return act(first, *others, **options)
+
+        return call
+
+    for name in ("fsync", "replace", "link"):
+        monkeypatch.setattr(os, name, noted(name, getattr(os, name)))
+    kind.write(tmp_path, 1)
+    named = [place for place, (name, _) in enumerate(calls) if name in ("replace", "link")]
+    assert calls
+    for place in named:
+        assert calls[place - 1] == ("fsync", calls[place][1])
+        assert calls[place + 1] == ("fsync", str(Path(calls[place][1]).parent))
+
+
+def test_half_a_file_under_its_first_name_is_no_file_of_anybody(tmp_path: Path) -> None:
+    """A cut leaves a part of the file that was to take the older one's place."""
+    workspace = Workspace(tmp_path / "workspace")
+    path = workspace.calibration_path("T-1", "c")
+    write_calibration(calibration(), path)
+    whole = path.read_bytes()
+    folder = workspace.protocols_folder("T-1") / "run"
+    begin_run(folder, Protocol(repeats=1, regions=2), serial="T-1", calibration="c")
+    run = open_run(folder)
+    picture = run.accept(run.wanted[0], [noisy(0)])
+    workspace.use(path)
+    for size in (0, 1, 100, len(whole) // 2, len(whole) - 1):
+        for old in (path, picture, picture.with_name("truth.csv"), workspace.folder / "w.json"):
+            (old.parent / f".{old.name}.0badcafe.part").write_bytes(whole[:size])
+        assert [entry.path for entry in workspace.entries()] == [path]
+        assert workspace.in_use == path
+        assert open_run(folder).done == run.wanted[:1]
+        assert workspace.protocols() == (folder,)
+
+
+def lines_before(content: bytes, size: int) -> int:
+    """Return how many whole lines are in the first bytes of a file."""
+    return content[:size].count(b"\n")
+
+
+def test_measurements_of_a_run_cut_anywhere_keep_every_whole_line_and_go_on(tmp_path: Path) -> None:
+    path = tmp_path / "measured.jsonl"
+    ledger = Ledger(path, "c")
+    for number in range(3):
+        ledger.keep(f"k{number}", f"sentence {number}")
+    content = path.read_bytes()
+    for size in range(len(content) + 1):
+        path.write_bytes(content[:size])
+        again = Ledger(path, "c")
+        whole = lines_before(content, size)
+        # Of the last line only its end may be missing.
+        found = sum(again.find(f"k{number}") is not None for number in range(3))
+        assert whole <= found <= whole + 1
+        again.keep("new", "after the cut")
+        reread = Ledger(path, "c")
+        assert reread.find("new") == "after the cut"
+        assert sum(reread.find(f"k{number}") is not None for number in range(3)) == found
+
+
+def test_frames_of_a_batch_cut_anywhere_keep_every_whole_line_and_go_on(tmp_path: Path) -> None:
+    path = tmp_path / "frames.jsonl"
+    BatchLedger(path).keep([FrameRow(f"a{k}", "s", "a.png") for k in range(3)])
+    content = path.read_bytes()
+    for size in range(1, len(content) + 1, 3):
+        path.write_bytes(content[:size])
+        again = BatchLedger(path)
+        whole = lines_before(content, size)
+        assert [again.has(f"a{k}", "s") for k in range(3)] == [k < whole for k in range(3)]
+        again.keep([FrameRow("new", "s", "a.png")])
+        names = [f"a{k}" for k in range(whole)] + ["new"]
+        assert [row.output for row in again.rows()] == names
+        # A line of which only the end was missing is whole again now.
+        assert {row.output for row in BatchLedger(path).rows()} - {f"a{whole}"} == set(names)
+
+
+def test_refusals_cut_anywhere_leave_the_run_as_it_is(tmp_path: Path) -> None:
+    begin_run(tmp_path, Protocol(repeats=1, regions=2), serial="A", calibration="c")
+    run = open_run(tmp_path)
+    run.accept(run.wanted[0], [noisy(0)])
+    run.refuse(run.wanted[1], "nothing is pressed")
+    path = tmp_path / "refused.csv"
+    content = path.read_bytes()
+    for size in range(len(content) + 1):
+        path.write_bytes(content[:size])
+        assert open_run(tmp_path).done == run.wanted[:1]
+
+
+def test_a_recording_without_any_block_of_what_was_not_on_the_disk_gives_no_wrong_frame(
+    tmp_path: Path,
+) -> None:
+    """The disk writes in an order of its own: any block may be missing while later ones are there.
+
+    The link to a frame can be there without the frame.
+    """
+    path = tmp_path / "a.gplrec"
+    pictures = write_recording(path, frames=3, shape=(16, 16))
+    whole = path.read_bytes()
+    first = whole.index(layout.FRAME_MAGIC)
+    for place in range(first, len(whole), BLOCK):
+        spoilt = bytearray(whole)
+        spoilt[place : place + BLOCK] = bytes(len(spoilt[place : place + BLOCK]))
+        path.write_bytes(spoilt)
+        found = 0
+        with Recording.open(path) as recording:
+            for index in range(len(recording)):
+                try:
+                    frame = recording.frame(index)
+                except InputError:
+                    continue
+                assert np.array_equal(frame.rgb, pictures[frame.number])
+                found += 1
+        assert found >= 1  # a block can hold the end of a frame and the beginning of the next
+
+
+@pytest.mark.parametrize("journal", ["whole", "cut", "gone"])
+def test_records_cut_off_within_a_change_have_all_that_was_kept_before(
+    tmp_path: Path, journal: str
+) -> None:
+    """The journal is on the disk before anything of the file is changed: SQLite waits for it."""
+    path, cut = tmp_path / NAME, tmp_path / "cut"
+    with Records.open(path) as records:
+        for _ in range(3):
+            records.add(RECORD)
+    cut.mkdir()
+    connection = sqlite3.connect(path, isolation_level=None)
+    # So small a cache that pages go to the file before the change is done.
+    connection.execute(
+        "PRAGMA cache_size = 1" if journal == "whole" else "PRAGMA cache_size = 5000"
+    )
+    connection.execute("BEGIN IMMEDIATE")
+    connection.executemany(
+        "INSERT INTO sensors (serial, first_seen) VALUES (?, 'x')",
+        [(f"s{k}" * 50,) for k in range(300)],
+    )
+    for file in (path, path.with_name(f"{NAME}-journal")):
+        if file.exists():
+            shutil.copy(file, cut / file.name)
+    connection.execute("ROLLBACK")
+    connection.close()
+    left = cut / f"{NAME}-journal"
+    assert left.exists()
+    if journal == "cut":
+        left.write_bytes(left.read_bytes()[: left.stat().st_size // 2])
+    elif journal == "gone":
+        left.unlink()
+    with Records.open(cut / NAME) as records:
+        assert not records.notice
+        assert len(records.measurements()) == 3
+        assert records.sensors() == ("A",)

@@ -1,0 +1,156 @@
+"""Two programs on one workspace: both work right, and neither loses what the other one keeps."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.shell.settings import Settings
+from app.workspace.workspace import Workspace
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.simulation.session import session_toml
+
+HERE = Path(__file__).resolve().parent
+ROUNDS = 12
+
+AT_WORK = """
+import json, sys
+from dataclasses import replace
+from pathlib import Path
+from recorded import noisy
+from written import RECORD, calibration
+from app.workspace.workspace import Workspace
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.errors import InputError
+
+root, who, rounds = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
+workspace = Workspace(root / "workspace")
+source = root / who / "c.gplcal"  # the other one imports a file of the same name
+source.parent.mkdir()
+made = calibration()
+write_calibration(replace(made, noise=made.noise * (1 + (who == "b"))), source)
+print("ready", flush=True)
+sys.stdin.readline()
+project = CalibrationProject(root / "session")
+done = {"captures": [], "records": [], "refused": []}
+for number in range(rounds):
+    try:
+        workspace.use(workspace.import_calibration(source))
+        done["captures"].append(project.add_capture(Stage.BALLS, [noisy(number)]))
+        done["records"].append(workspace.records.add(RECORD))
+        project.exclude(Stage.BALLS, done["captures"][-1], True)
+    except InputError as error:
+        done["refused"].append(str(error))
+print(json.dumps(done))
+"""
+
+
+@pytest.fixture(scope="module")
+def worked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[str, list[str]]]]:
+    """Let two programs work at once; return the folder, and what each of them has done."""
+    root = tmp_path_factory.mktemp("shared")
+    (root / "session").mkdir()
+    (root / "session" / "session.toml").write_text(session_toml(SensorDesign()))
+    paths = os.pathsep.join(map(str, (HERE, *HERE.parents[:2])))
+    programs = [
+        subprocess.Popen(
+            [sys.executable, "-c", AT_WORK, str(root), who, str(ROUNDS)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": paths},
+            text=True,
+        )
+        for who in "ab"
+    ]
+    for program in programs:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "ready\n"
+    for program in programs:
+        assert program.stdin is not None
+        program.stdin.write("go\n")
+        program.stdin.flush()
+    done = [json.loads(program.communicate()[0]) for program in programs]
+    assert [program.returncode for program in programs] == [0, 0]
+    return root, done
+
+
+def test_every_picture_that_was_said_to_be_kept_is_there(
+    worked: tuple[Path, list[dict[str, list[str]]]],
+) -> None:
+    root, done = worked
+    names = [name for program in done for name in program["captures"]]
+    assert len(set(names)) == len(names) == 2 * ROUNDS
+    session = read_session(root / "session")
+    assert {path.name for path in session.captured("balls")} == set(names)
+    for path in session.captured("balls"):
+        read_picture(path)
+
+
+def test_every_measurement_is_there(worked: tuple[Path, list[dict[str, list[str]]]]) -> None:
+    root, done = worked
+    with Records.open(root / "workspace" / NAME) as records:
+        kept = {record.id for record in records.measurements()}
+    assert kept == {number for program in done for number in program["records"]}
+
+
+def test_both_calibrations_are_in_the_library_once_and_one_is_in_use(
+    worked: tuple[Path, list[dict[str, list[str]]]],
+) -> None:
+    workspace = Workspace(worked[0] / "workspace")
+    entries = workspace.entries()
+    assert len({entry.summary.identity for entry in entries if entry.summary}) == len(entries) == 2
+    assert workspace.in_use in [entry.path for entry in entries]
+
+
+def test_who_decides_second_is_told_in_a_sentence(
+    worked: tuple[Path, list[dict[str, list[str]]]],
+) -> None:
+    """A decision is never written over one that was not seen."""
+    root, done = worked
+    said = {sentence for program in done for sentence in program["refused"]}
+    known = ("changed by something else", "another program is holding the records")
+    assert [sentence for sentence in said if not any(part in sentence for part in known)] == []
+    assert read_session(root / "session").decisions.excluded
+
+
+def test_settings_of_both_are_kept(tmp_path: Path) -> None:
+    one, two = Settings(tmp_path / "desktop.ini"), Settings(tmp_path / "desktop.ini")
+    one.theme = "dark"
+    one.save()
+    two.last_page = "measure"
+    two.save()
+    again = Settings(tmp_path / "desktop.ini")
+    assert (again.theme, again.last_page) == ("dark", "measure")
+
+
+def test_the_folder_of_a_run_is_written_by_one_program(tmp_path: Path) -> None:
+    script = (
+        "import sys; from pathlib import Path;"
+        "from gelpolight_core.export.run_lock import RunLock;"
+        "held = RunLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.readline()"
+    )
+    program = subprocess.Popen(
+        [sys.executable, "-c", script, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(HERE.parents[1])},
+        text=True,
+    )
+    assert program.stdout is not None
+    assert program.stdout.readline() == "held\n"
+    with pytest.raises(InputError, match=rf"is being written by .*process {program.pid}"):
+        RunLock(tmp_path)
+    program.kill()
+    program.communicate()
+    RunLock(tmp_path).release()
