@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes both lock files again from pyproject.toml, with the newest versions that it allows.
+# Makes the three lock files again from pyproject.toml, with the newest versions that it allows.
 # Needs Python 3.11 to 3.13 with venv, and the network. The tool that resolves (uv) lives in a folder that is thrown away.
 set -eu
 cd "$(dirname "$0")/.."
@@ -34,4 +34,9 @@ lock() { # FILE WHAT [OPTION...]
 
 lock packaging/requirements.lock "What the program needs"
 lock packaging/requirements-dev.lock "What the program and its tests need" --extra dev \
+    --constraint packaging/requirements.lock
+
+# PyInstaller is GPL 2 with an exception for what it builds: a tool of the build, never a part of the program.
+echo "pyinstaller>=6.16" >"$scratch/freeze.txt"
+lock packaging/requirements-freeze.lock "What the frozen build is made of and with" "$scratch/freeze.txt" \
     --constraint packaging/requirements.lock
