@@ -138,6 +138,8 @@ def collect(contents: Iterable[tuple[str, str]]) -> list[Part]:
     def add(part: Part, place: str) -> None:
         known = parts.setdefault(part.name, part)
         known.texts.update(part.texts)
+        if part.version not in known.version:
+            known.version += f", {part.version}"
         known.places.append(place)
 
     packages = {package.name: _of_package(package) for package in distributions()}
@@ -251,7 +253,7 @@ def written(parts: Iterable[Part]) -> str:
     for part in parts:
         lines.append(f"{f'{part.name} {part.version}':{width}}  {part.licence}")
         if "GPL" in part.licence:
-            lines += [f"    {place}" for place in sorted(part.places)]
+            lines += [f"    {place}" for place in sorted(part.places) if LIBRARY.search(place)]
     texts = {"GelPoLight Studio": (ROOT / "LICENSE").read_text("utf-8")}
     for part in parts:
         texts.update(part.texts)
