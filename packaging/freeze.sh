@@ -3,6 +3,7 @@
 #
 #     sh packaging/freeze.sh           dist/gelpolight-studio/ and dist/gelpolight-studio_VERSION_ARCHITECTURE.deb
 #     sh packaging/freeze.sh folder    the folder alone
+#     sh packaging/freeze.sh package   the package alone, of the folder that is there
 #
 # Needs Python 3.11 to 3.13 with venv and its shared library, binutils, and for the package dpkg-deb. The package
 # runs on systems at least as new as this one: make it on the oldest that is to be served (Debian 12).
@@ -12,9 +13,9 @@ cd "$(dirname "$0")/.."
 
 kind=${1:-all}
 case $kind in
-all | folder) ;;
+all | folder | package) ;;
 *)
-    echo "packaging/freeze.sh: unknown argument \"$kind\"; use folder, or nothing." >&2
+    echo "packaging/freeze.sh: unknown argument \"$kind\"; use folder, package, or nothing." >&2
     exit 2
     ;;
 esac
@@ -90,7 +91,9 @@ make_package() {
 }
 
 mkdir -p "$work"
-make_environment
-freeze
+if [ "$kind" != package ]; then
+    make_environment
+    freeze
+fi
 report_sizes
 [ "$kind" = folder ] || make_package

@@ -33,6 +33,15 @@ NAMED_VERSIONS = (
 Entry = tuple[str, str, str]
 """Place in the build, file it is made from, kind: an entry of PyInstaller's tables."""
 
+# Imported from C, where PyInstaller does not look.
+HIDDEN_MODULES = (
+    "PySide6.support.deprecated",
+    "isal.igzip_lib",
+    "numba._devicearray",
+    "vtkmodules.numpy_interface",
+    "vtkmodules.util",
+)
+
 LEFT_OUT_MODULES = (
     "IPython",
     "PIL._avif",  # formats and fonts that Matplotlib does not ask Pillow for
@@ -56,7 +65,6 @@ LEFT_OUT_MODULES = (
     "numba.cuda",
     "pyqtgraph.console",
     "pyqtgraph.examples",
-    "pyqtgraph.multiprocess",
     "pyqtgraph.opengl",
     "readline",  # GPL
     "setuptools",
