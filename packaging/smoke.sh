@@ -199,7 +199,7 @@ windows() {
 check_desktop() {
     inside desktop-file-validate /usr/share/applications/gelpolight.desktop || fail "the desktop entry is wrong"
     inside env XDG_DATA_DIRS=/usr/share grep -q gplcal /usr/share/mime/globs2 || fail "the file types are not known"
-    say "The desktop knows: $(grep -h gpl "$place/usr/share/mime/globs2" "$place/usr/share/applications/mimeinfo.cache" | tr '\n' ' ')"
+    say "The desktop knows: $(grep -h gelpolight "$place/usr/share/mime/globs2" "$place/usr/share/applications/mimeinfo.cache" | tr '\n' ' ')"
 }
 
 look_at_logs() {
