@@ -33,13 +33,23 @@ NAMED_VERSIONS = (
 Entry = tuple[str, str, str]
 """Place in the build, file it is made from, kind: an entry of PyInstaller's tables."""
 
-# Imported from C, where PyInstaller does not look.
+# Imported from C, where PyInstaller does not look. Not the whole of VTK's folders: others of their
+# modules would bring three times as many of its libraries.
 HIDDEN_MODULES = (
     "PySide6.support.deprecated",
     "isal.igzip_lib",
     "numba._devicearray",
-    "vtkmodules.numpy_interface",
-    "vtkmodules.util",
+    "vtkmodules.numpy_interface.array_overrides",
+    "vtkmodules.numpy_interface.vtk_affine_array",
+    "vtkmodules.numpy_interface.vtk_aos_array",
+    "vtkmodules.numpy_interface.vtk_composite_array",
+    "vtkmodules.numpy_interface.vtk_constant_array",
+    "vtkmodules.numpy_interface.vtk_implicit_array",
+    "vtkmodules.numpy_interface.vtk_indexed_array",
+    "vtkmodules.numpy_interface.vtk_soa_array",
+    "vtkmodules.numpy_interface.vtk_strided_array",
+    "vtkmodules.numpy_interface.vtk_structured_point_array",
+    "vtkmodules.util.data_array_selection",
 )
 
 LEFT_OUT_MODULES = (
