@@ -22,7 +22,7 @@ from app.shell.context import AppContext, Requests, SourceChoice
 from app.shell.faults import Faults
 from app.shell.icons import application_icon
 from app.shell.log import Log
-from app.shell.main_window import MainWindow
+from app.shell.main_window import SOURCES, MainWindow
 from app.shell.memory import keep_arenas_few
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
@@ -31,6 +31,7 @@ from app.sources.stopping import join_left_behind
 from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
+from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 from gelpolight_core.translation import tr
 
 # The first page is drawn and answers before anything heavy is loaded beside it.
@@ -45,7 +46,7 @@ def run(arguments: Sequence[str] = ()) -> int:
     Parameters
     ----------
     arguments : sequence of str
-        ``--demo`` puts the virtual sensor in as the source.
+        ``--demo`` puts the virtual sensor in as the source; anything else is a file to open.
 
     Returns
     -------
@@ -70,6 +71,8 @@ def run(arguments: Sequence[str] = ()) -> int:
         window.show()
         if "--demo" in arguments:
             QTimer.singleShot(0, window.begin_demo)  # after the window is up
+        elif arguments:
+            open_files(window, [Path(argument) for argument in arguments])
         if crash:
             context.toasts.show(
                 tr("The program ended in a crash last time; the log says where."),
@@ -95,6 +98,17 @@ def run(arguments: Sequence[str] = ()) -> int:
         sys.stdout.flush()
         os._exit(status)
     return status
+
+
+def open_files(window: MainWindow, files: Sequence[Path]) -> None:
+    """Open what a desktop hands over, as if it were dropped; a recording is played at once."""
+
+    def go_on() -> None:
+        window.open_dropped(tuple(files))
+        if any(file.suffix.lower() == RECORDING_ENDING for file in files):
+            window.show_page("inspect")
+
+    window.loader.when_loaded(SOURCES, go_on)
 
 
 @contextmanager

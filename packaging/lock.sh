@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes the lock files again from pyproject.toml: two with the newest versions that it allows, and requirements-oldest
-# with the oldest (packaging/oldest.sh tests with these).
+# Makes the lock files again from pyproject.toml: all with the newest versions that it allows, but
+# requirements-oldest with the oldest (packaging/oldest.sh tests with these).
 #
 #     sh packaging/lock.sh         every version anew
 #     sh packaging/lock.sh keep    versions that are locked stay; only what is missing or no longer allowed changes
@@ -57,3 +57,8 @@ lock packaging/requirements-dev.lock "What the program and its tests need" --ext
 grep -E '^(pytest|hypothesis)' packaging/requirements-dev.lock | sed 's/ .*//' >"$scratch/tools.txt"
 lock packaging/requirements-oldest.lock "The oldest versions that the program allows, and what tests it" --extra dask \
     --resolution lowest-direct "$scratch/tools.txt"
+
+# PyInstaller is GPL 2 with an exception for what it builds: a tool of the build, never a part of the program.
+echo "pyinstaller>=6.16" >"$scratch/freeze.txt"
+lock packaging/requirements-freeze.lock "What the frozen build is made of and with" "$scratch/freeze.txt" \
+    --constraint packaging/requirements.lock

@@ -26,6 +26,8 @@ MENDABLE = 2
 INTERRUPTED = 130
 LOG = "gelpolight-faults.log"
 DEMO = "--demo"
+OPENED = (".gplcal", ".gplrec")
+"""Endings of the files that a desktop opens with this program."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -73,7 +75,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         DEMO, action="store_true", help=tr("start the desktop program on the virtual sensor")
     )
-    parser.set_defaults(run=_open_desktop)
+    parser.set_defaults(run=_open_desktop, files=())
     commands = parser.add_subparsers(title=tr("commands"), metavar=tr("COMMAND"))
     for command in (
         simulate,
@@ -107,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         given = _split_places(sys.argv[1:] if arguments is None else list(arguments))
         # The window is up before the commands, which it does not need, would be loaded.
-        options = _WINDOW.get(tuple(given)) or build_parser().parse_args(given)
+        options = _window(given) or build_parser().parse_args(given)
         status: int = options.run(options)
         sys.stdout.flush()
     except InputError as error:
@@ -133,7 +135,28 @@ def _open_desktop(options: argparse.Namespace) -> int:
     """Show the main window; here, because the commands run where no window library is."""
     from app.desktop import run
 
-    return run([DEMO] if options.demo else [])
+    return run([DEMO] if options.demo else [str(file) for file in options.files])
+
+
+def _window(given: list[str]) -> argparse.Namespace | None:
+    """Return the options of the window, None where a command is given.
+
+    Raises
+    ------
+    InputError
+        If a file to open is not there.
+    """
+    if given in ([], [DEMO]):
+        return argparse.Namespace(run=_open_desktop, demo=bool(given), files=())
+    files = tuple(Path(text) for text in given)
+    if any(file.suffix.lower() not in OPENED for file in files):
+        return None
+    for file in files:
+        if not file.is_file():
+            raise InputError(
+                tr("there is no such file"), where=str(file), advice=tr("Check its name")
+            )
+    return argparse.Namespace(run=_open_desktop, demo=False, files=files)
 
 
 def _split_places(arguments: list[str]) -> list[str]:
@@ -146,10 +169,6 @@ def _split_places(arguments: list[str]) -> list[str]:
 
 
 _PLACE = re.compile(r"-\d*\.?\d+(,-?\d*\.?\d+)+")
-_WINDOW = {
-    (): argparse.Namespace(run=_open_desktop, demo=False),
-    (DEMO,): argparse.Namespace(run=_open_desktop, demo=True),
-}
 
 
 def _open_closed_streams() -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from PySide6.QtCore import Qt, qVersion
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
     QHBoxLayout,
+    QPlainTextEdit,
     QPushButton,
     QVBoxLayout,
     QWidget,
@@ -22,6 +24,8 @@ from app.widgets.naming import named
 from gelpolight_core import __version__
 from gelpolight_core.translation import tr
 
+# A packaged program brings the licences of all its parts; elsewhere each library brings its own.
+LICENCES = Path(__file__).resolve().parents[2] / "LICENCES.txt"
 PARTS = (
     "PySide6-Essentials",
     "pyqtgraph",
@@ -92,12 +96,35 @@ class AboutDialog(QDialog):
         copy.clicked.connect(self.copy)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
         buttons.addButton(copy, QDialogButtonBox.ButtonRole.ActionRole)
+        if LICENCES.is_file():
+            texts = named(
+                QPushButton(tr("Licences…"), self), "about.licences", tr("Licences of all parts")
+            )
+            texts.clicked.connect(self.show_licences)
+            buttons.addButton(texts, QDialogButtonBox.ButtonRole.ActionRole)
         buttons.rejected.connect(self.reject)
         layout = QVBoxLayout(self)
         layout.addLayout(top)
         layout.addWidget(table)
         layout.addWidget(licences)
         layout.addWidget(buttons)
+
+    def show_licences(self) -> None:
+        """Show the licences of everything that was packaged with the program."""
+        dialog = named(QDialog(self), "licences", tr("Licences of all parts"))
+        dialog.setWindowTitle(tr("Licences of all parts"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.resize(800, 600)
+        text = QPlainTextEdit(LICENCES.read_text("utf-8"), dialog)
+        named(text, "licences.text", tr("Licences"))
+        text.setReadOnly(True)
+        text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, dialog)
+        buttons.rejected.connect(dialog.reject)
+        layout = QVBoxLayout(dialog)
+        layout.addWidget(text)
+        layout.addWidget(buttons)
+        dialog.show()
 
     def copy(self) -> None:
         """Put the versions on the clipboard."""

@@ -86,6 +86,19 @@ def test_without_a_command_the_window_opens(
     assert asked == [demo]
 
 
+@pytest.mark.parametrize("name", ["sensor.gplcal", "PRESS.GPLREC"])
+def test_a_file_of_ours_alone_opens_the_window_with_it(
+    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = []
+    monkeypatch.setattr(desktop, "run", lambda arguments: asked.append(arguments) or 0)
+    assert main([str(tmp_path / name)]) == MENDABLE
+    assert "no such file" in capsys.readouterr().err
+    (tmp_path / name).touch()
+    assert main([str(tmp_path / name)]) == 0
+    assert asked == [[str(tmp_path / name)]]
+
+
 @pytest.mark.parametrize("display", ["", ":987"], ids=["none", "dead"])
 def test_without_a_screen_one_sentence_says_what_to_do(
     display: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

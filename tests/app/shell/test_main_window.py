@@ -9,9 +9,17 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices, QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QApplication, QLabel, QTabWidget, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QTabWidget,
+    QWidget,
+)
 from pytestqt.qtbot import QtBot
 
+from app.desktop import open_files
 from app.shell.about import AboutDialog, versions
 from app.shell.context import AppContext
 from app.shell.log_window import LogWindow
@@ -292,6 +300,30 @@ def test_a_dropped_recording_plays_the_camera(window: MainWindow, tmp_path: Path
     assert "coin.gplrec" in window.context.toasts.shown()[0].text
 
 
+def test_a_calibration_that_the_desktop_hands_over_goes_to_the_library(
+    window: MainWindow, tmp_path: Path, qtbot: QtBot
+) -> None:
+    file = tmp_path / "a.gplcal"
+    file.touch()
+    open_files(window, [file])
+    qtbot.waitUntil(lambda: window.page("sensors").opened == [file])
+    assert window.page_name == "sensors"
+
+
+def test_a_recording_that_the_desktop_hands_over_is_played_in_inspect(
+    context: AppContext, tmp_path: Path, qtbot: QtBot
+) -> None:
+    pages = (*PAGES, PageEntry("inspect", "Inspect", "inspect", f"{__name__}:BarePage"))
+    window = MainWindow(context=context, pages=pages)
+    qtbot.addWidget(window)
+    file = tmp_path / "press.gplrec"
+    file.touch()
+    open_files(window, [file])
+    qtbot.waitUntil(lambda: window.page_name == "inspect")
+    assert context.source.info is not None
+    assert context.source.info.file == file
+
+
 def test_other_files_are_not_taken(window: MainWindow, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
     assert not drop_on(window, tmp_path / "notes.txt")
@@ -403,6 +435,25 @@ def test_about_names_the_parts(window: MainWindow) -> None:
     dialog.copy()
     assert {"Python", "Qt", "numpy"} <= {name for name, _ in versions()}
     assert "PySide6" in QApplication.clipboard().text()
+    dialog.close()
+
+
+def test_about_shows_the_licences_that_a_packaged_program_brings(
+    window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    window.show_about()
+    assert dialog_of(window, AboutDialog).findChild(QPushButton, "about.licences") is None
+    dialog_of(window, AboutDialog).close()
+    qtbot.waitUntil(lambda: not window.findChildren(AboutDialog))
+    (tmp_path / "LICENCES.txt").write_text("Qt: LGPL-3.0-only\n")
+    monkeypatch.setattr("app.shell.about.LICENCES", tmp_path / "LICENCES.txt")
+    window.show_about()
+    dialog = dialog_of(window, AboutDialog)
+    dialog.findChild(QPushButton, "about.licences").click()
+    text = dialog.findChild(QPlainTextEdit, "licences.text")
+    assert text.isVisible()
+    assert text.toPlainText() == "Qt: LGPL-3.0-only\n"
+    text.window().close()
     dialog.close()
 
 

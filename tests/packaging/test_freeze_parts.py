@@ -1,0 +1,233 @@
+"""What the frozen program takes along, and what its Debian package says of it."""
+
+from __future__ import annotations
+
+import configparser
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import xml.etree.ElementTree as ET
+from importlib.metadata import distribution
+from pathlib import Path
+
+import freeze_parts as parts
+import frozen_start
+import pytest
+
+from app.command_line.main import OPENED
+from app.shell import about
+from app.shell.pages import all_pages
+from app.workspace.workspace import ENDING as CALIBRATION
+from gelpolight_core.recording.recording import ENDING as RECORDING
+
+ROOT = Path(__file__).resolve().parents[2]
+DEB = ROOT / "packaging" / "deb"
+MIME = "{http://www.freedesktop.org/standards/shared-mime-info}"
+SYSTEM = "/usr/lib/x86_64-linux-gnu/"
+SITE = "/build/venv/lib/python3.11/site-packages/"
+
+
+def taken(place: str, source: str = "") -> bool:
+    return parts.is_wanted((place, source or SITE + place, "BINARY"))
+
+
+def test_every_folder_of_resources_is_taken_along() -> None:
+    assert {p.name for p in (ROOT / "resources").iterdir() if p.is_dir()} == set(parts.RESOURCES)
+
+
+def test_every_resource_lies_where_the_program_looks_for_it() -> None:
+    data = {Path(folder, Path(file).name) for file, folder in parts.data_files()}
+    assert Path("resources/icons/gelpolight.svg") in data
+    assert Path("resources/checkerboards/checkerboard-9x6-3mm.pdf") in data
+    assert (
+        Path("gelpolight_core/py.typed") in data
+        or not (ROOT / "gelpolight_core" / "py.typed").exists()
+    )
+
+
+def test_the_data_of_packages_are_those_that_are_installed_with_them() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    assert set(parts.PACKAGE_DATA) == set(project["tool"]["setuptools"]["package-data"]["*"])
+
+
+def test_no_file_of_the_packages_is_forgotten() -> None:
+    """A data file of a new kind has to be named in the tables."""
+    known = {Path(file) for file, _ in parts.data_files()}
+    for package in parts.PACKAGES:
+        for path in (ROOT / package).rglob("*"):
+            if path.is_file() and path.suffix not in (".py", ".pyc") and ".nb" not in path.suffix:
+                assert path in known, path
+
+
+def test_nothing_that_the_program_imports_is_left_out() -> None:
+    imported = set()
+    for base, names in re.findall(r"^ *from ([\w.]+) import ([\w, ]+)", _sources(), re.MULTILINE):
+        imported |= {base, *(f"{base}.{name.strip()}" for name in names.split(","))}
+    imported |= set(re.findall(r"^ *import ([\w.]+)", _sources(), re.MULTILINE))
+    assert {"PySide6.QtCore", "vtkmodules.vtkRenderingOpenGL2"} <= imported
+    # A cluster needs an installation: its workers import the program by themselves.
+    left_out = set(parts.LEFT_OUT_MODULES) - {"distributed", "dask"}
+    assert not imported & left_out
+
+
+def test_every_page_is_in_a_package_that_is_taken_whole() -> None:
+    modules = {module for page in all_pages() for module in page.modules}
+    assert {module.split(".")[0] for module in modules} <= set(parts.PACKAGES)
+    assert all(importlib.util.find_spec(module) for module in modules)
+
+
+def test_the_versions_that_about_shows_are_known_in_the_frozen_program() -> None:
+    assert set(about.PARTS) <= set(parts.NAMED_VERSIONS)
+    asked = re.findall(r'[^_]version\("([\w-]+)"\)', _sources())
+    assert set(asked) <= {*parts.NAMED_VERSIONS, "gelpolight-studio"}
+    assert all(distribution(name) for name in parts.NAMED_VERSIONS)
+
+
+def _sources() -> str:
+    files = [path for package in parts.PACKAGES for path in (ROOT / package).rglob("*.py")]
+    return "\n".join(path.read_text("utf-8") for path in files)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "PySide6/Qt/plugins/platforms/libqxcb.so",
+        "PySide6/Qt/plugins/imageformats/libqsvg.so",
+        "PySide6/Qt/lib/libQt6Widgets.so.6",
+        "PySide6/plugins/platforms/qwindows.dll",
+        "opencv_contrib_python_headless.libs/libssl-81259c47.so.1.1.1k",
+        "matplotlib/mpl-data/fonts/ttf/DejaVuSans.ttf",
+        "vtkmodules/libvtkRenderingOpenGL2.so",
+    ],
+)
+def test_what_is_needed_is_taken_along(place: str) -> None:
+    assert taken(place)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "PySide6/Qt/plugins/platformthemes/libqgtk3.so",
+        "PySide6/Qt/plugins/tls/libqopensslbackend.so",
+        "PySide6/Qt/translations/qt_de.qm",
+        "PySide6/Qt/lib/libQt6Network.so.6",
+        "matplotlib/mpl-data/sample_data/goog.npz",
+    ],
+)
+def test_what_nothing_uses_is_left_out(place: str) -> None:
+    assert not taken(place)
+
+
+def test_libraries_that_belong_to_the_graphics_driver_come_from_the_system() -> None:
+    """An older C++ runtime of ours would keep a newer driver from being loaded."""
+    for name in ("libstdc++.so.6", "libX11.so.6", "libglib-2.0.so.0", "libreadline.so.8"):
+        assert not taken(name, SYSTEM + name)
+    for name in ("libpython3.11.so.1.0", "libsqlite3.so.0", "libffi.so.8", "libz.so.1"):
+        assert taken(name, SYSTEM + name)
+
+
+def test_bytecode_is_made_for_our_modules_only(tmp_path: Path) -> None:
+    source = tmp_path / "one.py"
+    source.write_text("answer = 42\n")
+    entries = [("app/one.py", str(source), "DATA"), ("cv2/config.py", str(source), "DATA")]
+    made = parts.compiled(entries, tmp_path / "made")
+    name = f"app/__pycache__/one.{sys.implementation.cache_tag}.pyc"
+    assert [place for place, _, _ in made] == [name]
+    assert Path(made[0][1]).stat().st_size > 0
+
+
+def test_a_changed_module_changes_the_stamp_of_the_compiled_loops(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for package in parts.PACKAGES:
+        (tmp_path / package).mkdir()
+    (tmp_path / "app" / "one.py").write_text("a = 1\n")
+    monkeypatch.setattr(parts, "ROOT", tmp_path)
+    before = parts.hash_of_sources()
+    (tmp_path / "app" / "one.py").write_text("a = 2\n")
+    assert parts.hash_of_sources() != before
+
+
+def test_compiled_loops_and_fonts_are_kept_in_a_folder_of_the_user(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(os, "environ", {})
+    frozen_start.choose_caches(tmp_path / "cache")
+    assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "cache" / "kernels")
+    assert Path(os.environ["MPLCONFIGDIR"]).parent == tmp_path / "cache"
+
+
+def test_where_the_user_has_no_room_for_them_the_program_runs_all_the_same(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(os, "environ", {})
+    (tmp_path / "file").write_text("")
+    frozen_start.choose_caches(tmp_path / "file" / "cache")
+    spare = Path(os.environ["NUMBA_CACHE_DIR"]).parent
+    assert spare.is_dir()
+    spare.rmdir()
+
+
+def test_programs_that_are_opened_find_their_own_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        os, "environ", {"LD_LIBRARY_PATH": "/ours", "QT_PLUGIN_PATH": "/ours", "HOME": "/home"}
+    )
+    frozen_start.give_back_environment()
+    assert os.environ == {"HOME": "/home"}
+    os.environ.update(LD_LIBRARY_PATH="/ours", LD_LIBRARY_PATH_ORIG="/theirs")
+    frozen_start.give_back_environment()
+    assert os.environ == {"HOME": "/home", "LD_LIBRARY_PATH": "/theirs"}
+
+
+def test_the_desktop_entry_starts_the_program_with_files_of_both_kinds() -> None:
+    entry = configparser.ConfigParser(interpolation=None)
+    entry.optionxform = str  # type: ignore[assignment,method-assign]
+    entry.read(DEB / "gelpolight.desktop")
+    desktop = entry["Desktop Entry"]
+    assert desktop["Type"] == "Application"
+    assert desktop["Exec"] == "gelpolight %F"
+    assert desktop["Icon"] == "gelpolight"
+    assert all(text.endswith(";") for text in (desktop["Categories"], desktop["MimeType"]))
+    types = {x.get("type") for x in ET.parse(DEB / "gelpolight.xml").getroot()}
+    assert set(desktop["MimeType"].strip(";").split(";")) == types
+
+
+def test_the_file_types_are_those_that_the_program_opens() -> None:
+    globs = [
+        found.get("pattern")
+        for kind in ET.parse(DEB / "gelpolight.xml").getroot().iter(f"{MIME}mime-type")
+        for found in kind.iter(f"{MIME}glob")
+    ]
+    assert globs == [f"*{ending}" for ending in OPENED] == [f"*{CALIBRATION}", f"*{RECORDING}"]
+
+
+def test_the_control_file_of_the_package_is_well_formed() -> None:
+    lines = (DEB / "control.in").read_text("utf-8").splitlines()
+    fields = dict(line.split(": ", 1) for line in lines if not line.startswith(" "))
+    assert {"Package", "Version", "Architecture", "Maintainer", "Description", "Depends"} <= set(
+        fields
+    )
+    assert all(len(line) < 80 for line in lines)
+    places = set(re.findall(r"@(\w+)@", "\n".join(lines)))
+    script = (ROOT / "packaging" / "freeze.sh").read_text("utf-8")
+    assert places == set(re.findall(r"s/@(\w+)@/", script))
+
+
+def test_the_package_asks_for_what_windows_need_on_a_bare_machine() -> None:
+    script = (ROOT / "packaging" / "freeze.sh").read_text("utf-8")
+    command = re.search(r"sed -n '/\^window_libraries.*", script)
+    assert command
+    asked = subprocess.run(
+        ["sh", "-c", command[0]], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+    listed = re.search(
+        r'window_libraries="\n(.*?)"',
+        (ROOT / "packaging" / "setup.sh").read_text("utf-8"),
+        re.DOTALL,
+    )
+    assert listed
+    assert asked == sorted(line.split()[1] for line in listed[1].splitlines())
+    assert "libxcb-cursor0" in asked
