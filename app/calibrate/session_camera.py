@@ -14,8 +14,11 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
-LIT = (Stage.LIGHTS, Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
-"""Stages whose brightnesses are compared: the camera must not change between them."""
+LIT = (Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
+"""Stages whose brightnesses are compared: the camera must not change between them.
+
+The mirror's spots are compared with nothing, and need a shorter exposure than all else.
+"""
 
 
 class SetupCamera(QObject):

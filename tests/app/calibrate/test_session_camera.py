@@ -87,6 +87,31 @@ def test_settings_are_kept_with_the_pictures_and_held_to_from_then_on(
     context.toasts.clear()
 
 
+def test_the_mirror_may_have_an_exposure_of_its_own(
+    technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
+    qtbot: QtBot,
+) -> None:  # fmt: skip
+    """What is kept is how the camera was set for the white board, with which all is compared."""
+    context.toasts.attach(technician.page, lambda: None)
+    technician.begin(fresh, "lights")
+    live(context, qtbot)
+    camera = context.cameras.of(context.source.info)
+    assert camera is not None
+    context.cameras.lock(camera)
+    for step, exposure_ms in (("lights", 2.0), ("radiance", 12.0), ("background", 12.0)):
+        context.cameras.set(camera, {"exposure_ms": exposure_ms})
+        live(context, qtbot)
+        technician.wizard.go_to(step)
+        live(context, qtbot)
+        technician.capture()
+        technician.rest()
+    kept = read_session(fresh.session.folder).camera_settings
+    assert kept is not None
+    assert kept.controls["exposure_ms"] == 12.0
+    assert not context.cameras.differs(camera)[1]
+    context.toasts.clear()
+
+
 def test_a_calibration_is_told_how_its_camera_was_set(computed_project: Made) -> None:
     project, stored = computed_project(), settings_of_texts(TEXTS)
     before = {stage: status.state for stage, status in project.statuses().items()}
