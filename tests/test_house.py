@@ -15,6 +15,8 @@ import gelpolight_core
 ROOT = Path(__file__).resolve().parents[1]
 RUNTIME_LOCK = ROOT / "packaging" / "requirements.lock"
 DEV_LOCK = ROOT / "packaging" / "requirements-dev.lock"
+DOCS_LOCK = ROOT / "packaging" / "requirements-docs.lock"
+LOCKS = [RUNTIME_LOCK, DEV_LOCK, DOCS_LOCK]
 
 # Imports every module of a package in a Python in which the given modules cannot be imported.
 IMPORT_ALL_WITHOUT = """
@@ -72,7 +74,7 @@ def test_the_installed_version_is_the_one_that_calibrations_record() -> None:
     assert project["version"] == gelpolight_core.__version__
 
 
-@pytest.mark.parametrize("lock", [RUNTIME_LOCK, DEV_LOCK], ids=lambda path: path.name)
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
 def test_every_locked_library_is_pinned_and_has_a_hash(lock: Path) -> None:
     """Everybody gets the very files that were tested."""
     text = "\n".join(x for x in lock.read_text("utf-8").splitlines() if not x.startswith("#"))
@@ -82,7 +84,7 @@ def test_every_locked_library_is_pinned_and_has_a_hash(lock: Path) -> None:
         assert re.match(r"[\w.-]+==\S+ .*--hash=sha256:[0-9a-f]{64}( |$)", entry), entry
 
 
-@pytest.mark.parametrize("lock", [RUNTIME_LOCK, DEV_LOCK], ids=lambda path: path.name)
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
 def test_the_lock_files_name_no_address_and_no_folder(lock: Path) -> None:
     """A mirror or an offline folder of wheels serves as well as the public registry."""
     for line in lock.read_text("utf-8").splitlines():
@@ -104,6 +106,7 @@ def test_every_dependency_is_locked() -> None:
     for lock, wanted in (
         (RUNTIME_LOCK, project["dependencies"]),
         (DEV_LOCK, project["optional-dependencies"]["dev"]),
+        (DOCS_LOCK, project["optional-dependencies"]["docs"]),
     ):
         names = {re.split(r"[<>=!~\[ ]", requirement)[0].lower() for requirement in wanted}
         assert names <= pins(lock).keys()
