@@ -98,10 +98,15 @@ def test_the_mirror_may_have_an_exposure_of_its_own(
     camera = context.cameras.of(context.source.info)
     assert camera is not None
     context.cameras.lock(camera)
+    qtbot.waitUntil(lambda: fake.settings["exposure_auto"].value == 0.0, timeout=WAIT_MS)
     for step, exposure_ms in (("lights", 2.0), ("radiance", 12.0), ("background", 12.0)):
-        context.cameras.set(camera, {"exposure_ms": exposure_ms})
-        live(context, qtbot)
         technician.wizard.go_to(step)
+        live(context, qtbot)
+        context.cameras.set(camera, {"exposure_ms": exposure_ms})
+        qtbot.waitUntil(
+            lambda wanted=exposure_ms: camera.settings_now().controls["exposure_ms"] == wanted,
+            timeout=WAIT_MS,
+        )
         live(context, qtbot)
         technician.capture()
         technician.rest()
