@@ -54,7 +54,7 @@ class SetupCamera(QObject):
         camera = self._context.cameras.of(info)
         if camera is None:
             name = tr("No camera is chosen.") if info is None else info.name
-            more = tr("Choose one at the top, or import pictures.") if info is None else ""
+            more = tr("Choose one, or import pictures.") if info is None else ""
             self._setup.show_camera(f"{name} {more}".rstrip(), "", settable=False)
             return
         state, what = camera.state, camera.device.name

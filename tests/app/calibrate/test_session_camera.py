@@ -12,7 +12,9 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
+from app.bench.stated import stated_session
 from app.shell.context import AppContext
+from app.widgets.source_button import SourceButton
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import _provenance
 from gelpolight_core.calibration.project import CalibrationProject
@@ -152,3 +154,22 @@ def test_the_set_up_step_says_how_the_camera_is_and_opens_its_settings(
     context.source.choose(None)
     assert "No camera is chosen" in setup.camera.text()
     assert not setup.camera_settings.isEnabled()
+
+
+def test_the_camera_of_a_new_sensor_is_chosen_in_the_form(
+    technician: Technician, context: AppContext, qtbot: QtBot
+) -> None:
+    context.cameras.driver = FakeDriver(FakeCamera())
+    technician.page.begin()
+    form = technician.page.form
+    button = technician.see("setup.source")
+    assert isinstance(button, SourceButton)
+    assert not form.camera_settings.isEnabled()
+    button.use_camera(context.cameras.infos()[0])
+    assert C310.name in form.camera.text()
+    assert form.camera_settings.isEnabled()
+    assert form.stated().sensor.serial == ""
+
+    context.source.choose_virtual_sensor()
+    assert form.stated().sensor == stated_session().sensor
+    context.source.choose(None)
