@@ -30,6 +30,7 @@ from pathlib import Path
 
 print(*tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["build-system"]["requires"], sep="\n")
 END
+basis="pyproject.toml $scratch/build.txt"
 
 lock() { # FILE WHAT [OPTION...]
     file=$1
@@ -39,9 +40,10 @@ lock() { # FILE WHAT [OPTION...]
     rm -f "$scratch/lock.txt"
     [ "$how" != keep ] || [ ! -f "$file" ] || cp "$file" "$scratch/lock.txt"
     # One set of versions on every supported Python, so that a fault seen on one machine is seen on all.
+    # shellcheck disable=SC2086 # the basis is a list of files
     "$scratch/venv/bin/uv" pip compile --quiet --no-config --universal --python-version 3.11 \
         --fork-strategy fewest --generate-hashes --no-annotate --no-header \
-        "$@" pyproject.toml "$scratch/build.txt" --output-file "$scratch/lock.txt" >/dev/null
+        "$@" $basis --output-file "$scratch/lock.txt" >/dev/null
     {
         echo "# $what, exact versions by hash, for Python 3.11 to 3.13. Made by packaging/lock.sh; do not edit."
         cat "$scratch/lock.txt"
@@ -62,3 +64,13 @@ lock packaging/requirements-oldest.lock "The oldest versions that the program al
 echo "pyinstaller>=6.16" >"$scratch/freeze.txt"
 lock packaging/requirements-freeze.lock "What the frozen build is made of and with" "$scratch/freeze.txt" \
     --constraint packaging/requirements.lock
+
+# What builds the documentation shares nothing with the program.
+"$scratch/venv/bin/python" - >"$scratch/docs.txt" <<'END'
+import tomllib
+from pathlib import Path
+
+print(*tomllib.loads(Path("pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]["docs"], sep="\n")
+END
+basis=$scratch/docs.txt
+lock packaging/requirements-docs.lock "What builds the documentation"

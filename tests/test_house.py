@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parents[1]
 RUNTIME_LOCK = ROOT / "packaging" / "requirements.lock"
 DEV_LOCK = ROOT / "packaging" / "requirements-dev.lock"
 OLDEST_LOCK = ROOT / "packaging" / "requirements-oldest.lock"
-LOCKS = [RUNTIME_LOCK, DEV_LOCK, OLDEST_LOCK]
+DOCS_LOCK = ROOT / "packaging" / "requirements-docs.lock"
+FREEZE_LOCK = ROOT / "packaging" / "requirements-freeze.lock"
+LOCKS = [RUNTIME_LOCK, DEV_LOCK, OLDEST_LOCK, DOCS_LOCK, FREEZE_LOCK]
 
 # Imports every module of a package in a Python in which the given modules cannot be imported.
 IMPORT_ALL_WITHOUT = """
@@ -106,6 +108,7 @@ def test_every_dependency_is_locked() -> None:
     for lock, wanted in (
         (RUNTIME_LOCK, project["dependencies"]),
         (DEV_LOCK, project["optional-dependencies"]["dev"]),
+        (DOCS_LOCK, project["optional-dependencies"]["docs"]),
     ):
         names = {re.split(r"[<>=!~\[ ]", requirement)[0].lower() for requirement in wanted}
         assert names <= pins(lock).keys()

@@ -14,6 +14,7 @@ from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
 from app.shell.context import AppContext
 from app.widgets.naming import named
+from app.widgets.source_button import SourceButton
 from app.workspace.workspace import folder_name
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.errors import InputError
@@ -43,6 +44,8 @@ class CalibratePage(QWidget):
         column.addWidget(self._stack)
         self.start = StartView()
         self.form = SetupForm()
+        none = tr("No camera: import pictures")
+        self.form.offer_cameras(SourceButton(context=context, page="setup", none=none))
         self._stack.addWidget(self.start)
         self._stack.addWidget(self.form)
         self.start.new_wanted.connect(self.begin)
@@ -50,6 +53,7 @@ class CalibratePage(QWidget):
         self.start.demo_wanted.connect(self.begin_demo)
         self.start.recent_wanted.connect(lambda folder: self.open_path(Path(folder)))
         self.form.accepted.connect(self._create)
+        context.source.changed.connect(self._on_source)
         self.setup_camera = SetupCamera(self.form, context=context)
         self.start.show_recent(context.settings.recent_sessions)
 
@@ -113,6 +117,13 @@ class CalibratePage(QWidget):
 
         info = self.context.source.info
         return stated_session() if info is not None and info.kind == "virtual" else new_session()
+
+    def _on_source(self) -> None:
+        """State what is known of the virtual sensor, where it is chosen in the form."""
+        info = self.context.source.info
+        in_form = self._stack.currentWidget() is self.form
+        if in_form and info is not None and info.kind == "virtual":
+            self.form.show_session(self._proposal(), new=True)
 
     def _create(self, stated: Session) -> None:
         name = datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")

@@ -14,8 +14,11 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
-LIT = (Stage.LIGHTS, Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
-"""Stages whose brightnesses are compared: the camera must not change between them."""
+LIT = (Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
+"""Stages whose brightnesses are compared: the camera must not change between them.
+
+The mirror's spots are compared with nothing, and need a shorter exposure than all else.
+"""
 
 
 class SetupCamera(QObject):
@@ -51,7 +54,7 @@ class SetupCamera(QObject):
         camera = self._context.cameras.of(info)
         if camera is None:
             name = tr("No camera is chosen.") if info is None else info.name
-            more = tr("Choose one at the top, or import pictures.") if info is None else ""
+            more = tr("Choose one, or import pictures.") if info is None else ""
             self._setup.show_camera(f"{name} {more}".rstrip(), "", settable=False)
             return
         state, what = camera.state, camera.device.name

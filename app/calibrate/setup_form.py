@@ -119,8 +119,13 @@ class SetupForm(QScrollArea):
         self.camera_settings.clicked.connect(self.camera_wanted)
         row.addWidget(self.camera, 1)
         row.addWidget(self.camera_settings)
+        self._camera_row = row
         self.show_camera(tr("No camera is chosen."), "", settable=False)
         return box
+
+    def offer_cameras(self, button: QWidget) -> None:
+        """Have the cameras' button in the form, where there is no bar above it that has one."""
+        self._camera_row.insertWidget(1, button)
 
     def show_camera(self, text: str, role: str, *, settable: bool) -> None:
         """Say how the camera is set, and offer to set it where it can be set."""

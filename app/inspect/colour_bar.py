@@ -50,10 +50,12 @@ class ColourBar(QWidget):
         painter.drawImage(QRectF(4, TOP, BAR, height), strip)
         painter.setPen(theme.colour("text"))
         painter.drawText(QPointF(4, TOP - 8), unit)
-        step = round_length_mm(max(high - low, 1e-6) / 3.0)
+        # Of one value only there is no scale: all colours mean the same.
+        span = high - low if high > low else 1.0
+        step = round_length_mm(span / 3.0)
         first = int(np.ceil(low / step - 1e-6))
         for number in range(first, int(np.floor(high / step + 1e-6)) + 1):
-            at = TOP + height * (1.0 - (number * step - low) / (high - low))
+            at = TOP + height * (1.0 - (number * step - low) / span)
             painter.drawLine(QPointF(4 + BAR, at), QPointF(8 + BAR, at))
             box = QRectF(11 + BAR, at - 9, self.width() - BAR - 11, 18)
             painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, f"{number * step:.5g}")

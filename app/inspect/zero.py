@@ -92,7 +92,7 @@ def drift_sentence(frame: NDArray[Any], calibration: Calibration) -> str:
         return ""
     worst = max(drift.quality.figures, key=lambda figure: _rank(figure.verdict))
     sentence = tr(
-        "The background has moved from the calibration's: {what} {v:.2g} {unit}. {advice}."
+        "The background has moved from the calibration's ({what}: {v:.2g} {unit}). {advice}."
     )
     return sentence.format(
         what=worst.label[0].lower() + worst.label[1:],

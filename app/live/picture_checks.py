@@ -89,6 +89,9 @@ def measure_exposure(rgb: Rgb) -> Exposure:
         verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
         text = tr("Too dark: the brightest reach {p} % of the scale. Lengthen the exposure.")
         return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * brightest)))
+    if brightest >= 1.0:
+        text = tr("Exposure is good, but for bright spots that are saturated.")
+        return Exposure(share, brightest, Verdict.PASS, text)
     text = tr("Exposure is good: the brightest places reach {p} % of the scale.")
     return Exposure(share, brightest, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))
 

@@ -31,6 +31,7 @@ from PySide6.QtWidgets import (
 from app.shell import theme
 from app.shell.about import AboutDialog
 from app.shell.context import AppContext
+from app.shell.documentation import find_documentation
 from app.shell.dropping import dropped_paths, is_session, sort_dropped
 from app.shell.icons import icon
 from app.shell.loader import Loader
@@ -309,6 +310,16 @@ class MainWindow(QMainWindow):
             self._precision = PrecisionDialog(context=self.context, parent=self)
         self._precision.show()
         self._precision.raise_()
+
+    def show_guide(self) -> None:
+        """Show the documentation, in what the desktop shows web pages with."""
+        page = find_documentation()
+        if page is None:
+            text = tr("The documentation is not here; it can be built with packaging/docs.sh.")
+            self.context.toasts.show(text, "warn")
+        elif not QDesktopServices.openUrl(QUrl.fromLocalFile(str(page))):
+            text = tr("Nothing here shows web pages; the documentation is at {path}")
+            self.context.toasts.show(text.format(path=page), "warn")
 
     def open_board(self, square_mm: int) -> None:
         """Show a checkerboard to print, in what the desktop shows PDF with."""

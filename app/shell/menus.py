@@ -99,6 +99,9 @@ class Menus:
         window = self._window
         menu = window.menuBar().addMenu(tr("&Help"))
         menu.addAction(
+            make_action(window, "help.documentation", tr("&Documentation"), window.show_guide)
+        )
+        menu.addAction(
             make_action(
                 window,
                 "help.shortcuts",

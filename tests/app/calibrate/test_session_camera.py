@@ -12,7 +12,9 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
+from app.bench.stated import stated_session
 from app.shell.context import AppContext
+from app.widgets.source_button import SourceButton
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import _provenance
 from gelpolight_core.calibration.project import CalibrationProject
@@ -87,6 +89,36 @@ def test_settings_are_kept_with_the_pictures_and_held_to_from_then_on(
     context.toasts.clear()
 
 
+def test_the_mirror_may_have_an_exposure_of_its_own(
+    technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
+    qtbot: QtBot,
+) -> None:  # fmt: skip
+    """What is kept is how the camera was set for the white board, with which all is compared."""
+    context.toasts.attach(technician.page, lambda: None)
+    technician.begin(fresh, "lights")
+    live(context, qtbot)
+    camera = context.cameras.of(context.source.info)
+    assert camera is not None
+    context.cameras.lock(camera)
+    qtbot.waitUntil(lambda: fake.settings["exposure_auto"].value == 0.0, timeout=WAIT_MS)
+    for step, exposure_ms in (("lights", 2.0), ("radiance", 12.0), ("background", 12.0)):
+        technician.wizard.go_to(step)
+        live(context, qtbot)
+        context.cameras.set(camera, {"exposure_ms": exposure_ms})
+        qtbot.waitUntil(
+            lambda wanted=exposure_ms: camera.settings_now().controls["exposure_ms"] == wanted,
+            timeout=WAIT_MS,
+        )
+        live(context, qtbot)
+        technician.capture()
+        technician.rest()
+    kept = read_session(fresh.session.folder).camera_settings
+    assert kept is not None
+    assert kept.controls["exposure_ms"] == 12.0
+    assert not context.cameras.differs(camera)[1]
+    context.toasts.clear()
+
+
 def test_a_calibration_is_told_how_its_camera_was_set(computed_project: Made) -> None:
     project, stored = computed_project(), settings_of_texts(TEXTS)
     before = {stage: status.state for stage, status in project.statuses().items()}
@@ -122,3 +154,22 @@ def test_the_set_up_step_says_how_the_camera_is_and_opens_its_settings(
     context.source.choose(None)
     assert "No camera is chosen" in setup.camera.text()
     assert not setup.camera_settings.isEnabled()
+
+
+def test_the_camera_of_a_new_sensor_is_chosen_in_the_form(
+    technician: Technician, context: AppContext, qtbot: QtBot
+) -> None:
+    context.cameras.driver = FakeDriver(FakeCamera())
+    technician.page.begin()
+    form = technician.page.form
+    button = technician.see("setup.source")
+    assert isinstance(button, SourceButton)
+    assert not form.camera_settings.isEnabled()
+    button.use_camera(context.cameras.infos()[0])
+    assert C310.name in form.camera.text()
+    assert form.camera_settings.isEnabled()
+    assert form.stated().sensor.serial == ""
+
+    context.source.choose_virtual_sensor()
+    assert form.stated().sensor == stated_session().sensor
+    context.source.choose(None)

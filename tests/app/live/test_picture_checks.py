@@ -60,6 +60,15 @@ def test_a_black_picture_with_three_bright_spots_is_exposed_well() -> None:
     assert measure_exposure(rgb).verdict is Verdict.PASS
 
 
+def test_spots_that_are_saturated_are_not_called_well_exposed_without_a_word() -> None:
+    """Of a mirror's picture they are all there is, and another advice asks for less exposure."""
+    rgb = np.zeros((480, 640, 3), np.uint8)
+    rgb[100:104, 200:204, 0] = rgb[300:304, 100:104, 1] = rgb[400:404, 500:504, 2] = 255
+    exposure = measure_exposure(rgb)
+    assert exposure.verdict is Verdict.PASS
+    assert "saturated" in exposure.advice
+
+
 def test_a_few_hot_pixels_do_not_hide_that_a_picture_is_dark() -> None:
     rgb = picture(0.05)
     rgb[::40, ::60] = 180

@@ -1,0 +1,28 @@
+#!/bin/sh
+# Builds the documentation of docs/ into site/, to be read in any browser without a network: open site/index.html.
+# Its tools go into .venv-docs, apart from the program's. Safe to run again. PYTHON=/path/to/python chooses another Python.
+set -eu
+cd "$(dirname "$0")/.."
+
+lock=packaging/requirements-docs.lock
+venv=.venv-docs
+stamp=$venv/gelpolight-docs # what is installed, and where: an environment cannot be moved
+wanted=$({ pwd -P && cat "$lock"; } | sha256sum)
+
+if [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
+    echo "Documentation: installing what builds it into $venv."
+    rm -rf "$venv"
+    "${PYTHON:-python3}" -m venv "$venv"
+    "$venv/bin/python" -m pip --disable-pip-version-check --no-input install --quiet --require-hashes \
+        --only-binary :all: --requirement "$lock"
+    echo "$wanted" >"$stamp"
+fi
+
+# The theme's makers warn of a coming MkDocs at every build; the locked one is not it.
+NO_MKDOCS_2_WARNING=1 "$venv/bin/python" -m mkdocs build --strict --quiet --clean --site-dir site
+
+if grep -rnE '(src="|<link [^>]*href=")https?:' --include='*.html' site; then
+    echo "These pages would fetch something from the network when they are read; keep it in docs/ instead." >&2
+    exit 1
+fi
+echo "Documentation: open $(pwd)/site/index.html"

@@ -1,0 +1,131 @@
+"""The documentation does not age: what it names is there, and what it quotes is still said."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = tuple(sorted(DOCS.rglob("*.md")))
+GUIDE = (*sorted((DOCS / "guide").glob("*.md")), DOCS / "troubleshooting.md")
+PICTURES = DOCS / "pictures"
+SCENES = tuple(sorted((ROOT / "packaging").glob("screenshot_*.py")))
+LARGEST_KB, ALL_KB = 100, 2000
+
+named = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
+guided = pytest.mark.parametrize("page", GUIDE, ids=lambda path: path.name)
+
+
+def text_of(page: Path) -> str:
+    """Return a page without its blocks of code."""
+    return re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def links_of(page: Path) -> list[str]:
+    """Return what a page links to, pictures too."""
+    return re.findall(r"\]\(([^)\s]+)\)", text_of(page))
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as the site makes them."""
+    anchors = set()
+    for heading in re.findall(r"^#+ (.+)$", text_of(page), flags=re.MULTILINE):
+        plain = re.sub(r"[^\w\s-]", "", re.sub(r"[`*]", "", heading)).strip().lower()
+        anchors.add(re.sub(r"[\s-]+", "-", plain))
+    return anchors
+
+
+def nav_entries() -> list[str]:
+    """Return the pages that the site's navigation names."""
+    config = (ROOT / "mkdocs.yml").read_text("utf-8")
+    return re.findall(r"^ +- [^:\n]+: (\S+\.md)$", config.partition("\nnav:")[2], re.MULTILINE)
+
+
+@cache
+def said() -> tuple[str, ...]:
+    """Return every text that the program can say, with ``…`` where it puts something in."""
+    texts = set()
+    for package in ("app", "gelpolight_core"):
+        for module in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(module.read_text("utf-8"))):
+                if (
+                    isinstance(node, ast.Call)
+                    and isinstance(node.func, ast.Name)
+                    and node.func.id == "tr"
+                    and isinstance(node.args[0], ast.Constant)
+                ):
+                    texts.add(re.sub(r"\{[^}]*\}", "…", str(node.args[0].value)))
+    assert len(texts) > 1000
+    return tuple(texts)
+
+
+@cache
+def labels() -> frozenset[str]:
+    """Return every text as a button shows it, without the underlining and the dots at its end."""
+    return frozenset(re.sub(r"&(?!&)", "", text).rstrip("….: ") for text in said())
+
+
+def is_said(message: str) -> bool:
+    """Whether the program says this; ``…`` stands for anything."""
+    pattern = re.compile(".*?".join(map(re.escape, message.split("…"))), re.DOTALL)
+    return any(pattern.fullmatch(text) for text in said())
+
+
+@named
+def test_every_link_leads_to_a_page_a_picture_or_a_heading(page: Path) -> None:
+    for link in links_of(page):
+        if re.match(r"https?:|mailto:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.is_file(), link
+        assert target.is_relative_to(DOCS), link
+        if anchor:
+            assert anchor in anchors_of(target), link
+
+
+def test_every_page_is_in_the_navigation_and_there() -> None:
+    entries = nav_entries()
+    assert sorted(entries) == sorted({str(page.relative_to(DOCS)) for page in PAGES})
+
+
+def test_the_pictures_are_those_that_the_pages_show_and_the_scenes_make() -> None:
+    shown = {Path(link).stem for page in PAGES for link in links_of(page) if "pictures/" in link}
+    scenes = "".join(script.read_text("utf-8") for script in SCENES)
+    made = set(re.findall(r'\.shot\("([\w-]+)"', scenes))
+    assert shown == made
+    assert {path.stem for path in PICTURES.glob("*.webp")} == made
+
+
+def test_the_pictures_are_small_enough_to_be_kept_with_the_sources() -> None:
+    sizes = {path.name: path.stat().st_size / 1e3 for path in PICTURES.iterdir()}
+    assert {name: size for name, size in sizes.items() if size > LARGEST_KB} == {}
+    assert sum(sizes.values()) < ALL_KB
+
+
+def messages_of(page: Path) -> list[str]:
+    """Return the messages that a page quotes, one on each line that begins with >."""
+    return re.findall(r"^> (.+)$", page.read_text("utf-8"), flags=re.MULTILINE)
+
+
+@guided
+def test_every_quoted_message_is_one_that_the_program_says(page: Path) -> None:
+    assert [message for message in messages_of(page) if not is_said(message)] == []
+
+
+def test_troubleshooting_quotes_messages() -> None:
+    """The test above has something to look at."""
+    assert len(messages_of(DOCS / "troubleshooting.md")) > 60
+
+
+@guided
+def test_what_is_set_in_bold_is_on_the_screen(page: Path) -> None:
+    """Bold words are labels; only a sentence or the head of a paragraph may be bold besides."""
+    text = re.sub(r"\s+", " ", text_of(page))
+    bold = re.findall(r"\*\*([^*]+)\*\*", text)
+    assert [w for w in bold if w[-1] not in ".:" and w.rstrip("…") not in labels()] == []
