@@ -94,7 +94,8 @@ def looking_back(operator: Operator) -> None:
     wizard(operator).go_to("reflectance")
     computed(operator)
     effect = wizard(operator).findChild(QLabel, "lut.effect")
-    operator.until(lambda: effect is not None and effect.text(), "the press through the curve")
+    assert effect is not None
+    operator.until(lambda: "RMS" in effect.text(), "the press through the curve")
     operator.shot("calibrate-reflectance")
 
 

@@ -40,8 +40,12 @@ def inspect(operator: Operator) -> None:
     choice = page.views.quality.findChild(QComboBox, "inspect.quality.what")
     assert choice is not None
     choice.setCurrentIndex(choice.findData("uncertainty"))
+    operator.pause(2.0)
     page.pause(True)
-    operator.pause(8.0)
+    operator.until(
+        lambda: page._shown is not None and page._shown.quality is not None, "the uncertainty"
+    )
+    operator.pause(2.0)
     operator.shot("inspect-standing")
     page.pause(False)
     page.views.docks["camera"].raise_()
