@@ -63,18 +63,20 @@ def calibrate_virtual_sensor(
     name = f"virtual-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
     sessions = workspace.sessions_folder(design.serial)
     # A name with a dot is no session yet: the library does not show it.
-    folder = sessions / f".{name}"
+    folder, whole = sessions / f".{name}", sessions / name
     make_folder(folder)
     try:
         simulate_session(design, folder, progress=lambda _file, share: tell(PICTURES_SHARE * share))
+        # The calibration notes the session's name.
+        folder.rename(whole)
         run = calibrate_session(
-            read_session(folder),
+            read_session(whole),
             progress=lambda _stage, share: tell(PICTURES_SHARE + (1.0 - PICTURES_SHARE) * share),
         )
         path = workspace.keep_calibration(run.calibration, name)
-        folder.rename(sessions / name)
     except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
+        for unfinished in (folder, whole):
+            shutil.rmtree(unfinished, ignore_errors=True)
         raise
     workspace.use(path)
     return path

@@ -13,6 +13,7 @@ from app.inspect.place import flag_words
 from app.inspect.products import QUALITY_COLOURS, Shown
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
+from gelpolight_core.reconstruction.efforts import PAPER
 from gelpolight_core.reconstruction.heightmap import Flag
 from gelpolight_core.reconstruction.misfit import Misfit
 from gelpolight_core.translation import tr
@@ -72,8 +73,10 @@ class QualityPanel(QWidget):
             return  # of a frame that was made before it was asked for
         if shown.quality is None:
             sentence = tr("Pause to see the uncertainty.")
-            if still:
+            if still and shown.heightmap.model == PAPER:
                 sentence = tr("This model states no uncertainty; calibrate for the full model.")
+            elif still:
+                sentence = tr("The uncertainty of this picture is being found out.")
             self.map.say(sentence)
             self._legend.clear()
             return
