@@ -187,9 +187,13 @@ windows() {
     printf '[source]\nkind=folder\nfile=%s/one\n' "$home" >>"$settings"
     inside chown -R technician:technician $home
     start
+    tries=0
+    until grep -q libvtkRenderingOpenGL2 /proc/$window/maps; do
+        tries=$((tries + 1))
+        [ $tries -le 600 ] || fail "nothing was drawn in 3D"
+        sleep 1
+    done
     settle
-    settle
-    grep -q libvtkRenderingOpenGL2 /proc/$window/maps || fail "nothing was drawn in 3D"
     picture inspect
     stop $window
     kill $server
