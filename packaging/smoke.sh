@@ -90,9 +90,9 @@ seconds() { # COMMAND...: wall and processor seconds of a command of the user
         sh -c 'cd && exec "$@"' sh "$@" 2>&1 || { cat "$out/command.log" >&2; fail "$*"; }
 }
 
-forget_files() { # as after starting the machine: nothing of the program is in memory
+forget_files() { # nearly as after starting the machine: no larger file of the program is in memory
     sync
-    find "$place$program" "$place/usr/lib/x86_64-linux-gnu" -type f -exec dd if={} iflag=nocache count=0 status=none \;
+    find "$place$program" "$place/usr/lib/x86_64-linux-gnu" -type f -size +64k -exec dd if={} iflag=nocache count=0 status=none \;
 }
 
 commands() {
@@ -157,7 +157,7 @@ settle() {
 
 windows() {
     inside install -d -o technician /tmp/screen
-    as_user Xvfb $screen -screen 0 1280x800x24 -fbdir /tmp/screen >"$out/xvfb.log" 2>&1 &
+    as_user Xvfb $screen -noreset -screen 0 1280x800x24 -fbdir /tmp/screen >"$out/xvfb.log" 2>&1 &
     server=$!
     trap 'kill $server 2>/dev/null' EXIT
     until inside env DISPLAY=$screen xwininfo -root >/dev/null 2>&1; do
@@ -187,9 +187,13 @@ windows() {
     printf '[source]\nkind=folder\nfile=%s/one\n' "$home" >>"$settings"
     inside chown -R technician:technician $home
     start
+    tries=0
+    until grep -q libvtkRenderingOpenGL2 /proc/$window/maps; do
+        tries=$((tries + 1))
+        [ $tries -le 600 ] || fail "nothing was drawn in 3D"
+        sleep 1
+    done
     settle
-    settle
-    grep -q libvtkRenderingOpenGL2 /proc/$window/maps || fail "nothing was drawn in 3D"
     picture inspect
     stop $window
     kill $server
