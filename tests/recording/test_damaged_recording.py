@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import resource
 import signal
@@ -216,4 +217,25 @@ def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path: Path) -> N
         assert recording.numbers.tolist() == [0]
         assert recording.lost == 1
         assert not recording.truncated
+        assert np.array_equal(recording.frame(0).rgb, noisy(0))
+
+
+def test_a_disk_that_fails_altogether_is_one_sentence_and_what_came_before_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not even the part of a frame can be taken back."""
+    path = tmp_path / "a.gplrec"
+
+    def fail(*_: object) -> int:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with RecordingWriter(path, RecordingHeader(serial="A")) as writer:
+        writer.append(noisy(0), 0, 100.0)
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "pwrite", fail)
+            patch.setattr(os, "ftruncate", fail)
+            with pytest.raises(InputError, match=r"a\.gplrec: the file cannot be written"):
+                writer.append(noisy(1), 1, 100.02)
+    with Recording.open(path) as recording:
+        assert recording.numbers.tolist() == [0]
         assert np.array_equal(recording.frame(0).rgb, noisy(0))

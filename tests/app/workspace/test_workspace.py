@@ -338,3 +338,20 @@ def test_every_recording_has_a_place_of_its_own(workspace: Workspace) -> None:
     assert len(paths) == 3
     assert {path.parent for path in paths} == {workspace.recordings_folder("A/1")}
     assert {path.suffix for path in paths} == {".gplrec"}
+
+
+def test_a_calibration_whose_validation_cannot_be_copied_is_not_imported_in_half(
+    workspace: Workspace, source: Path, tmp_path: Path
+) -> None:
+    copied = tmp_path / source.name
+    shutil.copy(source, copied)
+    write_validation(trial(copied, GOOD), copied)
+    serial = read_summary(source).serial
+    place = workspace.sensor_folder(serial) / f"{folder_name(copied.stem)}.gplcal"
+    in_the_way = validation_path(place)
+    in_the_way.mkdir(parents=True)
+    with pytest.raises(InputError, match="a folder stands where the file should be"):
+        workspace.import_calibration(copied)
+    assert workspace.entries() == ()
+    in_the_way.rmdir()
+    assert read_entry(workspace.import_calibration(copied)).validated

@@ -1,0 +1,52 @@
+"""What a soak concludes from its figures."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging"))
+
+from soak_figures import Row, conclude
+from soak_person import may_be_used
+
+STEADY = Row(0.0, 1500.0, 600.0, 900.0, 10, 24, 1000, 3000, 20, 60, 15.0, 15.0, 15.0, 10.0, 5.0,
+             500.0, 0, 0, 100.0)  # fmt: skip
+
+
+def hour(growth_mb: float = 0.0, rate_to: float = 15.0) -> list[Row]:
+    """Return an hour's rows that grow by so much in the hour, and whose rate goes so far down."""
+    return [
+        replace(
+            STEADY,
+            minutes=0.5 * k,
+            # Pages that come and go, as a person opens them.
+            rss_mb=1500.0 + growth_mb * k / 120 + 40.0 * (k % 5),
+            made_hz=15.0 + (rate_to - 15.0) * k / 120,
+        )
+        for k in range(121)
+    ]
+
+
+def test_an_hour_in_which_nothing_changes_is_well() -> None:
+    said, wrong = conclude(hour())
+    assert wrong == []
+    assert any(line.startswith("rss_mb") for line in said)
+
+
+def test_memory_that_grows_and_a_rate_that_falls_are_told() -> None:
+    (wrong,) = conclude(hour(growth_mb=100.0))[1]
+    assert "memory grows by 100 MB per hour" in wrong
+    (wrong,) = conclude(hour(rate_to=11.0))[1]
+    assert "made_hz" in wrong
+
+
+def test_too_few_rests_are_no_verdict() -> None:
+    assert conclude(hour()[:3])[1]
+
+
+def test_the_person_neither_ends_the_program_nor_takes_its_calibration_away() -> None:
+    assert not may_be_used("file.quit")
+    assert not may_be_used("sensors.remove.button")
+    assert may_be_used("calibrate.capture")
