@@ -170,6 +170,8 @@ class Soak:
         if not self._arranged:
             self._arranged = True
             self._arrange()
+            # What was shown before says nothing of the arranged scene.
+            self._shown_before = self.counts.shown
         if self.counts.shown - self._shown_before < 5:
             return "nothing is shown"
         if page.link.last is None or not page.link.last.frame.settled:
