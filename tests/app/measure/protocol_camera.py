@@ -59,11 +59,12 @@ class SceneCamera:
         time.sleep(min(1.0 / RATE_HZ, timeout_s))
         with self._lock:
             light, self._number = self._light, self._number + 1
+            rng = np.random.default_rng(self._number)
             if self.shaking:
-                light = np.roll(light, self._number % 5, axis=1)
+                # By chance: to who sees every fifth frame a regular movement may stand still.
+                light = np.roll(light, rng.integers(0, 5, 2), axis=(1, 0))
             if self.cropped:
                 light = light[:, ::2]
-        rng = np.random.default_rng(self._number)
         value = 255.0 * light + rng.standard_normal(light.shape, dtype=np.float32)
         return Frame(
             np.clip(np.rint(value), 0, 255).astype(np.uint8), self._number, time.monotonic()
