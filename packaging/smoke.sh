@@ -4,7 +4,7 @@
 #     sh packaging/smoke.sh BUILD SESSION [OUT]
 #
 # BUILD is the package, SESSION a session folder with presses, OUT (build/smoke) where the pictures and figures go.
-# Needs root, debootstrap, xwd reading by ImageMagick's convert, and a Debian mirror (MIRROR).
+# Needs root, debootstrap, xwd reading by ImageMagick's convert, and a Debian mirror (debootstrap's own, or MIRROR).
 set -eu
 
 [ $# -ge 2 ] && [ -f "$1" ] && [ -f "$2/session.toml" ] || {
@@ -52,7 +52,7 @@ make_place() {
     if [ ! -f "$base/complete" ]; then
         step "making a bare Debian 12"
         rm -rf "$base"
-        debootstrap --variant=minbase bookworm "$base" "${MIRROR:-http://deb.debian.org/debian}" >"$out/debootstrap.log"
+        debootstrap --variant=minbase bookworm "$base" ${MIRROR:+"$MIRROR"} >"$out/debootstrap.log"
         touch "$base/complete"
     fi
     rm -rf "$place"

@@ -60,9 +60,11 @@ def add_along_row(slope, start, weights, left, target):  # type: ignore[no-untyp
 
 
 @_whole
-def add_down(r0, r1, r2, r3, r4, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Add the y part of the divergence of one line, from five lines of slopes."""
+def add_down(ring, begin, weights, target):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Add the y part of the divergence of one line, from five lines of slopes in a ring."""
     a, b, c, d, e = weights
+    r0, r1, r2 = ring[begin % 5], ring[(begin + 1) % 5], ring[(begin + 2) % 5]
+    r3, r4 = ring[(begin + 3) % 5], ring[(begin + 4) % 5]
     for k in range(target.shape[0]):
         target[k] += a * r0[k] + b * r1[k] + c * r2[k] + d * r3[k] + e * r4[k]
 
@@ -107,15 +109,7 @@ def divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compi
                 faults[loaded + top, 0] += bad
                 faults[loaded + top, 1] += clipped
             loaded += 1
-        add_down(
-            ring[begin % 5],
-            ring[(begin + 1) % 5],
-            ring[(begin + 2) % 5],
-            ring[(begin + 3) % 5],
-            ring[(begin + 4) % 5],
-            weight_y[line],
-            field[line][left : left + columns],
-        )
+        add_down(ring, begin, weight_y[line], field[line][left : left + columns])
         if top <= line < top + rows:
             bad, clipped = _clean(slope_x[line - top], line_x, limit)
             faults[line, 0] += bad

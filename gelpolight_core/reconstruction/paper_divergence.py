@@ -45,15 +45,7 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
             if keep and own:
                 slope_x[loaded], slope_y[loaded] = ring_x[at], ring_y[at]
             loaded += 1
-        add_down(
-            ring_y[begin % 5],
-            ring_y[(begin + 1) % 5],
-            ring_y[(begin + 2) % 5],
-            ring_y[(begin + 3) % 5],
-            ring_y[(begin + 4) % 5],
-            weight_y[line],
-            field[line][left : left + columns],
-        )
+        add_down(ring_y, begin, weight_y[line], field[line][left : left + columns])
         if top <= line < top + rows:
             row = (line - top) % 5
             add_along_row(ring_x[row], start_x, weight_x, left, field[line])
