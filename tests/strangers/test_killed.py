@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import random
-import subprocess
-import sys
-import threading
 from pathlib import Path
 
 import pytest
+from killing import lines_until_killed
 
 from app.workspace.indenters import read_indenters
 from app.workspace.workspace import Workspace
@@ -75,22 +71,13 @@ for number, press in enumerate(run.wanted):
 
 def told_until_killed(root: Path, seed: int) -> list[list[str]]:
     """Let a program write, kill it at a moment that the seed says; return what it has told."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", AT_WORK, str(root)],
-        stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (HERE, *HERE.parents[:2])))},
-        text=True,
+    lines = lines_until_killed(
+        ["-c", AT_WORK, str(root)],
+        paths=(HERE, *HERE.parents[:2]),
+        seed=seed,
+        longest_s=LONGEST_S,
     )
-    assert process.stdout is not None
-    with process:
-        first = process.stdout.readline()
-        end = threading.Timer(random.Random(seed).uniform(0.0, LONGEST_S), process.kill)
-        end.start()
-        rest = process.stdout.read()
-        end.join()
-    assert process.returncode == -9, "it ended by itself"
-    # A line that was cut off was not told.
-    return [line.split() for line in (first + rest).split("\n")[:-1]]
+    return [line.split() for line in lines]
 
 
 @pytest.mark.parametrize("seed", range(2))

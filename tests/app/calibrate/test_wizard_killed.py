@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import random
-import subprocess
-import sys
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from killing import lines_until_killed
 from technician import Technician
 
 from gelpolight_core.calibration.inputs import FOLDERS
@@ -28,23 +25,14 @@ HERE = Path(__file__).parent
 
 def told_until_killed(session: Path, pictures: Path, seed: int) -> list[dict[str, Any]]:
     """Let a wizard work, kill it at a moment that the seed says, and return what it has told."""
-    paths = os.pathsep.join([str(HERE), str(HERE.parents[2])])
-    process = subprocess.Popen(
-        [sys.executable, str(HERE / "wizard_at_work.py"), str(session), str(pictures), str(seed)],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1"},
+    lines = lines_until_killed(
+        [str(HERE / "wizard_at_work.py"), str(session), str(pictures), str(seed)],
+        paths=(HERE, HERE.parents[2]),
+        seed=seed,
+        longest_s=LONGEST_S,
+        environment={"OMP_NUM_THREADS": "1"},
     )
-    assert process.stdout is not None
-    with process:
-        first = process.stdout.readline()
-        end = threading.Timer(random.Random(seed).uniform(0.0, LONGEST_S), process.kill)
-        end.start()
-        rest = process.stdout.read()
-        end.join()
-    assert process.returncode == -9, "it ended by itself"
-    # A line that was cut off was not told.
-    return [json.loads(line) for line in (first + rest).split("\n")[:-1]]
+    return [json.loads(line) for line in lines]
 
 
 @pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + KILLS))
