@@ -22,6 +22,7 @@ from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from app.workspace.entries import Entry, parse_time
 from gelpolight_core.calibration.manifest import CalibrationSummary
+from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.quality import Verdict, verdict_word
 from gelpolight_core.translation import tr
 
@@ -92,7 +93,7 @@ def _stages(entry: Entry) -> QWidget:
     column = QVBoxLayout(stages)
     column.setContentsMargins(0, 0, 8, 0)
     for stage, table in (entry.summary.quality if entry.summary is not None else {}).items():
-        title = tr(stage).replace("_", " ").capitalize()
+        title = stage_title(stage)
         column.addWidget(_heading(title, table.verdict))
         shown = QualityTableWidget(f"sensors.quality.{stage}", title, stages)
         shown.set_table(table)

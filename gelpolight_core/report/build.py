@@ -9,6 +9,7 @@ from pathlib import PurePath
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
+from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.quality import QualityTable, verdict_word
 from gelpolight_core.report.ball_drawings import draw_balls, draw_curves, draw_misfits
@@ -34,7 +35,7 @@ from gelpolight_core.report.optics_drawings import (
     draw_lens_views,
     draw_top_pose,
 )
-from gelpolight_core.report.stage_facts import stage_facts, stage_intro, stage_title
+from gelpolight_core.report.stage_facts import stage_facts, stage_intro
 from gelpolight_core.session.session import Session, read_picture
 from gelpolight_core.translation import tr
 

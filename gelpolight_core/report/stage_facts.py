@@ -9,17 +9,6 @@ from gelpolight_core.report.drawing import CHANNELS
 from gelpolight_core.translation import tr
 
 Facts = tuple[tuple[str, str], ...]
-TITLES = {
-    "lens": "Lens",
-    "top_pose": "Top surface",
-    "response": "Camera response",
-    "lights": "LED positions",
-    "crosstalk": "Crosstalk",
-    "radiance": "Light intensity",
-    "reflectance": "Reflectance",
-    "factors": "Reflectance factors",
-    "joint": "Joint refinement",
-}
 INTROS = {
     "lens": "Checkerboard views at several tilts give focal length, principal point and distortion",
     "top_pose": "A checkerboard on the top surface says where that surface is",
@@ -31,11 +20,6 @@ INTROS = {
     "factors": "The bare membrane against theory: where it reflects more or less than on average",
     "joint": "LEDs, membrane and balls are fitted together to what all ball presses show",
 }
-
-
-def stage_title(key: str) -> str:
-    """Return the heading of a stage; a stage that is not known here is headed by its key."""
-    return tr(TITLES.get(key, key))
 
 
 def stage_intro(key: str) -> str:
