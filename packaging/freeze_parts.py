@@ -16,6 +16,8 @@ PACKAGES = ("app", "gelpolight_core")
 RESOURCES = ("checkerboards", "designs", "icons")
 # What setuptools puts beside the modules: see package-data in pyproject.toml.
 PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.mo", "py.typed")
+# Of the documentation: for search engines.
+NOT_READ = ("sitemap.xml", "sitemap.xml.gz")
 # Whose version the program asks for.
 NAMED_VERSIONS = (
     "matplotlib",
@@ -128,6 +130,21 @@ def data_files() -> list[tuple[str, str]]:
         for pattern in PACKAGE_DATA:
             found += [(path, path.parent) for path in (ROOT / package).rglob(pattern)]
     return [(str(path), str(folder.relative_to(ROOT))) for path, folder in found if path.is_file()]
+
+
+def documentation() -> list[tuple[str, str]]:
+    """Return the files of the documentation: file, folder in the build.
+
+    Raises
+    ------
+    FileNotFoundError
+        If packaging/docs.sh has not made it.
+    """
+    site = ROOT / "site"
+    if not (site / "index.html").is_file():
+        raise FileNotFoundError(f"no documentation in {site}: make it with packaging/docs.sh")
+    found = [path for path in site.rglob("*") if path.is_file() and path.name not in NOT_READ]
+    return [(str(path), str(path.parent.relative_to(ROOT))) for path in found]
 
 
 def is_wanted(entry: Entry) -> bool:

@@ -24,7 +24,9 @@ from importlib.metadata import Distribution, distributions
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-OURS = tuple(ROOT / name for name in ("app", "gelpolight_core", "resources"))
+OURS = tuple(ROOT / name for name in ("app", "gelpolight_core", "resources", "site"))
+# What is not ours of the documentation; packaging/docs.sh puts its licence beside it.
+THEME = ROOT / "site" / "assets"
 FILE = "LICENCES.txt"
 TEXTS = Path(__file__).resolve().parent / "licence-texts"
 TABLE_NAME = "packaging/licences.toml"
@@ -147,10 +149,13 @@ def collect(contents: Iterable[tuple[str, str]]) -> list[Part]:
     for place, source in contents:
         path = _resolved(Path(source))
         package = owners.get(path)
-        if not Path(source).is_absolute() or any(map(path.is_relative_to, OURS)):
+        of_theme = path.is_relative_to(THEME)
+        if not Path(source).is_absolute() or (any(map(path.is_relative_to, OURS)) and not of_theme):
             continue  # links to what is listed, and the project's own
         try:
-            if package is not None:
+            if of_theme:
+                add(_theme(), place)
+            elif package is not None:
                 own = packages[package.name]
                 add(_of_library(place, path, own) or own, place)
             elif place == "base_library.zip" or path.is_relative_to(_standard_library()):
@@ -231,6 +236,12 @@ def _python() -> Part:
         "https://docs.python.org/3/license.html",
     )
     return Part("Python", platform.python_version(), "PSF-2.0", {"Python: LICENSE": text})
+
+
+def _theme() -> Part:
+    text = (THEME / "LICENSE").read_text("utf-8")
+    name = "Material for MkDocs"
+    return Part(name, "in the documentation", "MIT", {f"{name}: LICENSE": text})
 
 
 def _standard_library() -> Path:

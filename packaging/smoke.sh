@@ -206,6 +206,13 @@ check_desktop() {
     say "The desktop knows: $(grep -h gelpolight "$place/usr/share/mime/globs2" "$place/usr/share/applications/mimeinfo.cache" | tr '\n' ' ')"
 }
 
+check_documentation() {
+    [ -f "$place/usr/share/doc/gelpolight-studio/copyright" ] || fail "the licences are not there"
+    pages=$(find -L "$place/usr/share/doc/gelpolight-studio/html" -name '*.html' | wc -l)
+    [ "$pages" -ge 10 ] || fail "the documentation is not there"
+    say "Documentation: $pages pages."
+}
+
 look_at_logs() {
     log=$(find "$place$home/.local" -name gelpolight.log)
     trouble=$(grep -hE " (WARNING|ERROR|CRITICAL) " "$log" || true)
@@ -219,6 +226,7 @@ look_at_logs() {
 make_place
 look_for_python
 check_desktop
+check_documentation
 commands
 windows
 look_at_logs

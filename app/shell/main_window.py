@@ -315,7 +315,7 @@ class MainWindow(QMainWindow):
         """Show the documentation, in what the desktop shows web pages with."""
         page = find_documentation()
         if page is None:
-            text = tr("The documentation is not here; it can be built with packaging/docs.sh.")
+            text = tr("This installation came without the documentation: see docs in the sources.")
             self.context.toasts.show(text, "warn")
         elif not QDesktopServices.openUrl(QUrl.fromLocalFile(str(page))):
             text = tr("Nothing here shows web pages; the documentation is at {path}")

@@ -19,6 +19,7 @@ import pytest
 
 from app.command_line.main import OPENED
 from app.shell import about
+from app.shell.documentation import find_documentation
 from app.shell.pages import all_pages
 from app.workspace.workspace import ENDING as CALIBRATION
 from gelpolight_core.recording.recording import ENDING as RECORDING
@@ -46,6 +47,24 @@ def test_every_resource_lies_where_the_program_looks_for_it() -> None:
         Path("gelpolight_core/py.typed") in data
         or not (ROOT / "gelpolight_core" / "py.typed").exists()
     )
+
+
+def test_the_documentation_lies_where_the_program_looks_for_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(parts, "ROOT", tmp_path)
+    with pytest.raises(FileNotFoundError, match=r"docs\.sh"):
+        parts.documentation()
+    for name in ("index.html", "guide/calibrate.html", "sitemap.xml"):
+        (tmp_path / "site" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "site" / name).write_text("here", "utf-8")
+    build = tmp_path / "build"
+    for file, folder in parts.documentation():
+        (build / folder).mkdir(parents=True, exist_ok=True)
+        (build / folder / Path(file).name).write_bytes(Path(file).read_bytes())
+    assert find_documentation(build) == build / "site" / "index.html"
+    assert (build / "site" / "guide" / "calibrate.html").is_file()
+    assert not (build / "site" / "sitemap.xml").exists()
 
 
 def test_the_data_of_packages_are_those_that_are_installed_with_them() -> None:
