@@ -16,19 +16,15 @@ from app.command_line.main import MENDABLE, main
 from gelpolight_core.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
-# What a technician waits for without wondering; measured: 0.5 s on two cores.
-START_S = 2.0
-
 STARTED = """
-import sys, time
-began = time.monotonic()
+import sys
 from PySide6.QtCore import QTimer
 from app import desktop
 from app.shell.main_window import MainWindow
 
 def look():
     heavy = {"scipy", "numba", "cv2", "matplotlib"} & set(sys.modules)
-    print(time.monotonic() - began, sorted(heavy))
+    print(sorted(heavy))
     sys.stdout.flush()
     if "--stay" not in sys.argv:
         from PySide6.QtWidgets import QApplication
@@ -54,10 +50,7 @@ def test_the_window_is_up_before_the_numerical_libraries() -> None:
     process = start()
     out, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
-    seconds, heavy = out.split(maxsplit=1)
-    assert heavy.strip() == "[]"
-    # Generous: other work may share this machine; the libraries' absence is the sharper check.
-    assert float(seconds) < 5 * START_S
+    assert out.strip() == "[]"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
