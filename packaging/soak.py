@@ -83,8 +83,8 @@ class Soak:
         self.person = Person(self.window, self.scratch, self._actions, self.options.seed)
         context.source.bench = Bench()
         context.source.bench.adjust(rate_hz=RATE_HZ)
-        if self.options.calibration is not None:
-            context.workspace.use(context.workspace.import_calibration(self.options.calibration))
+        self._calibration: Path | None = None
+        self._use_calibration()
         self.window.show_page("inspect")
         self.lateness = Lateness()
         self._watched = False
@@ -176,6 +176,8 @@ class Soak:
             return "nothing is shown"
         if page.link.last is None or not page.link.last.frame.settled:
             return UNSETTLED
+        if self._calibration is not None and page.link.last.heightmap is None:
+            return "there is no depth"
         return ""
 
     def _trouble(self, sentence: str) -> None:
@@ -196,9 +198,21 @@ class Soak:
             if action is not None:
                 action.trigger()
         page.findChild(QCheckBox, "inspect.section.region").setChecked(False)
+        self._use_calibration()
         bench = self.window.context.source.bench
         bench.lay("ball")
         bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
+
+    def _use_calibration(self) -> None:
+        """Put the calibration into use: most of what a frame costs is its own."""
+        if self.options.calibration is None:
+            return
+        context = self.window.context
+        if self._calibration is None or not self._calibration.is_file():
+            self._calibration = context.workspace.import_calibration(self.options.calibration)
+        if context.workspace.in_use != self._calibration:
+            context.workspace.use(self._calibration)
+            context.requests.calibrations_changed.emit()
 
     def _measured(self) -> None:
         self.rows.append(self._looked.row(self._began_s, self.log, self.scratch))
