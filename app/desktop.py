@@ -23,7 +23,7 @@ from app.shell.faults import Faults
 from app.shell.icons import application_icon
 from app.shell.log import Log
 from app.shell.main_window import SOURCES, MainWindow
-from app.shell.memory import keep_arenas_few
+from app.shell.memory import keep_little
 from app.shell.settings import APPLICATION, Settings
 from app.shell.status import StatusModel
 from app.shell.toasts import Toasts
@@ -165,7 +165,7 @@ def make_application() -> QApplication:
     before = QApplication.instance()
     if isinstance(before, QApplication):
         return before
-    keep_arenas_few()
+    keep_little()
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(
         Qt.HighDpiScaleFactorRoundingPolicy.PassThrough
     )

@@ -198,6 +198,10 @@ class Soak:
             if action is not None:
                 action.trigger()
         page.findChild(QCheckBox, "inspect.section.region").setChecked(False)
+        what = page.findChild(QComboBox, "inspect.quality.what")
+        if what is not None:  # standard deviations are several times as dear as depth
+            what.setCurrentIndex(0)
+            what.activated.emit(0)
         self._use_calibration()
         bench = self.window.context.source.bench
         bench.lay("ball")

@@ -77,9 +77,9 @@ def test_the_window_does_so_when_another_page_is_shown(
 
 HOARD = """
 import ctypes, sys, threading
-from app.shell.memory import keep_arenas_few
+from app.shell.memory import keep_little
 if sys.argv[1] == "few":
-    keep_arenas_few()
+    keep_little()
 library = ctypes.CDLL(None)
 library.malloc.restype = ctypes.c_void_p
 places = [0] * 8
@@ -105,3 +105,36 @@ def test_threads_share_a_few_stores_of_memory() -> None:
         for how in ("few", "many")
     }
     assert stores["few"] <= 2 < stores["many"]
+
+
+LARGE = """
+import ctypes, sys
+from app.shell.memory import LARGE_BYTES, keep_little
+if sys.argv[1] == "little":
+    keep_little()
+
+class Mallinfo2(ctypes.Structure):
+    names = "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost"
+    _fields_ = [(name, ctypes.c_size_t) for name in names.split()]
+
+library = ctypes.CDLL(None)
+library.mallinfo2.restype = Mallinfo2
+library.malloc.restype = ctypes.c_void_p
+library.malloc.argtypes = [ctypes.c_size_t]
+library.free.argtypes = [ctypes.c_void_p]
+library.free(library.malloc(3 * LARGE_BYTES))  # by itself it raises the bound to that
+before = library.mallinfo2().hblks
+place = library.malloc(2 * LARGE_BYTES)
+print(library.mallinfo2().hblks - before)
+"""
+
+
+@pytest.mark.skipif(
+    not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="a call of the GNU C library"
+)
+def test_large_blocks_come_from_the_system_whatever_was_freed_before() -> None:
+    blocks = {
+        how: int(subprocess.check_output([sys.executable, "-c", LARGE, how]))
+        for how in ("little", "much")
+    }
+    assert blocks == {"little": 1, "much": 0}
