@@ -201,7 +201,6 @@ class Soak:
         what = page.findChild(QComboBox, "inspect.quality.what")
         if what is not None:  # standard deviations are several times as dear as depth
             what.setCurrentIndex(0)
-            what.activated.emit(0)
         self._use_calibration()
         bench = self.window.context.source.bench
         bench.lay("ball")
