@@ -135,8 +135,15 @@ def take_bare(view: ProtocolView, qtbot: QtBot) -> None:
     qtbot.waitUntil(panel.capture.isEnabled, timeout=WAIT_MS)
 
 
+def wait_until_asked(view: ProtocolView, qtbot: QtBot) -> None:
+    """Wait until the program has seen the bare membrane, and asks for a press."""
+    live = view.pressing.panel.live
+    qtbot.waitUntil(lambda: live.text().startswith("Press it in"), timeout=WAIT_MS)
+
+
 def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
     """Press where the program says, wait until it has taken it, and lift."""
+    wait_until_asked(view, qtbot)
     run = view.work.run
     before, wanted = run.progress.done, run.next()
     camera.press(wanted.place_mm)
@@ -200,6 +207,7 @@ def test_an_unsteady_press_is_refused_with_its_reason_and_asked_for_again(
     choose(view, repeats=2)
     begin(view, qtbot)
     run, panel = view.work.run, view.pressing.panel
+    wait_until_asked(view, qtbot)
     camera.shaking = True
     camera.press(run.next().place_mm)
     qtbot.waitUntil(lambda: panel.live.text() == "Hold it still.", timeout=WAIT_MS)
