@@ -21,6 +21,8 @@ from app.sources.source import Frame, Setting, SourceLost
 from gelpolight_core.calibration.project import CalibrationProject
 
 RATE_HZ = 60.0
+# Far more than a loaded machine takes; only a failing test waits so long.
+WAIT_MS, REST_MS = 60_000, 300_000
 
 
 def read_rgb(path: Path) -> NDArray[Any]:
@@ -105,11 +107,11 @@ class Technician:
 
     def rest(self) -> None:
         """Wait until nothing is under way."""
-        self._qtbot.waitUntil(lambda: not self.wizard.controller.busy, timeout=60_000)
+        self._qtbot.waitUntil(lambda: not self.wizard.controller.busy, timeout=REST_MS)
 
     def until(self, what: Callable[[], object]) -> None:
         """Wait for something to be seen."""
-        self._qtbot.waitUntil(lambda: bool(what()), timeout=20_000)
+        self._qtbot.waitUntil(lambda: bool(what()), timeout=WAIT_MS)
 
     def see(self, name: str) -> QWidget:
         """Return a widget that can be seen."""

@@ -22,7 +22,7 @@ from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
 
-WAIT_MS = 20_000
+WAIT_MS = 60_000
 TEXTS = {"name": "C310", "identity": "x", "control.gain": "3"}
 Made = Callable[[], CalibrationProject]
 

@@ -23,7 +23,7 @@ from app.sources.stream import Stream
 from app.widgets.source_button import SourceButton
 from gelpolight_core.session.camera_settings import CameraSettings
 
-WAIT_MS = 20_000
+WAIT_MS = 60_000
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
-WAIT_MS = 30_000
+WAIT_MS = 60_000
 
 
 @pytest.fixture

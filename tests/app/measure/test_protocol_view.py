@@ -28,7 +28,7 @@ from gelpolight_core.measurement.result import Truth
 from gelpolight_core.optics.refraction import camera_to_membrane
 from gelpolight_core.records.entry import MeasurementRecord
 
-WAIT_MS = 30_000
+WAIT_MS = 60_000
 
 
 def frame(place_mm: tuple[float, float] | None, seed: int) -> np.ndarray:

@@ -16,7 +16,7 @@ from app.sources.source import Frame, SourceLost
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
 
-WAIT_S = 10.0
+WAIT_S = 60.0
 
 
 def picture(

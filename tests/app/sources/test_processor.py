@@ -13,7 +13,7 @@ from app.sources.processor import Failure, Outcome, Processor
 from app.sources.source import Frame
 from gelpolight_core.errors import InputError
 
-WAIT_S = 10.0
+WAIT_S = 60.0
 
 
 def frame(number: int) -> Frame:

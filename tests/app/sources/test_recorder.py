@@ -18,7 +18,7 @@ from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader, Rgb
 from gelpolight_core.recording.writer import RecordingWriter
 
-WAIT_S = 20.0
+WAIT_S = 60.0
 
 
 class Silent:

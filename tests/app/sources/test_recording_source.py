@@ -15,7 +15,7 @@ from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording import layout
 
-WAIT_S = 20.0
+WAIT_S = 60.0
 
 
 class Clock:

@@ -16,7 +16,7 @@ from app.sources.source import Frame, Setting, SourceLost
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
 
-WAIT_S = 10.0  # far more than a loaded machine takes; only a failing test waits so long
+WAIT_S = 60.0  # far more than a loaded machine takes; only a failing test waits so long
 
 
 def frame(number: int, *, settled: bool = True, time_s: float | None = None) -> Frame:

@@ -20,7 +20,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor, Whiteboard
 
-WAIT_S = 30.0
+WAIT_S = 60.0
 
 
 def design_without_noise(design: SensorDesign) -> SensorDesign:
