@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import logging
-import math
 import os
 import threading
 import time
@@ -12,9 +10,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
+from allocated import allocated_mb
 from probes import Lateness, resident_mb
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
@@ -176,26 +174,6 @@ class Look:
         )
         self._lateness.late_ms.clear()
         return row
-
-
-class _Allocated(ctypes.Structure):
-    """``struct mallinfo2`` of the GNU C library."""
-
-    _fields_: ClassVar = [
-        (name, ctypes.c_size_t)
-        for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks",
-                     "uordblks", "fordblks", "keepcost")
-    ]  # fmt: skip
-
-
-def allocated_mb() -> tuple[float, float]:
-    """Return what the allocator has given out, and what it keeps; NaN where it does not say."""
-    ask = getattr(ctypes.CDLL(None), "mallinfo2", None)
-    if ask is None:
-        return math.nan, math.nan
-    ask.restype = _Allocated
-    found = ask()
-    return (found.uordblks + found.hblkhd) / 1e6, found.fordblks / 1e6
 
 
 def disk_mb(folder: Path) -> float:

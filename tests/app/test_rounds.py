@@ -18,12 +18,14 @@ KEPT_MB = 0.1
 ENDS = 5
 
 SCRIPT = """
-import ctypes, gc, json, sys, threading
+import gc, json, sys, threading
 from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEvent, QTimer
 from PySide6.QtGui import QPixmapCache
 from PySide6.QtWidgets import QApplication
+sys.path.insert(0, "packaging")
+from allocated import allocated_mb
 from app import desktop
 from app.bench.stated import stated_session
 from app.calibrate.page import CalibratePage
@@ -31,18 +33,6 @@ from app.shell.main_window import MainWindow
 from app.sources.bench import Bench
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.session.description import create_session
-
-class Mallinfo2(ctypes.Structure):
-    names = "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost"
-    _fields_ = [(name, ctypes.c_size_t) for name in names.split()]
-
-library = ctypes.CDLL(None)
-library.mallinfo2.restype = Mallinfo2
-
-def held_mb():
-    # What the allocator keeps of freed memory goes up and down by several MB.
-    info = library.mallinfo2()
-    return (info.uordblks + info.hblkhd) / 1e6
 
 folder, rounds = Path(sys.argv[1]), int(sys.argv[2])
 create_session(replace(stated_session(), folder=folder))
@@ -83,7 +73,9 @@ class Rounds:
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         gc.collect()
         QPixmapCache.clear()  # the style keeps up to 10 MB of painted buttons
-        left.append((len(QApplication.allWidgets()), threading.active_count(), held_mb()))
+        # Given out; what the allocator keeps of freed memory goes up and down by several MB.
+        given_mb, _ = allocated_mb()
+        left.append((len(QApplication.allWidgets()), threading.active_count(), given_mb))
         self.begin()
 
 shown = MainWindow.showEvent

@@ -17,6 +17,7 @@ from app.shell.main_window import MainWindow
 from app.shell.memory import give_back
 from app.shell.pages import PageEntry
 
+ROOT = Path(__file__).resolve().parents[3]
 PIECE, PIECES = 60_000, 3000
 
 
@@ -110,22 +111,18 @@ def test_threads_share_a_few_stores_of_memory() -> None:
 LARGE = """
 import ctypes, sys
 from app.shell.memory import LARGE_BYTES, keep_little
+sys.path.insert(0, "packaging")
+from allocated import ask_allocator
 if sys.argv[1] == "little":
     keep_little()
-
-class Mallinfo2(ctypes.Structure):
-    names = "arena ordblks smblks hblks hblkhd usmblks fsmblks uordblks fordblks keepcost"
-    _fields_ = [(name, ctypes.c_size_t) for name in names.split()]
-
 library = ctypes.CDLL(None)
-library.mallinfo2.restype = Mallinfo2
 library.malloc.restype = ctypes.c_void_p
 library.malloc.argtypes = [ctypes.c_size_t]
 library.free.argtypes = [ctypes.c_void_p]
 library.free(library.malloc(3 * LARGE_BYTES))  # by itself it raises the bound to that
-before = library.mallinfo2().hblks
+before = ask_allocator().hblks
 place = library.malloc(2 * LARGE_BYTES)
-print(library.mallinfo2().hblks - before)
+print(ask_allocator().hblks - before)
 """
 
 
@@ -134,7 +131,7 @@ print(library.mallinfo2().hblks - before)
 )
 def test_large_blocks_come_from_the_system_whatever_was_freed_before() -> None:
     blocks = {
-        how: int(subprocess.check_output([sys.executable, "-c", LARGE, how]))
+        how: int(subprocess.check_output([sys.executable, "-c", LARGE, how], cwd=ROOT))
         for how in ("little", "much")
     }
     assert blocks == {"little": 1, "much": 0}
