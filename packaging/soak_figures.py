@@ -201,17 +201,7 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
     warm = [row for row in rows if row.minutes >= warm_up]
     said, wrong = [], []
     minutes = [row.minutes for row in warm]
-    for name in (
-        "rss_mb",
-        "held_mb",
-        "spare_mb",
-        "threads",
-        "files",
-        "widgets",
-        "objects",
-        "timers",
-        "windows",
-    ):
+    for name in COUNTED:
         values = [float(getattr(row, name)) for row in warm]
         slope, low, high = trend(minutes, values)
         said.append(

@@ -26,6 +26,18 @@ LOOKS = {
     "term": ("#6b7785", "#9aa7b4", "x"),
 }
 LEAST = 1e-3
+# Nobody looks farther: logarithms of times from a microsecond to a day, and of errors.
+LIMITS = {
+    "xMin": -3.0,
+    "xMax": 8.0,
+    "yMin": -4.0,
+    "yMax": 5.0,
+    "minXRange": 0.15,
+    "minYRange": 0.15,
+}
+# Tenths of a power of ten that are marked, from afar to near.
+TENTHS = ((10,), (10, 20, 50), range(10, 100, 10), range(10, 100))
+FEWEST_TICKS = 3
 
 
 def errors() -> dict[str, str]:
@@ -49,6 +61,8 @@ class PrecisionPlot(QWidget):
         self._plot.setLogMode(x=True, y=True)
         self._plot.showGrid(x=True, y=True, alpha=0.25)
         self._plot.setLabel("bottom", tr("time of a frame (ms)"))
+        self._plot.setLimits(**LIMITS)
+        self._plot.sigRangeChanged.connect(self._set_ticks)
         for side in ("bottom", "left"):
             self._plot.getAxis(side).enableAutoSIPrefix(False)
         column = QVBoxLayout(self)
@@ -92,8 +106,11 @@ class PrecisionPlot(QWidget):
             place = PAPER_MS, PAPER_PERCENT[self._error]
             self._mark(place, tr("the paper, of its own sensor"), ink.name(), "star", 15)
         plot.autoRange(padding=0.18)
-        for side, values in zip(("bottom", "left"), plot.viewRange(), strict=True):
-            plot.getAxis(side).setTicks([_ticks(*values)])
+        self._set_ticks()
+
+    def _set_ticks(self) -> None:
+        for side, values in zip(("bottom", "left"), self._plot.viewRange(), strict=True):
+            self._plot.getAxis(side).setTicks([_ticks(*values)])
 
     def _mark(
         self, place: tuple[float, float] | None, text: str, colour: str, symbol: str, size: int
@@ -123,11 +140,15 @@ def _place(point: Point, error: str) -> tuple[float, float] | None:
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Return 1, 2 and 5 times the powers of ten between two logarithms, with their words."""
+    """Return round values between two logarithms, as many as can be read, with their words."""
     powers = range(math.floor(low), math.ceil(high) + 1)
-    values = [factor * 10.0**power for power in powers for factor in (1, 2, 5)]
-    inside = [value for value in values if low <= math.log10(value) <= high]
-    return [(math.log10(value), f"{value:g}") for value in inside]
+    inside: list[tuple[float, float]] = []
+    for tenths in TENTHS:
+        values = [tenth * 10.0 ** (power - 1) for power in powers for tenth in tenths]
+        inside = [(math.log10(v), v) for v in values if low <= math.log10(v) <= high]
+        if len(inside) >= FEWEST_TICKS:
+            break
+    return [(place, f"{value:g}") for place, value in inside]
 
 
 def _logarithm(place: tuple[float, float]) -> QPointF:

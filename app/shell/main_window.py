@@ -54,8 +54,8 @@ SOURCES = ("app.sources.listing", "app.sources.bench")
 FIRST_SIZE = QSize(1280, 800)
 # Raised when toolbars change, so that an older layout is not forced onto a newer window.
 LAYOUT_VERSION = 1
-# After another page is shown: what the one before had is let go by then.
-TIDY_MS = 3000
+# After another page is shown, when what the one before had is let go; and from then on.
+TIDY_MS, TIDY_AGAIN_MS = 3_000, 60_000
 
 
 class MainWindow(QMainWindow):
@@ -101,8 +101,7 @@ class MainWindow(QMainWindow):
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         self._tidy = QTimer(self)
         self._tidy.setSingleShot(True)
-        self._tidy.setInterval(TIDY_MS)
-        self._tidy.timeout.connect(give_back)
+        self._tidy.timeout.connect(self._give_back)
         self._restore_layout()
 
     def _build_navigation(self) -> dict[str, QAction]:
@@ -190,7 +189,11 @@ class MainWindow(QMainWindow):
         _call(before, "leave")
         self._stack.setCurrentWidget(after)
         _call(after, "enter")
-        self._tidy.start()
+        self._tidy.start(TIDY_MS)
+
+    def _give_back(self) -> None:
+        give_back()
+        self._tidy.start(TIDY_AGAIN_MS)
 
     def open_path_in(self, name: str, path: str) -> None:
         """Show a page and let it open a folder or file."""

@@ -13,6 +13,7 @@ from matplotlib.patches import Rectangle
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.export.drawing_thread import in_drawing_thread
 from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.translation import tr
 
@@ -28,6 +29,7 @@ QUIET_SQUARES = 1.5
 CUT_MM = 4.0
 
 
+@in_drawing_thread
 def write_board(board: BoardSpec, path: Path) -> None:
     """Write a checkerboard as a PDF page at true scale, whole or not at all.
 

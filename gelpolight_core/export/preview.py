@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.export.drawing_thread import in_drawing_thread
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.translation import tr
 
@@ -68,6 +69,7 @@ def _draw_depth(
     figure.colorbar(image, ax=axes, label=tr("depth (mm)"), shrink=0.9)
 
 
+@in_drawing_thread
 def write_preview(heightmap: HeightMap, frame: NDArray[np.floating[Any]], path: Path) -> None:
     """Write the preview as a PNG file, whole or not at all.
 

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.export.drawing_thread import in_drawing_thread
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
@@ -159,6 +160,7 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     return figure
 
 
+@in_drawing_thread
 def write_evaluation(evaluation: Evaluation, folder: Path) -> tuple[Path, ...]:
     """Write ``evaluation.txt``, ``.csv``, ``.json`` and ``.png``; return their paths.
 

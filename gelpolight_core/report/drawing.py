@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from gelpolight_core.export.drawing_thread import in_drawing_thread
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
 from gelpolight_core.translation import tr
@@ -47,6 +48,7 @@ _STYLE: dict[Any, Any] = {
 }
 
 
+@in_drawing_thread
 def draw(
     caption: str, height_mm: float, paint: Callable[[Figure], None], *, width_mm: float = FULL_MM
 ) -> Drawing:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 
+from gelpolight_core.export.drawing_thread import in_drawing_thread
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
@@ -102,6 +103,7 @@ def _judged(evaluation: Evaluation, direction: str, limits: dict[str, float]) ->
     return tuple(found)
 
 
+@in_drawing_thread
 def _drawing(evaluation: Evaluation) -> Drawing:
     figure = evaluation_figure(evaluation)
     width, height = figure.get_size_inches()

@@ -15,6 +15,7 @@ from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
+from gelpolight_core.export.drawing_thread import in_drawing_thread
 from gelpolight_core.quality import QualityTable, Verdict, verdict_word
 from gelpolight_core.report.document import (
     MARKS,
@@ -157,6 +158,7 @@ def line_width_mm(text: str, size: float, family: str = PLAIN) -> float:
     return float(width) * POINT_MM
 
 
+@in_drawing_thread
 def report_pdf(report: Report) -> bytes:
     """Return the report as a PDF file of A4 pages."""
     stream = io.BytesIO()

@@ -21,7 +21,8 @@ from shiboken6 import isValid
 from app.desktop import make_application, make_context
 from app.shell import theme
 from app.shell.context import AppContext
-from gelpolight_core.reconstruction.threads import THREAD_NAME
+from gelpolight_core.export.drawing_thread import THREAD_NAME as DRAWING_THREAD
+from gelpolight_core.reconstruction.threads import THREAD_NAME as ROWS_THREAD
 
 # tqdm's monitor lives as long as the process; numba and its kind start no Python threads.
 LASTING_THREADS = ("TMonitor",)
@@ -152,8 +153,9 @@ def _left_threads(before: set[threading.Thread]) -> list[str]:
             for thread in threading.enumerate()
             if thread not in before
             and type(thread).__name__ not in LASTING_THREADS
-            # These end with the solver that has them, for which there is a test of its own.
-            and not thread.name.startswith(THREAD_NAME)
+            # These end with the solver that has them, that one with the program; they have tests
+            # of their own.
+            and not thread.name.startswith((ROWS_THREAD, DRAWING_THREAD))
         ]
         if not left or time.monotonic() > end:
             return left

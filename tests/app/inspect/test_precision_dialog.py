@@ -13,6 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from app.inspect import precision_dialog
 from app.inspect.precision_dialog import PrecisionDialog
+from app.inspect.precision_plot import LIMITS, PrecisionPlot
 from app.shell.context import AppContext
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
@@ -136,3 +137,32 @@ def test_closing_it_ends_what_is_measured(
     dialog.show()
     assert dialog.start.isEnabled()
     assert not dialog.stop.isEnabled()
+
+
+def ticks(plot: PrecisionPlot, side: str) -> list[str]:
+    return [text for _, text in plot._plot.getAxis(side)._tickLevels[0]]
+
+
+def test_the_axes_say_round_values_however_far_one_looks(
+    dialog: PrecisionDialog, qtbot: QtBot
+) -> None:
+    plot = dialog.plot
+    view = plot._plot.getViewBox()
+    assert ticks(plot, "bottom")
+    for _ in range(200):
+        view.scaleBy((4.0, 4.0))
+    # What brings the axes up to date must bear what a mouse wheel can do.
+    dialog.show_points(POINTS)
+    (left, right), (bottom, top) = plot._plot.viewRange()
+    assert LIMITS["xMin"] <= left < right <= LIMITS["xMax"]
+    assert LIMITS["yMin"] <= bottom < top <= LIMITS["yMax"]
+    dialog.show_points(())
+    for _ in range(200):
+        view.scaleBy((4.0, 4.0))
+    assert ticks(plot, "bottom") == [f"{10.0**power:g}" for power in range(-3, 9)]
+    view.setRange(xRange=(1.0, 2.0), yRange=(0.1, 0.4), padding=0.0)
+    assert ticks(plot, "bottom") == ["10", "20", "50", "100"]
+    for _ in range(200):
+        view.scaleBy((0.25, 0.25))
+    assert 3 <= len(ticks(plot, "bottom")) <= 30
+    assert 3 <= len(ticks(plot, "left")) <= 30

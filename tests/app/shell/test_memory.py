@@ -57,7 +57,7 @@ def test_nothing_happens_where_there_is_no_such_call(monkeypatch: pytest.MonkeyP
     give_back()
 
 
-def test_the_window_does_so_when_another_page_is_shown(
+def test_the_window_does_so_when_another_page_is_shown_and_again_and_again(
     context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(main_window, "TIDY_MS", 0)
@@ -73,6 +73,10 @@ def test_the_window_does_so_when_another_page_is_shown(
     given.clear()
     window.show_page("two")
     qtbot.waitUntil(lambda: bool(given), timeout=20_000)
+    monkeypatch.setattr(main_window, "TIDY_AGAIN_MS", 0)
+    window.show_page("one")
+    given.clear()
+    qtbot.waitUntil(lambda: len(given) > 2, timeout=20_000)
     window.close()
 
 
