@@ -7,8 +7,9 @@ The real program runs on the virtual sensor, whose camera makes 15 frames a seco
 minute it is brought to the same state and left in peace for some seconds, in which it is measured:
 memory, threads, open files, objects and timers, frames made, processed and shown in a second, how
 late the user interface is, what the log says, and the room on disk. Every action is written to
-actions.log in the scratch folder. The exit status is 1 where memory grows, the rate drifts, or the
-log holds an error; the files are kept then.
+actions.log in the scratch folder. The exit status is 1 where memory grows (apart from what the C
+library keeps of what was given back to it), the rate drifts, or the log holds an error; the files
+are kept then.
 """
 
 from __future__ import annotations

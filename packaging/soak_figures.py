@@ -21,6 +21,7 @@ from scipy.stats import theilslopes
 from app.inspect.page import InspectPage
 from app.inspect.products import Maker, Shown
 from app.shell.log import Log
+from app.shell.memory import give_back
 from app.sources.source import Frame
 from app.sources.stream import Stream
 
@@ -32,7 +33,8 @@ LEAST_RATE = 0.9
 # What a person is told that something cannot be done is no error of the program.
 TOLD, FAULT = " app.shell.toasts: ", "fault of this program"
 COUNTED = (
-    "rss_mb", "held_mb", "spare_mb", "threads", "files", "widgets", "objects", "timers", "windows",
+    "rss_mb", "needed_mb", "held_mb", "spare_mb", "threads", "files", "widgets", "objects",
+    "timers", "windows",
 )  # fmt: skip
 
 
@@ -42,6 +44,7 @@ class Row:
 
     minutes: float
     rss_mb: float
+    needed_mb: float  # the same, after the allocator has given back what it can
     held_mb: float  # what the program has asked for; the system's allocator keeps more
     spare_mb: float  # what the allocator keeps of what was given back
     threads: int
@@ -152,10 +155,13 @@ class Look:
         self._lateness.late_ms.clear()
         log.look()
         objects = [o for w in QApplication.topLevelWidgets() for o in w.findChildren(QObject)]
+        held_mb, spare_mb = allocated_mb()
         row = Row(
             (time.monotonic() - began_s) / 60.0,
             resident_mb(),
-            *allocated_mb(),
+            needed_mb(),
+            held_mb,
+            spare_mb,
             threading.active_count(),
             len(os.listdir("/proc/self/fd")),
             len(QApplication.allWidgets()),
@@ -174,6 +180,12 @@ class Look:
         )
         self._lateness.late_ms.clear()
         return row
+
+
+def needed_mb() -> float:
+    """Return the resident memory without what the allocator keeps of what was given back."""
+    give_back()
+    return resident_mb()
 
 
 def disk_mb(folder: Path) -> float:
@@ -208,7 +220,7 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
             f"{name}: {values[0]:.0f} after the warm-up, {values[-1]:.0f} at the end, "
             f"{slope:+.1f} per hour (95 %: {low:+.1f} to {high:+.1f})"
         )
-        if name == "rss_mb" and low > MOST_GROWTH_MB_PER_H:
+        if name == "needed_mb" and low > MOST_GROWTH_MB_PER_H:
             wrong.append(f"memory grows by {slope:.0f} MB per hour, at least by {low:.0f}")
     for name in ("made_hz", "processed_hz", "shown_hz", "cpu_ms", "late_ms", "late_at_work_ms"):
         first, last = thirds([getattr(row, name) for row in warm])

@@ -189,7 +189,9 @@ class MainWindow(QMainWindow):
         _call(before, "leave")
         self._stack.setCurrentWidget(after)
         _call(after, "enter")
-        self._tidy.start(TIDY_MS)
+        # Not put off by those who go from page to page.
+        if not 0 <= self._tidy.remainingTime() <= TIDY_MS:
+            self._tidy.start(TIDY_MS)
 
     def _give_back(self) -> None:
         give_back()

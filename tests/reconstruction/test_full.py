@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -25,7 +24,7 @@ from gelpolight_core.reconstruction.full import (
 )
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.session.session import read_picture
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
 Map = NDArray[np.float32]
@@ -233,23 +232,3 @@ def test_a_calibration_for_the_papers_model_is_refused(virtual_calibration: Cali
     with pytest.raises(InputError, match="paper"):
         Reconstructor(plain, model="full")
     assert Reconstructor(plain).model == "paper"
-
-
-def test_a_rendered_press_has_its_height_and_shape(shared_data: Path, tmp_path: Path) -> None:
-    """Sensor-A by an independent path tracer, calibrated from half of its own balls for speed."""
-    from gelpolight_core.calibration.pipeline import calibrate_session
-
-    whole, folder = shared_data / "sensor-A", tmp_path / "sensor-A"
-    (folder / "balls").mkdir(parents=True)
-    for stage in ("checkerboard", "top_pose", "mirror", "whiteboard", "background"):
-        (folder / stage).symlink_to(whole / stage)
-    for ball in sorted((whole / "balls").glob("*.png"))[::2]:
-        (folder / "balls" / ball.name).symlink_to(ball)
-    shutil.copy(whole / "session.toml", folder)
-    calibration = calibrate_session(read_session(folder), model="full").calibration
-    name = "cylinder_s5_d100"
-    frame = read_picture(whole / "presses" / f"{name}.png").rgb
-    found = Score(Reconstructor(calibration).depth(frame), whole / "truth" / f"{name}.npz", 12.0)
-    assert abs(found.height) < 0.015
-    assert abs(found.size) < 0.015
-    assert found.rms_mm < 12e-3

@@ -390,15 +390,12 @@ def test_a_file_changed_by_something_else_is_said_and_read_when_asked(
     stage = wizard.step.stage
     assert stage is not None
     wizard.controller.exclude(stage, "ball_02.png", True)
-    technician.rest()
-    assert "decisions.toml was changed" in wizard.outside.sentence.text()
+    technician.until(lambda: "decisions.toml was changed" in wizard.outside.sentence.text())
     technician.click("calibrate.outside.reload")
-    technician.rest()
-    assert not wizard.outside.isVisible()
+    technician.until(lambda: not wizard.outside.isVisible())
     wizard.controller.exclude(stage, "ball_02.png", True)
-    technician.rest()
     kept = {"balls/ball_01.png", "balls/ball_02.png"}
-    assert read_session(technician.session).decisions.excluded == kept
+    technician.until(lambda: read_session(technician.session).decisions.excluded == kept)
 
 
 def test_a_file_broken_by_something_else_can_be_written_anew(
