@@ -178,6 +178,10 @@ class Soak:
         if page.link.last is None or not page.link.last.frame.settled:
             return UNSETTLED
         if self._calibration is not None and page.link.last.heightmap is None:
+            # Reading the calibration may have been stopped above.
+            for button in page.findChildren(QAbstractButton, "inspect.advised"):
+                if button.isVisible():
+                    button.click()
             return "there is no depth"
         return ""
 

@@ -112,6 +112,14 @@ class CalibrationChoice(QObject):
         future = None if self._reading is None else self._reading.future
         return future is not None and not future.done()
 
+    @property
+    def _came_to_nothing(self) -> bool:
+        """Whether the last reading was stopped or failed."""
+        future = None if self._reading is None else self._reading.future
+        if future is None or not future.done():
+            return False
+        return future.cancelled() or future.exception() is not None
+
     def refer_cameras(self, live: Reconstructor | None) -> None:
         """Hold the cameras to how they were set for a calibration."""
         texts = {} if live is None else live.calibration.provenance.camera_settings
@@ -136,6 +144,8 @@ class CalibrationChoice(QObject):
             self._context.workspace.use(path)
         except InputError as error:
             self._context.toasts.show(str(error), "fail")
+        if self._came_to_nothing:
+            self._state = ()  # asked for once more, it is read once more
         self._context.requests.calibrations_changed.emit()
 
     def _read(self, path: Path) -> None:

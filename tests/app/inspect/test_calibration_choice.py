@@ -13,6 +13,9 @@ from pytestqt.qtbot import QtBot
 from app.inspect.calibration_choice import CalibrationBox, CalibrationChoice
 from app.shell.context import AppContext
 from app.shell.jobs import Job
+from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.project import Cancelled
 
 
 class Waiting:
@@ -34,6 +37,33 @@ def test_a_reading_that_was_stopped_is_over(context: AppContext, qtbot: QtBot) -
     assert jobs.job.future is not None
     jobs.job.future.set_exception(RuntimeError("stopped"))
     assert not choice.is_reading
+
+
+def test_one_whose_reading_was_stopped_is_read_when_it_is_asked_for_again(
+    context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    """Otherwise only another calibration would help."""
+    path = context.workspace.calibration_path("virtual-1", "small")
+    write_calibration(small_calibration, path)
+    box, jobs = CalibrationBox(), Waiting()
+    qtbot.addWidget(box)
+    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    choice.refresh()
+    choice.use_what_fits("", None)
+    first = jobs.job
+    choice.use_what_fits("", None)
+    assert jobs.job is first
+    assert first.future is not None
+    first.future.set_exception(Cancelled())
+    choice.refresh()
+    assert jobs.job is first  # by itself nothing is begun again
+    choice.use_what_fits("", None)
+    assert jobs.job is not first
+    second = jobs.job
+    assert second.future is not None
+    second.future.set_result((path, None, None))
+    box.activated.emit(box.currentIndex())
+    assert jobs.job is second
 
 
 @pytest.mark.parametrize(("serial", "shown"), [("A", "A-12ab"), ("B", "B  A-12ab")])
