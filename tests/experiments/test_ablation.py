@@ -24,20 +24,20 @@ BALLS = (0, 3, 6, 8)
 
 
 @pytest.fixture(scope="module")
-def small(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the small virtual session with four of its balls and two of its presses."""
+def small(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the virtual session with four of its balls and two of its presses."""
     folder = tmp_path_factory.mktemp("ablation") / "small"
     for stage in ("checkerboard", "top_pose", "mirror", "whiteboard", "background", "truth"):
-        shutil.copytree(small_session / stage, folder / stage)
+        shutil.copytree(virtual_session / stage, folder / stage)
     for stage, names in (("presses", PRESSES), ("balls", [f"ball_{n:02d}.png" for n in BALLS])):
         (folder / stage).mkdir()
         for name in names:
-            shutil.copy(small_session / stage / name, folder / stage)
-    described = (small_session / "session.toml").read_text().splitlines()
+            shutil.copy(virtual_session / stage / name, folder / stage)
+    described = (virtual_session / "session.toml").read_text().splitlines()
     kept = [f'"ball_{n:02d}.png"' for n in BALLS]
     lines = [x for x in described if not x.startswith('"ball_') or x.split(" ")[0] in kept]
     (folder / "session.toml").write_text("\n".join(lines))
-    rows = (small_session / "presses" / "truth.csv").read_text().splitlines()
+    rows = (virtual_session / "presses" / "truth.csv").read_text().splitlines()
     shown = [row for row in rows if row.startswith(("file", *PRESSES))]
     (folder / "presses" / "truth.csv").write_text("\n".join(shown))
     return folder
