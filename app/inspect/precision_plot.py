@@ -35,9 +35,8 @@ LIMITS = {
     "minXRange": 0.15,
     "minYRange": 0.15,
 }
-# Tenths of a power of ten that are marked, from afar to near.
-TENTHS = ((10,), (10, 20, 50), range(10, 100, 10), range(10, 100))
-FEWEST_TICKS = 3
+# Ticks within a decade; and from how many decades on only powers of ten are marked.
+MOST_STEPS, MANY_DECADES = 8, 4.0
 
 
 def errors() -> dict[str, str]:
@@ -141,14 +140,22 @@ def _place(point: Point, error: str) -> tuple[float, float] | None:
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
     """Return round values between two logarithms, as many as can be read, with their words."""
-    powers = range(math.floor(low), math.ceil(high) + 1)
-    inside: list[tuple[float, float]] = []
-    for tenths in TENTHS:
-        values = [tenth * 10.0 ** (power - 1) for power in powers for tenth in tenths]
-        inside = [(math.log10(v), v) for v in values if low <= math.log10(v) <= high]
-        if len(inside) >= FEWEST_TICKS:
-            break
-    return [(place, f"{value:g}") for place, value in inside]
+    if high - low < 1.0:
+        least, most = 10.0**low, 10.0**high
+        step = _round_up((most - least) / MOST_STEPS)
+        values = [step * k for k in range(math.ceil(least / step), math.floor(most / step) + 1)]
+    else:
+        factors = (1, 2, 5) if high - low < MANY_DECADES else (1,)
+        powers = range(math.floor(low), math.ceil(high) + 1)
+        every = [factor * 10.0**power for power in powers for factor in factors]
+        values = [value for value in every if low <= math.log10(value) <= high]
+    return [(math.log10(value), f"{value:g}") for value in values]
+
+
+def _round_up(step: float) -> float:
+    """Return the next of 1, 2 and 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(step))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= step)
 
 
 def _logarithm(place: tuple[float, float]) -> QPointF:

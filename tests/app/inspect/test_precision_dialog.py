@@ -143,9 +143,7 @@ def ticks(plot: PrecisionPlot, side: str) -> list[str]:
     return [text for _, text in plot._plot.getAxis(side)._tickLevels[0]]
 
 
-def test_the_axes_say_round_values_however_far_one_looks(
-    dialog: PrecisionDialog, qtbot: QtBot
-) -> None:
+def test_the_axes_say_round_values_however_far_one_looks(dialog: PrecisionDialog) -> None:
     plot = dialog.plot
     view = plot._plot.getViewBox()
     assert ticks(plot, "bottom")
@@ -162,7 +160,10 @@ def test_the_axes_say_round_values_however_far_one_looks(
     assert ticks(plot, "bottom") == [f"{10.0**power:g}" for power in range(-3, 9)]
     view.setRange(xRange=(1.0, 2.0), yRange=(0.1, 0.4), padding=0.0)
     assert ticks(plot, "bottom") == ["10", "20", "50", "100"]
+    view.setRange(xRange=(0.95, 1.15), yRange=(-0.5, 2.5), padding=0.0)
+    assert ticks(plot, "bottom") == ["9", "10", "11", "12", "13", "14"]
+    assert ticks(plot, "left") == "0.5 1 2 5 10 20 50 100 200".split()
     for _ in range(200):
         view.scaleBy((0.25, 0.25))
-    assert 3 <= len(ticks(plot, "bottom")) <= 30
-    assert 3 <= len(ticks(plot, "left")) <= 30
+    assert 3 <= len(ticks(plot, "bottom")) <= 9
+    assert 3 <= len(ticks(plot, "left")) <= 9
