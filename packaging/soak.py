@@ -110,7 +110,7 @@ class Soak:
         self.person.rest()
         self.person.note("rest")
         self._rests_by_s = time.monotonic() + LONGEST_UNREST_S
-        self._shown_before, self._arranged = self.counts.shown, False
+        self._shown_before, self._arranged, self._advised = self.counts.shown, False, False
         self._settle()
 
     def _settle(self) -> None:
@@ -178,9 +178,10 @@ class Soak:
         if page.link.last is None or not page.link.last.frame.settled:
             return UNSETTLED
         if self._calibration is not None and page.link.last.heightmap is None:
-            # Reading the calibration may have been stopped above.
+            # Getting the calibration ready may have been stopped, above or by the person.
             for button in page.findChildren(QAbstractButton, "inspect.advised"):
-                if button.isVisible():
+                if button.isVisible() and not self._advised:
+                    self._advised = True
                     button.click()
             return "there is no depth"
         return ""

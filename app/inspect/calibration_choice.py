@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -109,16 +110,20 @@ class CalibrationChoice(QObject):
     @property
     def is_reading(self) -> bool:
         """Whether the calibration in use is being read; not where that came to nothing."""
-        future = None if self._reading is None else self._reading.future
+        future = self._last_reading
         return future is not None and not future.done()
 
     @property
     def _came_to_nothing(self) -> bool:
         """Whether the last reading was stopped or failed."""
-        future = None if self._reading is None else self._reading.future
+        future = self._last_reading
         if future is None or not future.done():
             return False
         return future.cancelled() or future.exception() is not None
+
+    @property
+    def _last_reading(self) -> Future[object] | None:
+        return None if self._reading is None else self._reading.future
 
     def refer_cameras(self, live: Reconstructor | None) -> None:
         """Hold the cameras to how they were set for a calibration."""

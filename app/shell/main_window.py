@@ -54,7 +54,7 @@ SOURCES = ("app.sources.listing", "app.sources.bench")
 FIRST_SIZE = QSize(1280, 800)
 # Raised when toolbars change, so that an older layout is not forced onto a newer window.
 LAYOUT_VERSION = 1
-# After another page is shown, when what the one before had is let go; and from then on.
+# How long after another page was shown memory is given back, and how often from then on.
 TIDY_MS, TIDY_AGAIN_MS = 3_000, 60_000
 
 

@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from gelpolight_core.export.drawing_thread import in_drawing_thread
 from gelpolight_core.simulation.indenters import Cylinder, press
 from gelpolight_core.simulation.lamps import Lamp, ParallelLamp, PointLamp, lamp_table
 from gelpolight_core.simulation.occlusion import lit_share
@@ -183,6 +184,7 @@ def _longest_shadow(depth_mm: float, elevation_deg: float) -> float:
     return 0.5 + depth_mm / math.tan(math.radians(elevation_deg))
 
 
+@in_drawing_thread
 def draw_shadow_comparison(comparison: ShadowComparison, file: Path | BinaryIO) -> None:
     """Draw the area dark under at least one light over the depth, to a PNG file.
 
