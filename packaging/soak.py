@@ -4,12 +4,12 @@
     ... --calibration sensor.gplcal    of the virtual sensor; without it there is no live depth
 
 The real program runs on the virtual sensor, whose camera makes 15 frames a second. Every half
-minute it is brought to the same state and left in peace for some seconds, in which it is measured:
-memory, threads, open files, objects and timers, frames made, processed and shown in a second, how
-late the user interface is, what the log says, and the room on disk. Every action is written to
-actions.log in the scratch folder. The exit status is 1 where memory grows (apart from what the C
-library keeps of what was given back to it), the rate drifts, or the log holds an error; the files
-are kept then.
+minute it is brought to the same state. When nothing is computed any more it is left in peace for
+some seconds, in which it is measured: memory, threads, open files, objects and timers, frames
+made, processed and shown in a second, how late the user interface is, what the log says, and the
+room on disk. Every action is written to actions.log in the scratch folder. The exit status is 1
+where memory grows (apart from what the C library keeps of what was given back to it), the rate
+drifts, or the log holds an error; the files are kept then.
 """
 
 from __future__ import annotations
@@ -26,20 +26,19 @@ from pathlib import Path
 
 from probes import Lateness, Spent
 from PySide6.QtCore import QTimer
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QComboBox, QDialog
+from PySide6.QtWidgets import QApplication
 
 EVERY_S = 30.0
 RESTS_S = 3.0
 MEASURED_S = 6.0
-# A rest that is not reached by then is a fault.
+# A rest that is not reached by then is a fault; a computation may take longer.
 LONGEST_UNREST_S = 40.0
+LONGEST_COMPUTING_S = 240.0
 HUNG_S = 60.0
-UNSETTLED = "the pictures do not settle"
 LOOK_MS = 100
-RATE_HZ = 15.0
+# Every so many rests all that is open is put away.
+EMPTIED_EVERY = 4
 KEPT_RECORDINGS = 4
-SIZE = 1400, 900
 
 
 class Soak:
@@ -71,6 +70,7 @@ class Soak:
         """Take the window, and let a person come."""
         from soak_figures import LogWatch
         from soak_person import Person
+        from soak_rest import RATE_HZ, Rest
 
         from app.shell.main_window import MainWindow
         from app.sources.bench import Bench
@@ -84,11 +84,10 @@ class Soak:
         self.person = Person(self.window, self.scratch, self._actions, self.options.seed)
         context.source.bench = Bench()
         context.source.bench.adjust(rate_hz=RATE_HZ)
-        self._calibration: Path | None = None
-        self._use_calibration()
+        self.rest = Rest(self.window, self.person, self.counts, self.options.calibration)
+        self.rest.use_calibration()
         self.window.show_page("inspect")
         self.lateness = Lateness()
-        self._watched = False
         self._look_after = QTimer(self.window)
         self._look_after.timeout.connect(self._still_alive)
         self._look_after.start(1000)
@@ -110,13 +109,19 @@ class Soak:
         self.person.rest()
         self.person.note("rest")
         self._rests_by_s = time.monotonic() + LONGEST_UNREST_S
-        self._shown_before, self._arranged, self._advised = self.counts.shown, False, False
+        self._computed_by_s = time.monotonic() + LONGEST_COMPUTING_S
+        self._emptied = len(self.rows) % EMPTIED_EVERY == EMPTIED_EVERY - 1
+        self.rest.begin(emptied=self._emptied)
         self._settle()
 
     def _settle(self) -> None:
         """Close what is open, one thing at a time, until the program looks as at every rest."""
-        undone = self._undone()
-        if undone and time.monotonic() < self._rests_by_s:
+        from soak_rest import COMPUTES, UNSETTLED
+
+        undone, now_s = self.rest.undone(), time.monotonic()
+        if undone == COMPUTES and now_s < self._computed_by_s:
+            self._rests_by_s = now_s + LONGEST_UNREST_S
+        if undone and now_s < self._rests_by_s:
             self._later(1e-3 * LOOK_MS, self._settle)
             return
         if undone == UNSETTLED:
@@ -124,67 +129,6 @@ class Soak:
         elif undone:
             self._trouble(f"it does not come to rest: {undone}")
         self._later(RESTS_S, self._measure)
-
-    def _undone(self) -> str:
-        """Do the next thing that is not as at rest; return what it is, empty when all is."""
-        popup = QApplication.activePopupWidget()
-        if popup is not None:
-            popup.close()
-            return "a menu is open"
-        dialogs = [w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog)]
-        dialogs = [w for w in dialogs if w.isVisible()]
-        if dialogs:
-            (QApplication.activeModalWidget() or dialogs[-1]).close()
-            return f"the dialog {dialogs[-1].objectName() or dialogs[-1].windowTitle()} is open"
-        if self.window.page_name != "inspect":
-            self.person.press("navigation.button.inspect")
-            return f"the page is {self.window.page_name or 'being loaded'}"
-        return self._undone_at_inspect()
-
-    def _undone_at_inspect(self) -> str:
-        page, source = self.window.page("inspect"), self.window.context.source
-        if not self._watched:
-            self._watched = True
-            self.counts.watch(page)
-        if page.recorder.busy:
-            page.recorder.stop()
-            return "it records"
-        if self.window.isFullScreen() or (self.window.width(), self.window.height()) != SIZE:
-            self.window.showNormal()
-            self.window.resize(*SIZE)
-        if page.link.paused:
-            page.pause_action.trigger()
-        for name in ("inspect.stop", "precision.stop"):
-            for button in self.window.findChildren(QAbstractButton, name):
-                if button.isVisible():
-                    button.click()
-        ways = page.findChild(QComboBox, "inspect.way")
-        if ways is not None and ways.isEnabled() and ways.currentIndex() != 0:
-            ways.setCurrentIndex(0)
-            ways.activated.emit(0)
-        for fault in tuple(source.bench.conditions.faults):
-            source.bench.switch(fault, False)
-        if source.info is None or source.info.kind != "virtual":
-            source.choose_virtual_sensor()
-        if page.link.stream is not None and page.link.stream.figures().lost:
-            page.link.open()
-        if not self._arranged:
-            self._arranged = True
-            self._arrange()
-            # What was shown before says nothing of the arranged scene.
-            self._shown_before = self.counts.shown
-        if self.counts.shown - self._shown_before < 5:
-            return "nothing is shown"
-        if page.link.last is None or not page.link.last.frame.settled:
-            return UNSETTLED
-        if self._calibration is not None and page.link.last.heightmap is None:
-            # Getting the calibration ready may have been stopped, above or by the person.
-            for button in page.findChildren(QAbstractButton, "inspect.advised"):
-                if button.isVisible() and not self._advised:
-                    self._advised = True
-                    button.click()
-            return "there is no depth"
-        return ""
 
     def _trouble(self, sentence: str) -> None:
         where = f"after {(time.monotonic() - self._began_s) / 60.0:.1f} minutes"
@@ -197,37 +141,12 @@ class Soak:
         self._looked = Look(self.counts, self.lateness)
         self._later(MEASURED_S, self._measured)
 
-    def _arrange(self) -> None:
-        page = self.window.page("inspect")
-        for name in ("inspect.layout", "inspect.look_oblique"):
-            action = page.findChild(QAction, name)
-            if action is not None:
-                action.trigger()
-        page.findChild(QCheckBox, "inspect.section.region").setChecked(False)
-        what = page.findChild(QComboBox, "inspect.quality.what")
-        if what is not None:  # standard deviations are several times as dear as depth
-            what.setCurrentIndex(0)
-        self._use_calibration()
-        bench = self.window.context.source.bench
-        bench.lay("ball")
-        bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
-
-    def _use_calibration(self) -> None:
-        """Put the calibration into use: most of what a frame costs is its own."""
-        if self.options.calibration is None:
-            return
-        context = self.window.context
-        if self._calibration is None or not self._calibration.is_file():
-            self._calibration = context.workspace.import_calibration(self.options.calibration)
-        if context.workspace.in_use != self._calibration:
-            context.workspace.use(self._calibration)
-            context.requests.calibrations_changed.emit()
-
     def _measured(self) -> None:
-        self.rows.append(self._looked.row(self._began_s, self.log, self.scratch))
-        print(self.rows[-1].told(), flush=True)
+        row = self._looked.row(self._began_s, self.log, self.scratch, emptied=self._emptied)
+        self.rows.append(row)
+        print(row.told(), flush=True)
         self._forget_recordings()
-        if self.rows[-1].minutes >= self.options.minutes:
+        if row.minutes >= self.options.minutes:
             self.lateness.timer.stop()
             self._look_after.stop()
             self.log.look()

@@ -24,11 +24,13 @@ from app.shell.log import Log
 from app.shell.memory import give_back
 from app.sources.source import Frame
 from app.sources.stream import Stream
+from app.widgets.qt_tree import below
 
 # What is loaded, compiled and cached late belongs to the warm-up.
 WARM_UP_S = 600.0
 WARM_UP_SHARE = 0.2
 MOST_GROWTH_MB_PER_H = 30.0
+LEAST_ALIKE = 6
 LEAST_RATE = 0.9
 # What a person is told that something cannot be done is no error of the program.
 TOLD, FAULT = " app.shell.toasts: ", "fault of this program"
@@ -43,6 +45,7 @@ class Row:
     """Figures of one rest: rates in frames per second while nothing but the live path runs."""
 
     minutes: float
+    emptied: bool  # sessions, runs and pictures that were open are put away
     rss_mb: float
     needed_mb: float  # the same, after the allocator has given back what it can
     held_mb: float  # what the program has asked for; the system's allocator keeps more
@@ -144,7 +147,7 @@ class Look:
             time.process_time(),
         )
 
-    def row(self, began_s: float, log: LogWatch, scratch: Path) -> Row:
+    def row(self, began_s: float, log: LogWatch, scratch: Path, *, emptied: bool) -> Row:
         """Return the figures since it was made."""
         span_s = time.monotonic() - self._wall_s
         cpu_s = time.process_time() - self._cpu_s
@@ -154,10 +157,11 @@ class Look:
         late_ms = float(np.percentile(self._lateness.late_ms or [0.0], 99))
         self._lateness.late_ms.clear()
         log.look()
-        objects = [o for w in QApplication.topLevelWidgets() for o in w.findChildren(QObject)]
+        objects = [o for w in QApplication.topLevelWidgets() for o in below(w, QObject)]
         held_mb, spare_mb = allocated_mb()
         row = Row(
             (time.monotonic() - began_s) / 60.0,
+            emptied,
             resident_mb(),
             needed_mb(),
             held_mb,
@@ -199,6 +203,17 @@ def trend(minutes: Sequence[float], values: Sequence[float]) -> tuple[float, flo
     return 60.0 * slope, 60.0 * low, 60.0 * high
 
 
+def grown(rows: Sequence[Row], name: str) -> tuple[str, float, float]:
+    """Return in words how a figure grew, the slope per hour, and its lower end."""
+    values = [float(getattr(row, name)) for row in rows]
+    slope, low, high = trend([row.minutes for row in rows], values)
+    words = (
+        f"{values[0]:.0f} after the warm-up, {values[-1]:.0f} at the end, "
+        f"{slope:+.1f} per hour (95 %: {low:+.1f} to {high:+.1f})"
+    )
+    return words, slope, low
+
+
 def thirds(values: Sequence[float]) -> tuple[float, float]:
     """Return the medians of the first and of the last third."""
     third = max(1, len(values) // 3)
@@ -212,14 +227,15 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
     warm_up = min(WARM_UP_S / 60.0, WARM_UP_SHARE * rows[-1].minutes)
     warm = [row for row in rows if row.minutes >= warm_up]
     said, wrong = [], []
-    minutes = [row.minutes for row in warm]
     for name in COUNTED:
-        values = [float(getattr(row, name)) for row in warm]
-        slope, low, high = trend(minutes, values)
-        said.append(
-            f"{name}: {values[0]:.0f} after the warm-up, {values[-1]:.0f} at the end, "
-            f"{slope:+.1f} per hour (95 %: {low:+.1f} to {high:+.1f})"
-        )
+        said.append(f"{name}: {grown(warm, name)[0]}")
+    # What a person has open takes memory for as long as it is open.
+    alike, which = [row for row in warm if row.emptied], "with nothing open"
+    if len(alike) < LEAST_ALIKE:
+        alike, which = warm, "too few with nothing open, so all"
+    for name in ("held_mb", "needed_mb"):
+        told, slope, low = grown(alike, name)
+        said.append(f"{name} at {len(alike)} rests ({which}): {told}")
         if name == "needed_mb" and low > MOST_GROWTH_MB_PER_H:
             wrong.append(f"memory grows by {slope:.0f} MB per hour, at least by {low:.0f}")
     for name in ("made_hz", "processed_hz", "shown_hz", "cpu_ms", "late_ms", "late_at_work_ms"):

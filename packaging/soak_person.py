@@ -33,6 +33,7 @@ from shiboken6 import isValid
 
 from app.inspect.surface_view import SurfaceView
 from app.shell.main_window import MainWindow
+from app.widgets.qt_tree import below
 
 PAUSE_MS = 40, 450
 LEFT = Qt.MouseButton.LeftButton
@@ -155,7 +156,7 @@ class Person:
     def _touch(self, root: QWidget) -> None:
         """Use a control, of a kind that is chosen first: there are more spin boxes than views."""
         kinds: dict[type, list[QWidget]] = {}
-        for widget in root.findChildren(QWidget):
+        for widget in below(root, QWidget):
             if isinstance(widget, CONTROLS) and can_be_used(widget):
                 kinds.setdefault(next(k for k in CONTROLS if isinstance(widget, k)), []).append(
                     widget
@@ -165,7 +166,7 @@ class Person:
 
     def press(self, name: str) -> bool:
         """Click on a control that can be used; whether there is one."""
-        for widget in self.window.findChildren(QWidget, name):
+        for widget in below(self.window, QWidget, name):
             if can_be_used(widget):
                 self.use(widget)
                 return True
@@ -234,7 +235,7 @@ class Person:
     # Menus and dialogs
 
     def _at_popup(self, popup: QWidget) -> None:
-        view = popup.findChild(QAbstractItemView)
+        view = next(below(popup, QAbstractItemView), None)
         if isinstance(popup, QMenu):
             actions = [a for a in popup.actions() if a.isEnabled() and may_be_used(a.objectName())]
             actions = [a for a in actions if a.isVisible() and not a.isSeparator()]
@@ -263,7 +264,7 @@ class Person:
 
     def _choose_file(self, dialog: QFileDialog) -> None:
         wanted = self._path_for(dialog)
-        line = dialog.findChild(QLineEdit, "fileNameEdit")
+        line = next(below(dialog, QLineEdit, "fileNameEdit"), None)
         if wanted is None or line is None or self._dialog_age > 2:
             self.note(f"Escape from {dialog.windowTitle()}")
             QTest.keyClick(dialog, Qt.Key.Key_Escape)
@@ -287,7 +288,7 @@ class Person:
         self.press(f"navigation.button.{self.random.choice(list(self.window.entries))}")
 
     def _shortcut(self) -> None:
-        actions = [a for a in self.window.findChildren(QAction) if self._has_keys(a)]
+        actions = [a for a in below(self.window, QAction) if self._has_keys(a)]
         if actions:
             action = self.random.choice(actions)
             self.note(f"{action.shortcut().toString()} ({action.objectName()})")
@@ -307,7 +308,7 @@ class Person:
 
     def _drag_on_canvas(self) -> None:
         page = self._page()
-        found = [w for w in page.findChildren(QWidget) if isinstance(w, CANVAS)]
+        found = [w for w in below(page, QWidget) if isinstance(w, CANVAS)]
         found = [w for w in found if can_be_used(w)]
         if found:
             self.use(self.random.choice(found))
@@ -335,7 +336,7 @@ class Person:
         self.press("navigation.button.measure")
         tools = [
             w.objectName()
-            for w in self.window.findChildren(QAbstractButton)
+            for w in below(self.window, QAbstractButton)
             if w.objectName().startswith(("measure.tool.", "measure.propose"))
         ]
         if tools:
@@ -351,7 +352,7 @@ class Person:
         self._next.append(lambda: self._trigger("inspect.record"))
 
     def _trigger(self, name: str) -> None:
-        action = self.window.findChild(QAction, name)
+        action = next(below(self.window, QAction, name), None)
         if action is not None and action.isEnabled():
             self.note(f"action {name}")
             action.trigger()

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QScrollArea, QVBoxLayou
 
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
+from app.widgets.qt_tree import below
 from gelpolight_core.translation import tr
 
 # What a group is called where its part of the program has another name than people know.
@@ -33,7 +34,7 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
     An action's group is the first part of its object name (``sensors.import``).
     """
     found = []
-    for action in window.findChildren(QAction):
+    for action in below(window, QAction):
         keys = ", ".join(
             s.toString(QKeySequence.SequenceFormat.NativeText) for s in action.shortcuts()
         )

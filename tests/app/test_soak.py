@@ -11,8 +11,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging"))
 from soak_figures import Row, conclude
 from soak_person import may_be_used
 
-STEADY = Row(0.0, 1500.0, 1100.0, 600.0, 900.0, 10, 24, 1000, 3000, 20, 60, 15.0, 15.0, 15.0, 10.0,
-             5.0, 500.0, 0, 0, 100.0)  # fmt: skip
+STEADY = Row(0.0, True, 1500.0, 1100.0, 600.0, 900.0, 10, 24, 1000, 3000, 20, 60, 15.0, 15.0, 15.0,
+             10.0, 5.0, 500.0, 0, 0, 100.0)  # fmt: skip
 
 
 def hour(growth_mb: float = 0.0, rate_to: float = 15.0) -> list[Row]:
@@ -38,6 +38,15 @@ def test_an_hour_in_which_nothing_changes_is_well() -> None:
 def test_what_the_allocator_keeps_is_no_leak() -> None:
     kept = [replace(row, rss_mb=row.rss_mb + 10.0 * row.minutes) for row in hour()]
     assert conclude(kept)[1] == []
+
+
+def test_what_a_person_has_open_is_no_leak() -> None:
+    """More and more is opened, and put away at every fourth rest."""
+    rows = [
+        replace(row, emptied=k % 4 == 3, needed_mb=row.needed_mb + (k % 4 != 3) * 5.0 * row.minutes)
+        for k, row in enumerate(hour())
+    ]
+    assert conclude(rows)[1] == []
 
 
 def test_memory_that_grows_and_a_rate_that_falls_are_told() -> None:
