@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from PySide6.QtGui import QAction
@@ -19,6 +20,8 @@ UNSETTLED = "the pictures do not settle"
 COMPUTES = "something is being computed"
 RATE_HZ = 15.0
 SIZE = 1400, 900
+# Without depth by then, the first rest says that there is none.
+LONGEST_STEPS = 30
 
 
 class Rest:
@@ -48,6 +51,42 @@ class Rest:
         """Come to rest anew; emptied: nothing that a person opened is left open."""
         self._emptied, self._arranged, self._advised = emptied, False, False
         self._shown_before = self.counts.shown
+
+    @property
+    def computes(self) -> bool:
+        """Whether any part of the program works on something."""
+        parts = [*below(self.window, Jobs), *below(self.window, Work)]
+        return any(part.busy for part in parts)
+
+    def first_uses(self) -> Iterator[None]:
+        """Use once what is compiled and loaded when it is used first; wait after each step."""
+        self.window.show_page("inspect")
+        yield
+        if self._wanted is None:
+            return
+        page = self.window.page("inspect")
+        self.window.context.source.choose_virtual_sensor()
+        self._arrange()
+        for _ in range(LONGEST_STEPS):
+            if page.link.last is not None and page.link.last.heightmap is not None:
+                break
+            yield
+        ways = page.findChild(QComboBox, "inspect.way")
+        for index in range(ways.count()):
+            ways.setCurrentIndex(index)
+            ways.activated.emit(index)
+            yield
+        self.window.show_page("measure")
+        yield
+        (desk,) = below(self.window, Desk)
+        for _ in range(LONGEST_STEPS):
+            desk.hold()
+            yield
+            if desk.work.taken is not None:
+                break
+        desk.work.propose()
+        yield
+        desk.release()
 
     def undone(self) -> str:
         """Do the next thing that is not as at rest; return what it is, empty when all is."""
@@ -99,8 +138,7 @@ class Rest:
                 self._put_away()
             # What was shown before says nothing of the arranged scene.
             self._shown_before = self.counts.shown
-        parts = [*below(self.window, Jobs), *below(self.window, Work)]
-        if any(part.busy for part in parts):
+        if self.computes:
             return COMPUTES
         if self.counts.shown - self._shown_before < 5:
             return "nothing is shown"

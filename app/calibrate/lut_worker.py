@@ -78,6 +78,7 @@ class NewestWins(Generic[Question, Answer]):
             answered = self._answer(question)
             with self._change:
                 self._done[:] = [answered]
+            del question, answered  # the thread would keep them until the next
 
     def _answer(self, question: Question) -> Answered[Question, Answer]:
         try:

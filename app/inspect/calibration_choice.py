@@ -167,10 +167,13 @@ class CalibrationChoice(QObject):
             return path, live, Reconstructor(calibration)
 
         def done(found: tuple[Path, object, object]) -> None:
+            if self._reading is reading:
+                self._reading = None  # it would keep what was read
             if self._state[:1] == found[:1]:
                 self.loaded.emit(*found[1:])
 
         title = tr("Getting the calibration ready")
         failed = partial(self._context.toasts.show, kind="fail")
-        self._reading = Job(title, work, done, failed)
-        self._jobs.submit(self._reading)
+        reading = Job(title, work, done, failed)
+        self._reading = reading
+        self._jobs.submit(reading)

@@ -52,6 +52,7 @@ class ExportDialog(QDialog):
         named(self, "inspect.export.dialog", tr("Export"))
         self.setWindowTitle(tr("Export the depth"))
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self._beside = folder.parent
         self._formats: dict[str, QCheckBox] = {}
         column = QVBoxLayout(self)
         for name, words in format_words().items():
@@ -108,7 +109,8 @@ class ExportDialog(QDialog):
         if self._range.isChecked():
             frames = self._first.value() - 1, self._last.value() - 1
         return ExportChoice(
-            folder=Path(self._folder.text()).expanduser(),
+            # A mere name is a folder beside the one that was proposed.
+            folder=self._beside / Path(self._folder.text()).expanduser(),
             formats=tuple(name for name, box in self._formats.items() if box.isChecked()),
             stride=self._stride.value(),
             frames=frames,

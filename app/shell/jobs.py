@@ -128,13 +128,17 @@ class Jobs(QObject):
     def _work(self) -> None:
         """Do the jobs in their order; in the thread."""
         while (job := self._queue.get()) is not None:
-            future = job.future
-            if future is None or not future.set_running_or_notify_cancel():
-                continue
-            try:
-                future.set_result(job.work(partial(self._tell, job)))
-            except BaseException as error:  # handed to the thread that asked, which tells it
-                future.set_exception(error)
+            self._do(job)
+            del job  # the thread would keep what came of it until the next
+
+    def _do(self, job: Job) -> None:
+        future = job.future
+        if future is None or not future.set_running_or_notify_cancel():
+            return
+        try:
+            future.set_result(job.work(partial(self._tell, job)))
+        except BaseException as error:  # handed to the thread that asked, which tells it
+            future.set_exception(error)
 
     def _tell(self, job: Job, share: float) -> None:
         """Keep the share done; called in the working thread."""

@@ -21,6 +21,7 @@ CRASHES = "gelpolight-crash.log"
 FILE_BYTES = 1_000_000
 FILES = 5
 KEPT = 5000
+OURS = ("app", "gelpolight_core")
 LINE = "%(asctime)s %(levelname)-7s %(threadName)s %(name)s: %(message)s"
 
 
@@ -31,6 +32,11 @@ class Record:
     number: int
     level: int
     text: str
+
+
+def worth_keeping(record: logging.LogRecord) -> bool:
+    """Return whether a record is ours, or at least a warning: libraries tell every step."""
+    return record.levelno >= logging.WARNING or record.name.partition(".")[0] in OURS
 
 
 class RecentRecords(logging.Handler):
@@ -77,8 +83,9 @@ class Log:
         root = logging.getLogger()
         self._level_before = root.level
         root.setLevel(logging.INFO)
-        root.addHandler(self.recent)
-        root.addHandler(self._file)
+        for handler in (self.recent, self._file):
+            handler.addFilter(worth_keeping)
+            root.addHandler(handler)
         logging.captureWarnings(True)
         crash = self.folder / CRASHES
         left = ""

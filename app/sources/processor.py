@@ -149,18 +149,20 @@ class Processor(Generic[T]):
         give_way(PROCESSING)
         while not end.is_set():
             frame = self._inbox.take(_POLL_S)
-            if frame is None:
-                continue
-            with self._lock:
-                function, generation = self._function, self._generation
-            began = time.perf_counter()
-            item = self._apply(function, generation, frame)
-            now = time.perf_counter()
-            with self._lock:
-                self._done.append((now, 1e3 * (now - began)))
-                stale = generation != self._generation
-            if not stale and not end.is_set():
-                self._outbox.put(item)
+            if frame is not None:
+                self._process(frame, end)
+
+    def _process(self, frame: Frame, end: threading.Event) -> None:
+        with self._lock:
+            function, generation = self._function, self._generation
+        began = time.perf_counter()
+        item = self._apply(function, generation, frame)
+        now = time.perf_counter()
+        with self._lock:
+            self._done.append((now, 1e3 * (now - began)))
+            stale = generation != self._generation
+        if not stale and not end.is_set():
+            self._outbox.put(item)
 
     def _apply(
         self, function: Callable[[Frame], T], generation: int, frame: Frame

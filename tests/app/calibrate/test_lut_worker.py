@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import weakref
 
 from app.calibrate.lut_worker import NewestWins
 
@@ -57,3 +58,17 @@ def test_a_stopped_worker_leaves_no_thread() -> None:
     worker = NewestWins(lambda question: question, name="test-stops")
     assert worker.stop()
     assert "test-stops" not in {thread.name for thread in threading.enumerate()}
+
+
+def test_an_answer_belongs_to_who_took_it() -> None:
+    class Heavy:
+        pass
+
+    worker = NewestWins(lambda _question: Heavy(), name="test-kept")
+    worker.ask(0)
+    kept = weakref.ref(answer_of(worker).answer)
+    end = time.monotonic() + 5.0
+    while kept() is not None and time.monotonic() < end:
+        time.sleep(0.005)
+    assert kept() is None
+    assert worker.stop()

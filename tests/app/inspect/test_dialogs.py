@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
-from PySide6.QtWidgets import QApplication, QDialog, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.inspect.export_dialog import ExportDialog
@@ -37,3 +37,16 @@ def test_nothing_of_a_dialog_is_left_when_it_is_closed(name: str, way: str, qtbo
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     assert len(QApplication.allWidgets()) == before
     assert host.findChildren(QDialog) == []
+
+
+@pytest.mark.parametrize(
+    ("typed", "expected"), [("run 3", "lab/run 3"), ("/data/x", "/data/x"), ("~", "~")]
+)
+def test_a_mere_name_is_a_folder_beside_the_proposed(
+    typed: str, expected: str, tmp_path: Path, qtbot: QtBot
+) -> None:
+    host = QWidget()
+    qtbot.addWidget(host)
+    dialog = ExportDialog(tmp_path / "lab" / "proposed", parent=host)
+    dialog.findChild(QLineEdit, "inspect.export.folder").setText(typed)
+    assert dialog.choice.folder == tmp_path / Path(expected).expanduser()

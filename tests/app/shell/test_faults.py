@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import threading
 from collections.abc import Iterator
@@ -112,3 +113,15 @@ def test_a_log_folder_that_cannot_be_written_is_replaced(tmp_path) -> None:
     log.stop()
     assert log.folder != tmp_path / "file"
     assert (log.folder / "gelpolight.log").is_file()
+
+
+def test_steps_of_libraries_are_left_out_and_their_warnings_kept(context: AppContext) -> None:
+    """Writing one PDF would fill hundreds of lines with the making of typefaces."""
+    for name in ("fontTools.subset", "app.inspect", "gelpolight_core.report"):
+        logging.getLogger(name).info("a step of %s", name)
+        logging.getLogger(name).warning("trouble in %s", name)
+    said = log_of(context)
+    assert "a step of fontTools" not in said
+    assert "trouble in fontTools" in said
+    assert "a step of app.inspect" in said
+    assert "a step of gelpolight_core" in said

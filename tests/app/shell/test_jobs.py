@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -22,6 +23,17 @@ def test_jobs_are_done_one_after_the_other(qtbot: QtBot) -> None:
         jobs.submit(Job("count", lambda _tell, n=number: n, done.append))
     qtbot.waitUntil(lambda: not jobs.busy)
     assert done == [0, 1, 2]
+    assert jobs.close()
+
+
+def test_what_came_of_a_job_belongs_to_who_asked(qtbot: QtBot) -> None:
+    class Heavy:
+        pass
+
+    jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
+    jobs.submit(Job("read", lambda _tell: Heavy(), lambda heavy: found.append(weakref.ref(heavy))))
+    qtbot.waitUntil(lambda: bool(found))
+    qtbot.waitUntil(lambda: found[0]() is None)
     assert jobs.close()
 
 

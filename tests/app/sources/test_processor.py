@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+import weakref
 from collections.abc import Iterator
 
 import numpy as np
@@ -46,6 +48,14 @@ def line() -> Iterator[Line]:
     line.processor.start()
     yield line
     line.processor.stop()
+
+
+def test_the_last_picture_is_not_kept(line: Line) -> None:
+    kept = weakref.ref(line.result(1).frame.rgb)
+    end = time.monotonic() + WAIT_S
+    while kept() is not None and time.monotonic() < end:
+        time.sleep(0.005)
+    assert kept() is None
 
 
 def test_a_result_names_its_frame_and_its_function(line: Line) -> None:
