@@ -78,7 +78,7 @@ class Rest:
             yield
         self.window.show_page("measure")
         yield
-        (desk,) = below(self.window, Desk)
+        desk = self.window.page("measure").desk
         for _ in range(LONGEST_STEPS):
             desk.hold()
             yield
