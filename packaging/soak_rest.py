@@ -146,10 +146,11 @@ class Rest:
             return UNSETTLED
         if self._calibration is not None and page.link.last.heightmap is None:
             # Getting the calibration ready may have been stopped, above or by the person.
-            for button in below(page, QAbstractButton, "inspect.advised"):
-                if button.isVisible() and not self._advised:
-                    self._advised = True
-                    button.click()
+            advised = (b for b in below(page, QAbstractButton, "inspect.advised") if b.isVisible())
+            button = None if self._advised else next(advised, None)
+            if button is not None:
+                self._advised = True
+                button.click()
             return "there is no depth"
         return ""
 

@@ -15,7 +15,7 @@ Kind = TypeVar("Kind", bound=QObject)
 
 
 def below(root: QObject, kind: type[Kind], name: str = "") -> Iterator[Kind]:
-    """Find the objects of a kind below one, in the order of their making.
+    """Find the objects of a kind below one, each before what is below it.
 
     Parameters
     ----------
