@@ -146,7 +146,7 @@ def skipped_text(rate_hz: float) -> str:
 def status_texts(status: Status) -> dict[str, str]:
     """Return what each place of the status bar says; empty where nothing is known."""
     texts = {
-        "camera": tr("No camera in use") if status.camera is None else status.camera,
+        "camera": tr("No camera") if status.camera is None else status.camera,
         "rate": "" if status.rate_hz is None else tr("{x:.1f} fps").format(x=status.rate_hz),
         "processing": ""
         if status.processing_ms is None

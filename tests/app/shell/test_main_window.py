@@ -494,7 +494,7 @@ def test_frames_that_are_not_looked_at_are_told_as_a_rate_of_the_last_seconds() 
 
 
 def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
-    assert status_texts(Status())["camera"] == "No camera in use"
+    assert status_texts(Status())["camera"] == "No camera"
     window.context.status.update(
         camera="Virtual sensor",
         rate_hz=29.97,
