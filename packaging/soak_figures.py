@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import threading
@@ -49,6 +50,7 @@ class Row:
     rss_mb: float
     needed_mb: float  # the same, after the allocator has given back what it can
     held_mb: float  # what the program has asked for; the system's allocator keeps more
+    rings_mb: float  # what refers to itself only: looked for, and let go, with nothing open
     spare_mb: float  # what the allocator keeps of what was given back
     threads: int
     files: int
@@ -158,6 +160,7 @@ class Look:
         self._lateness.late_ms.clear()
         log.look()
         objects = [o for w in QApplication.topLevelWidgets() for o in below(w, QObject)]
+        rings_mb = let_rings_go() if emptied else 0.0
         held_mb, spare_mb = allocated_mb()
         row = Row(
             (time.monotonic() - began_s) / 60.0,
@@ -165,6 +168,7 @@ class Look:
             resident_mb(),
             needed_mb(),
             held_mb,
+            rings_mb,
             spare_mb,
             threading.active_count(),
             len(os.listdir("/proc/self/fd")),
@@ -184,6 +188,16 @@ class Look:
         )
         self._lateness.late_ms.clear()
         return row
+
+
+def let_rings_go() -> float:
+    """Let go what refers to itself only, and return how much that was.
+
+    Python does so by itself now and then; what waits for it is no leak, but it may be much.
+    """
+    before_mb, _ = allocated_mb()
+    gc.collect()
+    return before_mb - allocated_mb()[0]
 
 
 def needed_mb() -> float:
@@ -238,6 +252,8 @@ def conclude(rows: Sequence[Row]) -> tuple[list[str], list[str]]:
         said.append(f"{name} at {len(alike)} rests ({which}): {told}")
         if name == "needed_mb" and low > MOST_GROWTH_MB_PER_H:
             wrong.append(f"memory grows by {slope:.0f} MB per hour, at least by {low:.0f}")
+    rings_mb = [row.rings_mb for row in rows if row.emptied] or [0.0]
+    said.append(f"rings_mb: median {np.median(rings_mb):.0f}, at most {max(rings_mb):.0f}")
     for name in ("made_hz", "processed_hz", "shown_hz", "cpu_ms", "late_ms", "late_at_work_ms"):
         first, last = thirds([getattr(row, name) for row in warm])
         said.append(f"{name}: median {first:.1f} in the first third, {last:.1f} in the last")

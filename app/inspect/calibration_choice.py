@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -110,20 +109,12 @@ class CalibrationChoice(QObject):
     @property
     def is_reading(self) -> bool:
         """Whether the calibration in use is being read; not where that came to nothing."""
-        future = self._last_reading
-        return future is not None and not future.done()
+        return self._reading is not None and not self._reading.over
 
     @property
     def _came_to_nothing(self) -> bool:
-        """Whether the last reading was stopped or failed."""
-        future = self._last_reading
-        if future is None or not future.done():
-            return False
-        return future.cancelled() or future.exception() is not None
-
-    @property
-    def _last_reading(self) -> Future[object] | None:
-        return None if self._reading is None else self._reading.future
+        """Whether the last reading was stopped or failed; one that did not is let go."""
+        return self._reading is not None and self._reading.over
 
     def refer_cameras(self, live: Reconstructor | None) -> None:
         """Hold the cameras to how they were set for a calibration."""
@@ -168,7 +159,7 @@ class CalibrationChoice(QObject):
 
         def done(found: tuple[Path, object, object]) -> None:
             if self._reading is reading:
-                self._reading = None  # it would keep what was read
+                self._reading = None
             if self._state[:1] == found[:1]:
                 self.loaded.emit(*found[1:])
 

@@ -42,6 +42,8 @@ class Job:
         Called in the GUI thread with a sentence where it came to nothing; None: Jobs.refused.
     must : bool
         Whether it is done even where all else is cancelled.
+    over : bool
+        Whether it came to its end, and to whom it concerns was told of it. It keeps nothing then.
     """
 
     title: str
@@ -49,6 +51,7 @@ class Job:
     done: Callable[[Any], None] = field(default=lambda _result: None)
     failed: Callable[[str], None] | None = None
     must: bool = False
+    over: bool = False
     share: float = 0.0
     future: Future[Any] | None = None
     cancel: threading.Event = field(default_factory=threading.Event)
@@ -139,6 +142,10 @@ class Jobs(QObject):
             future.set_result(job.work(partial(self._tell, job)))
         except BaseException as error:  # handed to the thread that asked, which tells it
             future.set_exception(error)
+        finally:
+            # The error's stack refers to this frame: with what the work used, it would refer to
+            # itself, and stay until Python looks for such rings.
+            del future, job
 
     def _tell(self, job: Job, share: float) -> None:
         """Keep the share done; called in the working thread."""
@@ -159,12 +166,14 @@ class Jobs(QObject):
             self._timer.stop()
 
     def _finish(self, job: Job) -> None:
-        assert job.future is not None
-        if job.future.cancelled():
+        # Where `done` refers to its job, which is a ring, the result must not be in it.
+        future, job.future, job.over = job.future, None, True
+        assert future is not None
+        if future.cancelled():
             return
-        error = job.future.exception()
+        error = future.exception()
         if error is None:
-            job.done(job.future.result())
+            job.done(future.result())
         elif isinstance(error, Cancelled):
             self.refused.emit(tr("{title}: stopped").format(title=job.title))
         elif isinstance(error, InputError):

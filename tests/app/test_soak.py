@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging"))
 
-from soak_figures import Row, conclude
+from soak_figures import Row, conclude, let_rings_go
 from soak_person import may_be_used
 
-STEADY = Row(0.0, True, 1500.0, 1100.0, 600.0, 900.0, 10, 24, 1000, 3000, 20, 60, 15.0, 15.0, 15.0,
-             10.0, 5.0, 500.0, 0, 0, 100.0)  # fmt: skip
+STEADY = Row(0.0, True, 1500.0, 1100.0, 600.0, 0.0, 900.0, 10, 24, 1000, 3000, 20, 60, 15.0, 15.0,
+             15.0, 10.0, 5.0, 500.0, 0, 0, 100.0)  # fmt: skip
 
 
 def hour(growth_mb: float = 0.0, rate_to: float = 15.0) -> list[Row]:
@@ -54,6 +55,20 @@ def test_memory_that_grows_and_a_rate_that_falls_are_told() -> None:
     assert "memory grows by 100 MB per hour" in wrong
     (wrong,) = conclude(hour(rate_to=11.0))[1]
     assert "made_hz" in wrong
+
+
+def test_what_only_refers_to_itself_is_let_go_and_told() -> None:
+    class Ring:
+        def __init__(self) -> None:
+            self.picture, self.itself = bytearray(40_000_000), self
+
+    gc.disable()
+    try:
+        Ring()
+        assert let_rings_go() > 39.0
+    finally:
+        gc.enable()
+    assert abs(let_rings_go()) < 5.0
 
 
 def test_too_few_rests_are_no_verdict() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +14,12 @@ from app.shell.context import AppContext
 from app.shell.jobs import Job
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.project import Cancelled
 
 
 class Waiting:
     """Stands for Jobs; nothing begins."""
 
     def submit(self, job: Job) -> None:
-        job.future = Future()
         self.job = job
 
 
@@ -34,8 +31,7 @@ def test_a_reading_that_was_stopped_is_over(context: AppContext, qtbot: QtBot) -
     assert not choice.is_reading
     choice._read(Path("a.gplcal"))
     assert choice.is_reading
-    assert jobs.job.future is not None
-    jobs.job.future.set_exception(RuntimeError("stopped"))
+    jobs.job.over = True
     assert not choice.is_reading
 
 
@@ -53,15 +49,14 @@ def test_one_whose_reading_was_stopped_is_read_when_it_is_asked_for_again(
     first = jobs.job
     choice.use_what_fits("", None)
     assert jobs.job is first
-    assert first.future is not None
-    first.future.set_exception(Cancelled())
+    first.over = True
     choice.refresh()
     assert jobs.job is first  # by itself nothing is begun again
     choice.use_what_fits("", None)
     assert jobs.job is not first
     second = jobs.job
-    assert second.future is not None
-    second.future.set_result((path, None, None))
+    second.over = True
+    second.done((path, None, None))
     box.activated.emit(box.currentIndex())
     assert jobs.job is second
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -26,13 +27,44 @@ def test_jobs_are_done_one_after_the_other(qtbot: QtBot) -> None:
     assert jobs.close()
 
 
-def test_what_came_of_a_job_belongs_to_who_asked(qtbot: QtBot) -> None:
-    class Heavy:
-        pass
+class Heavy:
+    """Stands for a calibration: what must not wait for Python to look for rings."""
 
+
+@pytest.fixture
+def no_collection() -> Iterator[None]:
+    """Nothing but a last reference that goes lets anything go."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("no_collection")
+def test_what_came_of_a_job_belongs_to_who_asked(qtbot: QtBot) -> None:
     jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
-    jobs.submit(Job("read", lambda _tell: Heavy(), lambda heavy: found.append(weakref.ref(heavy))))
+
+    def done(heavy: Heavy) -> None:
+        assert job.over
+        found.append(weakref.ref(heavy))
+
+    job = Job("read", lambda _tell: Heavy(), done)  # it and `done` refer to each other
+    jobs.submit(job)
     qtbot.waitUntil(lambda: bool(found))
+    qtbot.waitUntil(lambda: found[0]() is None)
+    assert jobs.close()
+
+
+@pytest.mark.usefixtures("no_collection")
+def test_what_a_job_failed_with_is_let_go_once_it_is_told(qtbot: QtBot) -> None:
+    jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
+
+    def fail(_tell: Tell) -> None:
+        heavy = Heavy()
+        found.append(weakref.ref(heavy))
+        raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+
+    with qtbot.waitSignal(jobs.refused):
+        jobs.submit(Job("look", fail))
     qtbot.waitUntil(lambda: found[0]() is None)
     assert jobs.close()
 
