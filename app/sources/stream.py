@@ -164,9 +164,10 @@ class Stream:
             self.source.open()
             self._deliver(end)
         except InputError as error:
-            reason = error
+            # What it keeps must not refer to it by the stack of where it was raised.
+            reason = error.with_traceback(None)
             with self._lock:
-                self._lost = error
+                self._lost = reason
         except Exception as error:
             _LOG.exception("The source %s failed", self.source.name)
             reason = SourceLost(

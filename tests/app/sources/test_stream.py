@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import queue
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
 
@@ -192,6 +194,22 @@ def test_a_silent_source_is_lost(source: ByHand) -> None:
     source.next.put(frame(0))
     assert "no picture has come" in lost_sentence(stream)
     stream.stop()
+
+
+def test_a_stream_that_was_lost_is_let_go_with_its_last_picture(source: ByHand) -> None:
+    """Not only when Python looks for what refers to itself."""
+    gc.disable()
+    try:
+        stream = Stream(source, silence_s=0.05)
+        stream.start()
+        source.next.put(frame(0))
+        lost_sentence(stream)
+        stream.stop()
+        left = weakref.ref(stream)
+        del stream
+        assert left() is None
+    finally:
+        gc.enable()
 
 
 def test_a_fault_of_a_source_is_logged_and_told(
