@@ -76,6 +76,12 @@ class Rest:
             ways.setCurrentIndex(index)
             ways.activated.emit(index)
             yield
+        # The largest drawing: a renderer in software keeps the room that it took.
+        self.window.showFullScreen()
+        page.pause_action.trigger()
+        yield
+        page.pause_action.trigger()
+        self.window.showNormal()
         self.window.show_page("measure")
         yield
         desk = self.window.page("measure").desk

@@ -129,16 +129,19 @@ class Answer:
 class Measuring:
     """Answers questions; keeps what does not change from one to the next.
 
-    A function for one thread at a time.
+    A function for one thread at a time. None in the place of a question: forget all that is kept.
     """
 
     def __init__(self) -> None:
+        self._forget()
+
+    def _forget(self) -> None:
         self._reconstructor: Reconstructor | None = None
         self._taken: Taken | None = None
         self._shown: tuple[HeightMap, MapPicture, NDArray[np.float32]] | None = None
         self._results: dict[Tool, ToolResult | str] = {}
 
-    def __call__(self, question: Question) -> Answer:
+    def __call__(self, question: Question | None) -> Answer | None:
         """Measure.
 
         Raises
@@ -146,6 +149,9 @@ class Measuring:
         InputError
             If the picture cannot be used, or is not of the calibration's size.
         """
+        if question is None:
+            self._forget()
+            return None
         heightmap, picture, linear = self._depth_of(question)
         results = {}
         for item in question.sheet.items:

@@ -73,7 +73,7 @@ class Work(QObject):
         self._reconstructor: Reconstructor | None = None
         self._propose = False
         self._busy = False
-        self._worker: NewestWins[Question, Answer] | None = None
+        self._worker: NewestWins[Question | None, Answer | None] | None = None
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -209,16 +209,19 @@ class Work(QObject):
         self._reconstructor = None
 
     def _ask(self) -> None:
-        if self._reconstructor is None or self.taken is None:
-            return
+        maker, question = self._reconstructor, None
+        if maker is not None and self.taken is not None:
+            question = Question(
+                maker.calibration, maker.model, self.taken, self.sheet, self._propose
+            )
         if self._worker is None:
+            if question is None:
+                return
             self._worker = NewestWins(Measuring(), name="measure")
-        maker = self._reconstructor
-        self._worker.ask(
-            Question(maker.calibration, maker.model, self.taken, self.sheet, self._propose)
-        )
+        self._worker.ask(question)  # without one, it lets go of the last picture
         self._timer.start()
-        self._say_busy(True)
+        if question is not None:
+            self._say_busy(True)
 
     def _poll(self) -> None:
         assert self._worker is not None
@@ -226,7 +229,9 @@ class Work(QObject):
         if self._worker.idle:
             self._timer.stop()
             self._say_busy(False)
-        if answered is None or answered.question.taken is not self.taken:
+        if answered is None or answered.question is None:
+            return
+        if answered.question.taken is not self.taken:
             return
         if isinstance(answered.error, InputError):
             self.refused.emit(str(answered.error))
