@@ -214,6 +214,9 @@ def main() -> None:
     ):
         (scratch / folder).mkdir(exist_ok=True)
         os.environ[variable] = str(scratch / folder)
+    # With threads, Mesa's renderer in software keeps the room of its largest drawings, the more of
+    # it the busier the machine: tens of megabytes an hour that are not the program's.
+    os.environ.setdefault("LP_NUM_THREADS", "0")
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
     from app import desktop
 

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QComboBo
 from soak_figures import Counts
 from soak_person import Person
 
+from app.inspect.surface import LIVE_NODES
 from app.measure.desk import Desk
 from app.measure.work import Work
 from app.shell.jobs import Jobs
@@ -76,12 +77,7 @@ class Rest:
             ways.setCurrentIndex(index)
             ways.activated.emit(index)
             yield
-        # The largest drawing: a renderer in software keeps the room that it took.
-        self.window.showFullScreen()
-        page.pause_action.trigger()
-        yield
-        page.pause_action.trigger()
-        self.window.showNormal()
+        yield from self._draw_largest()
         self.window.show_page("measure")
         yield
         desk = self.window.page("measure").desk
@@ -93,6 +89,20 @@ class Rest:
         desk.work.propose()
         yield
         desk.release()
+
+    def _draw_largest(self) -> Iterator[None]:
+        """Draw a standing picture with all its nodes; a renderer in software keeps that room."""
+        page = self.window.page("inspect")
+        self.window.showFullScreen()
+        page.pause_action.trigger()
+        for _ in range(LONGEST_STEPS):
+            yield
+            surface = page.link.last.surface
+            if surface is not None and max(surface.depth_mm.shape) > LIVE_NODES:
+                break
+        yield
+        page.pause_action.trigger()
+        self.window.showNormal()
 
     def undone(self) -> str:
         """Do the next thing that is not as at rest; return what it is, empty when all is."""
