@@ -43,7 +43,7 @@ class Job:
     must : bool
         Whether it is done even where all else is cancelled.
     over : bool
-        Whether it came to its end, and to whom it concerns was told of it. It keeps nothing then.
+        Whether it came to its end, told or stopped; it keeps nothing then.
     """
 
     title: str
