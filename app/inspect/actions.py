@@ -72,6 +72,7 @@ class Deeds(QObject):
             tip=tr("A picture of the views, in any size (Ctrl+Shift+P)"),
         )  # fmt: skip
         views.section.save_wanted.connect(self.save_profile)
+        link.switched.connect(self._forget_capture)
 
     # Zero
 
@@ -83,6 +84,11 @@ class Deeds(QObject):
         elif self._capture is None:
             self._capture = self._link.stream.capture(FRAMES)
             self._timer.start()
+
+    def _forget_capture(self) -> None:
+        """Nobody waits for the frames of a camera that was left."""
+        self._capture = None
+        self._timer.stop()
 
     def _poll(self) -> None:
         if self._capture is None or not self._capture.done():

@@ -6,9 +6,7 @@ import contextlib
 import os
 from pathlib import Path
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import sync_folder
-from gelpolight_core.translation import tr
+from gelpolight_core.export.atomic import cannot_write, sync_folder
 
 
 def append_durably(path: Path, content: bytes) -> None:
@@ -33,7 +31,7 @@ def append_durably(path: Path, content: bytes) -> None:
                     os.ftruncate(file.fileno(), size)
                 raise
     except OSError as error:
-        raise unwritable(error, path) from error
+        raise cannot_write(error, path) from error
     if is_new:
         sync_folder(path.parent)
 
@@ -43,12 +41,3 @@ def _write_all(handle: int, content: bytes) -> None:
     while view:
         view = view[os.write(handle, view) :]
     os.fsync(handle)
-
-
-def unwritable(error: OSError, path: Path) -> InputError:
-    """Return what to raise about a file that cannot be added to."""
-    return InputError(
-        tr("the file cannot be written ({reason})").format(reason=error.strerror or error),
-        where=str(path),
-        advice=tr("Check the disk and its permissions, then go on where it was left"),
-    )

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.appending import unwritable
+from gelpolight_core.export.atomic import cannot_write
 from gelpolight_core.translation import tr
 
 if sys.platform == "win32":
@@ -43,7 +43,7 @@ class RunLock:
         try:
             self._handle: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
-            raise unwritable(error, path) from error
+            raise cannot_write(error, path) from error
         try:
             # The system lets go of it with the process, even a killed one.
             _lock(self._handle)
@@ -51,7 +51,7 @@ class RunLock:
             who = _holder(self._handle)
             self.release()
             if error.errno not in (errno.EAGAIN, errno.EACCES):
-                raise unwritable(error, path) from error
+                raise cannot_write(error, path) from error
             raise InputError(
                 tr("this run is being written by {who}").format(who=who),
                 where=str(folder),
@@ -63,7 +63,7 @@ class RunLock:
             os.write(self._handle, _name().encode())
         except OSError as error:
             self.release()
-            raise unwritable(error, path) from error
+            raise cannot_write(error, path) from error
 
     def __enter__(self) -> RunLock:
         """Hold it for a block."""

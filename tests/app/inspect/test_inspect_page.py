@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
+from app.inspect.actions import POLL_MS
 from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
 from app.shell.context import AppContext
@@ -252,6 +254,24 @@ def test_zero_puts_the_background_of_now_into_use_and_can_be_undone(
     qtbot.waitUntil(lambda: context.workspace.in_use == zero, timeout=WAIT_MS)
     qtbot.waitUntil(lambda: not page.jobs.busy, timeout=4 * WAIT_MS)
     page.deeds._use(path)
+    assert context.workspace.in_use == path
+
+
+def test_leaving_while_zero_waits_for_its_frames_is_no_failure(
+    page: InspectPage, presses: Path, context: AppContext, qtbot: QtBot,
+    small_calibration: Calibration, caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    path = context.workspace.calibration_path(small_calibration.sensor.serial, "mine")
+    write_calibration(small_calibration, path)
+    context.workspace.use(path)
+    page.enter()
+    page.deeds.zero()
+    waiting = page.deeds._capture
+    page.leave()
+    assert waiting is not None
+    assert isinstance(waiting.exception(), InputError)  # its frames never came
+    qtbot.wait(3 * POLL_MS)
+    assert [record.message for record in caplog.records if record.levelno > logging.INFO] == []
     assert context.workspace.in_use == path
 
 
