@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 from collections.abc import Callable
 from concurrent.futures import Future
 from datetime import UTC, datetime
@@ -28,6 +27,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
+from gelpolight_core.who import user_name
 
 FRAMES = 4
 POLL_MS = 50
@@ -222,7 +222,7 @@ class Validating(QObject):
         validation = Validation(
             self._reconstructor.calibration.identity,
             datetime.now(UTC).isoformat(timespec="seconds"),
-            _who(),
+            user_name(),
             text,
             trial.comparisons,
         )
@@ -275,10 +275,3 @@ def _known_beside(path: Path) -> KnownObject | None:
         if row.file == path.name:
             return KnownObject(row.truth.shape, row.truth.size_mm, row.truth.height_mm)
     return None
-
-
-def _who() -> str:
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):  # a system without a user database has no name to give
-        return ""

@@ -129,6 +129,10 @@ class Wizard(WizardFrame):
         self.validating.close()
         if self.curves is not None:
             self.curves.close_editor()
+        # What could not be saved is told where it is seen when this page has gone.
+        self.controller.refused.disconnect(self._refuse)
+        toasts = self.context.toasts
+        self.controller.refused.connect(lambda text: toasts.show(text, "fail"))
         self.controller.close()
 
     def _on_camera(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import getpass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.reconstruction.drift import background_drift, zeroed
 from gelpolight_core.translation import tr
+from gelpolight_core.who import user_name
 
 
 def add_parser(commands: Any) -> None:
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         write_json(content, options.json)
     if options.zero:
         made = datetime.now(UTC).isoformat(timespec="seconds")
-        new = zeroed(reconstructor.calibration, [frame], operator=getpass.getuser(), made=made)
+        new = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=made)
         write_calibration(new, options.zero)
         say(tr("{name} written to {path}").format(name=new.identity, path=options.zero))
     return 0

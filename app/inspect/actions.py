@@ -170,15 +170,17 @@ class Deeds(QObject):
 
         else:
             return
-
-        def failed(sentence: str) -> None:
-            self._link.rest(False)
-            self._tell(sentence, "fail")
-
-        self._jobs.submit(Job(tr("Exporting"), work, self._on_exported, failed))
+        self._jobs.submit(
+            Job(
+                tr("Exporting"),
+                work,
+                self._on_exported,
+                lambda sentence: self._tell(sentence, "fail"),
+                ended=lambda: self._link.rest(False),
+            )
+        )
 
     def _on_exported(self, files: list[Path]) -> None:
-        self._link.rest(False)
         self._tell(
             tr("{n} files written to {folder}").format(n=len(files), folder=files[0].parent), "pass"
         )

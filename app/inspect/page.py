@@ -139,6 +139,7 @@ class InspectPage(QWidget):
         self.calibrations.refresh()
         self.calibrations.refer_cameras(self._loaded[0])
         self._want()
+        self._look_for_drift()
         self.link.enter(True)
         self._words.start()
         self._advise()

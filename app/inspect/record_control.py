@@ -45,6 +45,7 @@ class RecordControl(QObject):
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._poll)
+        link.switched.connect(self._on_switched)
 
     @property
     def busy(self) -> bool:
@@ -83,6 +84,11 @@ class RecordControl(QObject):
         self._recorder.start()
         self.action.setChecked(True)
         self._timer.start()
+
+    def _on_switched(self) -> None:
+        """End a recording of a stream that has gone: the same camera, opened again, is another."""
+        if self._recorder is not None and self._recorder.stream is not self._link.stream:
+            self.stop()
 
     def stop(self) -> None:
         """Take no more frames; what waits for the disk is still written, meanwhile."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -17,6 +16,7 @@ from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.drift import BackgroundDrift, background_drift, zeroed
 from gelpolight_core.translation import tr
+from gelpolight_core.who import user_name
 
 FRAMES = 8
 SUFFIX = "-zero"
@@ -61,7 +61,7 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
     calibration = read_calibration(origin)
     before = background_drift(frames[0], calibration)
     made = datetime.now(UTC).isoformat(timespec="seconds")
-    changed = zeroed(calibration, frames, operator=getpass.getuser(), made=made)
+    changed = zeroed(calibration, frames, operator=user_name(), made=made)
     path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")
     write_calibration(changed, path)
     workspace.use(path)

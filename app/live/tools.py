@@ -78,6 +78,8 @@ class PictureTools(QWidget):
         else:
             button.clicked.connect(lambda: self.pressed.emit(name))
         shortcut = QShortcut(QKeySequence(key), owner)
+        shortcut.setObjectName(f"live.key.{name}")
+        shortcut.setWhatsThis(text)  # for the sheet of shortcuts
         shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         shortcut.activated.connect(button.click)
         self._buttons[name] = button

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -34,6 +32,7 @@ from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from app.widgets.source_button import SourceButton
 from gelpolight_core.translation import tr
+from gelpolight_core.who import user_name
 
 BENCH_WIDTH = 270
 FIRST_SIZES = [620, 300]
@@ -76,7 +75,7 @@ class DeskFrame(QMainWindow):
         self.details = Details(jobs)
         self.replay = ReplayBar("measure")
         self.panel = SidePanel()
-        self.panel.who.setText(getpass.getuser())
+        self.panel.who.setText(user_name())
         self.validated = named(PlainLabel(), "measure.validated", tr("Validated or not"))
         self.auto = named(
             QCheckBox(tr("Hold when steady")),

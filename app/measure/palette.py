@@ -48,6 +48,8 @@ class Palette(QWidget):
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         button.clicked.connect(lambda on, name=kind.name: self._on_clicked(name, on))
         shortcut = QShortcut(QKeySequence(kind.key), owner)
+        shortcut.setObjectName(f"measure.key.{kind.name}")
+        shortcut.setWhatsThis(kind.label)  # for the sheet of shortcuts
         shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
         shortcut.activated.connect(button.click)
         self.buttons[kind.name] = button

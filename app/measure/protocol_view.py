@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -28,6 +27,7 @@ from gelpolight_core.measurement.protocol import Protocol, check_protocol, proto
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.records.evaluation_entry import evaluation_record
 from gelpolight_core.translation import tr
+from gelpolight_core.who import user_name
 
 NAME_FORMAT = "%Y-%m-%d-%H%M%S"
 
@@ -203,7 +203,7 @@ class ProtocolView(QWidget):
                 calibration_id=run.content.calibration,
                 size_limit_percent=limits.size_percent,
                 height_limit_percent=limits.height_percent,
-                operator=getpass.getuser(),
+                operator=user_name(),
                 folder=str(run.folder),
             )
             if record is not None:

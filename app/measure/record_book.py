@@ -11,6 +11,7 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from app.shell.context import AppContext
 from app.shell.jobs import Job, Jobs
 from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once
 from gelpolight_core.records.records import NAME, Records
@@ -52,6 +53,7 @@ class RecordBook(QObject):
         self._jobs.refused.connect(self.refused)
         self._folder: Path | None = None
         self._told = ""
+        context.requests.calibrations_changed.connect(self._on_workspace)
 
     @property
     def busy(self) -> bool:
@@ -64,10 +66,15 @@ class RecordBook(QObject):
         if folder != self._folder:
             self._folder = folder
             self.undo.clear()
+            self._take(())  # numbers of the other workspace's are others' here
         if (folder / NAME).exists():
             self._do(tr("Reading the records"), lambda _records: None)
         else:
             self._take(())
+
+    def _on_workspace(self) -> None:
+        if self._folder not in (None, self._context.workspace.folder):
+            self.refresh()
 
     def add(
         self,
@@ -123,8 +130,17 @@ class RecordBook(QObject):
         self._jobs.close()
 
     def _do(self, title: str, change: Change, done: Callable[[int], object] | None = None) -> None:
+        workspace = self._context.workspace
+        folder = workspace.folder
+
         def work(_tell: object) -> tuple[object, tuple[MeasurementRecord, ...], str]:
-            records = self._context.workspace.records
+            if workspace.folder != folder:
+                raise InputError(
+                    tr("{title}: another workspace was chosen meanwhile").format(title=title),
+                    where=str(folder),
+                    advice=tr("Choose that workspace again, and do it again"),
+                )
+            records = workspace.records
             result = change(records)
             return result, records.measurements(), records.notice
 
@@ -133,7 +149,8 @@ class RecordBook(QObject):
             if notice and notice != self._told:
                 self._told = notice
                 self.noticed.emit(notice)
-            self._take(records)
+            if workspace.folder == folder:
+                self._take(records)
             if done is not None:
                 done(result)
 

@@ -40,6 +40,8 @@ class Job:
         Called in the GUI thread with what `work` returned.
     failed : callable or None
         Called in the GUI thread with a sentence where it came to nothing; None: Jobs.refused.
+    ended : callable
+        Called in the GUI thread before any of these, however it ended; not once Jobs are closed.
     must : bool
         Whether it is done even where all else is cancelled.
     over : bool
@@ -50,6 +52,7 @@ class Job:
     work: Callable[[Callable[[float], None]], Any]
     done: Callable[[Any], None] = field(default=lambda _result: None)
     failed: Callable[[str], None] | None = None
+    ended: Callable[[], object] = field(default=lambda: None)
     must: bool = False
     over: bool = False
     share: float = 0.0
@@ -115,18 +118,34 @@ class Jobs(QObject):
                 job.future.cancel()
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
-        """Cancel what may be, end the thread after the rest; nobody is told of it any more.
+        """Cancel what may be, end the thread after the rest; only what was lost is told of.
 
         Return whether it has ended; one that hangs is left behind.
         """
         self.cancel()
         self._timer.stop()
+        kept = [job for job in self._waiting if job.must]
         self._waiting.clear()
         thread, self._thread = self._thread, None
         if thread is None:
             return True
         self._queue.put(None)
-        return join(thread, timeout_s)
+        ended = join(thread, timeout_s)
+        for job in kept:
+            self._tell_lost(job)
+        return ended
+
+    def _tell_lost(self, job: Job) -> None:
+        """Tell of a job that had to be done, and is not."""
+        assert job.future is not None
+        if not job.future.done():  # it goes on as long as the program runs
+            _LOG.error("%s was not done when it was closed", job.title)
+            sentence = tr("{title}: not done yet; leave the program running for a while")
+            self.refused.emit(sentence.format(title=job.title))
+            return
+        future, job.future, job.over = job.future, None, True
+        if (error := future.exception()) is not None:
+            self._tell_failure(job, error)
 
     def _work(self) -> None:
         """Do the jobs in their order; in the thread."""
@@ -169,12 +188,17 @@ class Jobs(QObject):
         # Where `done` refers to its job, which is a ring, the result must not be in it.
         future, job.future, job.over = job.future, None, True
         assert future is not None
+        job.ended()
         if future.cancelled():
             return
         error = future.exception()
         if error is None:
             job.done(future.result())
-        elif isinstance(error, Cancelled):
+        else:
+            self._tell_failure(job, error)
+
+    def _tell_failure(self, job: Job, error: BaseException) -> None:
+        if isinstance(error, Cancelled):
             self.refused.emit(tr("{title}: stopped").format(title=job.title))
         elif isinstance(error, InputError):
             (job.failed or self.refused.emit)(str(error))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QScrollArea, QVBoxLayout, QWidget
 
 from app.widgets.label import MarkupLabel, escaped
@@ -29,9 +29,10 @@ class Shortcut:
 
 
 def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
-    """Return the shortcuts of all named actions in a window, in the order of their groups.
+    """Return the shortcuts in a window that can be used, in the order of their groups.
 
-    An action's group is the first part of its object name (``sensors.import``).
+    They are those of named actions, and named shortcuts that say what they are for (``whatsThis``).
+    The group is the first part of the object name (``sensors.import``).
     """
     found = []
     for action in below(window, QAction):
@@ -41,6 +42,11 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
         if keys and action.objectName() and action.isEnabled():
             group = action.objectName().partition(".")[0]
             found.append(Shortcut(group, keys, action.text().replace("&", "").rstrip(".… ")))
+    for shortcut in below(window, QShortcut):
+        if shortcut.objectName() and shortcut.whatsThis() and shortcut.isEnabled():
+            group = shortcut.objectName().partition(".")[0]
+            keys = shortcut.key().toString(QKeySequence.SequenceFormat.NativeText)
+            found.append(Shortcut(group, keys, shortcut.whatsThis()))
     return tuple(sorted(dict.fromkeys(found), key=lambda s: s.group))
 
 

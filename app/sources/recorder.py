@@ -111,7 +111,7 @@ class Recorder:
         queue_bytes: int = QUEUE_BYTES,
     ) -> None:
         self.path = path
-        self._stream, self._header, self._queue_bytes = stream, header, queue_bytes
+        self.stream, self._header, self._queue_bytes = stream, header, queue_bytes
         self._changed = threading.Condition()
         self._queue: deque[tuple[Frame, int]] = deque()
         self._ending = self._finished = False
@@ -129,11 +129,11 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name=f"recording {self.path.name}")
         self._thread.daemon = True
         self._thread.start()
-        self._stream.add_tap(self._take)
+        self.stream.add_tap(self._take)
 
     def finish(self) -> None:
         """Take no more frames; those that wait are still written, while the caller goes on."""
-        self._stream.remove_tap(self._take)
+        self.stream.remove_tap(self._take)
         with self._changed:
             self._ending = True
             self._changed.notify_all()
@@ -200,7 +200,7 @@ class Recorder:
             failure = tr("A fault of this program: {kind}; the log has it.").format(
                 kind=type(error).__name__
             )
-        self._stream.remove_tap(self._take)
+        self.stream.remove_tap(self._take)
         with self._changed:
             self._ending = self._finished = True
             self._failure = failure

@@ -20,7 +20,7 @@ import numpy as np
 
 from gelpolight_core import __version__
 from gelpolight_core.batch.ledger import FrameRow
-from gelpolight_core.batch.plan import Job
+from gelpolight_core.batch.plan import Job, frame_stamp
 from gelpolight_core.batch.settings import BatchSettings, require_same
 from gelpolight_core.batch.stopping import shall_stop
 from gelpolight_core.calibration.file import read_calibration
@@ -108,6 +108,7 @@ class _FrameWorker:
         require_same(replace(settings, program=__version__), out)
         self._settings, self._out = settings, out
         self._recording: Recording | None = None
+        self._mark: tuple[int, ...] = ()
         calibration = read_calibration(settings.calibration)
         if calibration.identity != settings.identity:
             raise InputError(
@@ -156,17 +157,24 @@ class _FrameWorker:
                 advice=tr("Copy the recording again"),
             )
         frame = recording.frame(index)
+        if frame_stamp(recording.header.started, frame.number) != job.stamp:
+            raise InputError(
+                tr("frame {n} is another one than when the run was begun").format(n=index),
+                where=str(job.path),
+                advice=tr("Give the command again, which looks at the recording anew"),
+            )
         response = self._reconstructor.calibration.response
         picture = linear_picture(frame.rgb, job.name, response=response)
         return picture, replace(row, number=frame.number, time_s=frame.time_s)
 
     def _opened(self, path: Path) -> Recording:
         """Return a recording; its frames come one by one, and finding them takes a while."""
-        if self._recording is None or self._recording.path != path:
+        mark = _file_mark(path)
+        if self._recording is None or self._recording.path != path or self._mark != mark:
             if self._recording is not None:
                 self._recording.close()
                 self._recording = None
-            self._recording = Recording.open(path)
+            self._recording, self._mark = Recording.open(path), mark
         return self._recording
 
     def _write(self, heightmap: HeightMap, job: Job) -> None:
@@ -185,6 +193,15 @@ class _CannotWrite(Exception):
     def __init__(self, halt: Halt) -> None:
         super().__init__(halt)
         self.halt = halt
+
+
+def _file_mark(path: Path) -> tuple[int, ...]:
+    """Return what tells that a file was replaced or written on; a cluster's workers live long."""
+    try:
+        found = path.stat()
+    except OSError:  # opening it says why, in words
+        return ()
+    return found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _described(row: FrameRow, heightmap: HeightMap, shape: str | None) -> FrameRow:

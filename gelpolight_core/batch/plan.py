@@ -19,6 +19,9 @@ from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.session.session import SUFFIXES
 from gelpolight_core.translation import tr
 
+DIGITS = 6
+"""Of a frame's number in the name of its result, at least."""
+
 
 @dataclass(frozen=True, slots=True)
 class Job:
@@ -112,8 +115,8 @@ class _Frames:
         yield f"{self.output}/"
 
     def job(self, index: int) -> Job:
-        output = f"{self.output}/{self.path.stem}_{index:06d}"
-        return Job(self.path, index, output, f"{self.started} {self.numbers[index]}")
+        output = f"{self.output}/{self.path.stem}_{index:0{DIGITS}d}"
+        return Job(self.path, index, output, frame_stamp(self.started, self.numbers[index]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,6 +268,11 @@ class _Found:
             self.sources.append(_Frames(path, output, recording.header.started, recording.numbers))
 
 
+def frame_stamp(started: str, number: int) -> str:
+    """Return what tells a recording's frame from others: when it was begun, and which it is."""
+    return f"{started} {number}"
+
+
 def _seems_recording(path: Path) -> bool:
     return path.suffix.lower() == ENDING or is_recording(path)
 
@@ -278,6 +286,15 @@ def _refuse_twins(plan: BatchPlan) -> None:
     # Some disks ignore the case.
     names = Counter(stem.casefold() for source in plan.sources for stem in source.stems)
     twins = [name for name, count in names.items() if count > 1]
+    frames = {
+        f"{source.output}/{source.path.stem}".casefold(): len(source)
+        for source in plan.sources
+        if isinstance(source, _Frames)
+    }
+    for name in names:  # a picture may be called as a frame of the recording beside it
+        stem, _, number = name.rpartition("_")
+        if len(number) >= DIGITS and number.isdecimal() and int(number) < frames.get(stem, 0):
+            twins.append(name)
     if twins:
         raise InputError(
             tr("two inputs would have results named {name}").format(name=twins[0]),

@@ -6,6 +6,7 @@ loses nothing. It may be used by two threads: one that captures and decides, one
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,6 +39,7 @@ from gelpolight_core.session.session import (
 )
 
 Frame = NDArray[Any]
+Write = Callable[[Path, Path], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +99,8 @@ class KeptSession:
         """
         refuse_other_size(self._session, (frames[0].shape[1], frames[0].shape[0]))
         folder = FOLDERS[stage]
-        with self._lock:
-            name = self._keep(folder, ".png", radius_mm, partial(_write, average_frames(frames)))
-            self._replace_views(folder, {name})
+        write = partial(_write, average_frames(frames))
+        (name,) = self._keep_all(folder, [(".png", write)], radius_mm)
         return name
 
     def import_files(
@@ -121,15 +122,9 @@ class KeptSession:
         InputError
             If a file is no picture that fits into the session; then none is taken.
         """
-        folder = FOLDERS[stage]
         refuse_unfit(self._session, stage, files)
-        names: list[str] = []
-        with self._lock:
-            for path in files:
-                suffix = path.suffix.lower()
-                names.append(self._keep(folder, suffix, radius_mm, partial(_copy, path)))
-            self._replace_views(folder, set(names))
-        return tuple(names)
+        pictures = [(path.suffix.lower(), partial(_copy, path)) for path in files]
+        return self._keep_all(FOLDERS[stage], pictures, radius_mm)
 
     def take_back(self, stage: Stage, names: Sequence[str]) -> None:
         """Leave out pictures that came together, as if they had not.
@@ -169,12 +164,36 @@ class KeptSession:
         taken = {f"{FOLDERS[stage]}/{name}" for name in names}
         return taken, self._replaced.get(min(taken), _Replaced())
 
+    def _keep_all(
+        self, folder: str, pictures: Sequence[tuple[str, Write]], radius_mm: float | None
+    ) -> tuple[str, ...]:
+        """Write pictures that come together, all or none; return their names."""
+        names: list[str] = []
+        with self._lock:
+            try:
+                for suffix, write in pictures:
+                    names.append(self._keep(folder, suffix, radius_mm, write))
+                self._replace_views(folder, set(names))
+            except InputError:
+                with contextlib.suppress(OSError, InputError):  # the first refusal is told
+                    self._drop(folder, names)
+                raise
+        return tuple(names)
+
+    def _drop(self, folder: str, names: Sequence[str]) -> None:
+        for name in names:
+            (self._session.folder / folder / name).unlink(missing_ok=True)
+        radii = self._session.ball_radii_mm
+        if not radii.keys().isdisjoint(names):
+            kept = {name: radii[name] for name in radii if name not in names}
+            self._describe(replace(self._session, ball_radii_mm=kept))
+
     def _keep(
         self,
         folder: str,
         suffix: str,
         radius_mm: float | None,
-        write: Callable[[Path, Path], None],
+        write: Write,
     ) -> str:
         """Write a picture under the next free name, and return that.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -33,6 +32,7 @@ from gelpolight_core.session.copies import file_hash, refuse_copies
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
+from gelpolight_core.who import user_name
 
 Progress = Callable[[str, float], None]
 STAGES = tuple(FOLDERS.values())
@@ -269,14 +269,10 @@ def _provenance(session: Session) -> Provenance:
     for name in ("session.toml", DECISIONS_FILE):
         if (session.folder / name).is_file():
             sources[name] = file_hash(session.folder / name)
-    try:
-        operator = getpass.getuser()
-    except (KeyError, OSError):  # a container without a user database has no name to give
-        operator = ""
     camera = session.camera_settings
     return Provenance(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
-        operator=operator,
+        operator=user_name(),
         program_version=__version__,
         session=session.folder.resolve().name,
         sources=sources,

@@ -157,7 +157,8 @@ def _run_balls(session: Session, results: StageResults, tell: Progress) -> Stage
     inputs = inputs_of(session)
     rests_on = tuple(inputs[need].fingerprint for need in NEEDS[Stage.BALLS])
     hashes = dict(inputs[Stage.BALLS].pictures)
-    files = session.files("balls")
+    # A press that is captured at this moment is the next computation's.
+    files = [path for path in session.files("balls") if path.name in hashes]
     balls = []
     for index, path in enumerate(files):
         tell(index / len(files))

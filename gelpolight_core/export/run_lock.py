@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import getpass
 import os
 import socket
 import sys
@@ -12,6 +11,7 @@ from pathlib import Path
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import cannot_write
 from gelpolight_core.translation import tr
+from gelpolight_core.who import user_name
 
 if sys.platform == "win32":
     import msvcrt
@@ -90,7 +90,7 @@ def _lock(handle: int) -> None:
 
 
 def _name() -> str:
-    return f"{getpass.getuser()} @ {socket.gethostname()}, process {os.getpid()}"
+    return f"{user_name() or tr('somebody')} @ {socket.gethostname()}, process {os.getpid()}"
 
 
 def _holder(handle: int) -> str:

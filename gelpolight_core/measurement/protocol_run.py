@@ -20,8 +20,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.appending import append_durably, unwritable
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.export.appending import append_durably
+from gelpolight_core.export.atomic import cannot_write, make_folder, write_atomically
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.protocol import PressWanted, Protocol, check_protocol
 from gelpolight_core.measurement.protocol_file import (
@@ -159,7 +159,11 @@ class ProtocolRun:
         """
         order = {wanted.file: k for k, wanted in enumerate(self.wanted)}
         # What another program has added to the same run meanwhile stays.
-        there = {row[0]: row for row in _read_rows(self.presses / TRUTH) if row[0] in order}
+        there = {
+            row[0]: row
+            for row in _read_rows(self.presses / TRUTH)
+            if row[0] in order and (self.presses / row[0]).is_file()
+        }
         rows = {**self._rows, **there, press.file: _row(press)}
         _write_rows([rows[file] for file in sorted(rows, key=order.__getitem__)], self.presses)
         self._rows = rows
@@ -204,7 +208,7 @@ class ProtocolRun:
         try:
             os.replace(picture, kept)
         except OSError as error:
-            raise unwritable(error, kept) from error
+            raise cannot_write(error, kept) from error
         return kept
 
 

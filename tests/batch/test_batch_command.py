@@ -121,7 +121,13 @@ def test_inputs_that_cannot_be_are_refused_in_one_line(
     (tmp_path / "day.png").write_bytes(b"")
     (tmp_path / "other" / "day").mkdir(parents=True)
     (tmp_path / "other" / "day" / "run.gplrec").write_bytes((day / "run.gplrec").read_bytes())
+    frames = tmp_path / "frames"
+    (frames / "run").mkdir(parents=True)
+    (frames / "run.gplrec").write_bytes((day / "run.gplrec").read_bytes())
+    (frames / "run" / "run_000003.png").write_bytes((day / "left" / "a.png").read_bytes())
+    (frames / "run" / "run_000004.png").write_bytes((day / "left" / "a.png").read_bytes())
     for inputs, words in (
+        ([frames], "two inputs would have results named frames/run/run_000003"),
         ([tmp_path / "empty"], "there are no frames"),
         ([tmp_path / "none"], "there is no such file or folder"),
         ([day, "-o", tmp_path], "the input lies in the folder of the results"),

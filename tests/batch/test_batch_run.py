@@ -26,6 +26,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.export.run_lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.reader import Recording
 from gelpolight_core.session.session import read_picture
 
 
@@ -344,3 +345,23 @@ def test_a_scheduler_that_does_not_answer_is_refused(
     monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         cluster.ClusterRunner(settings, tmp_path, "tcp://127.0.0.1:9")
+
+
+def test_a_worker_that_lives_long_sees_that_a_recording_was_replaced(
+    settings: BatchSettings, plan, go, day: Path, tmp_path: Path
+) -> None:
+    """A cluster's workers outlive a run: a half copied recording is copied whole meanwhile."""
+    out, path = tmp_path / "out", day / "run.gplrec"
+    whole = path.read_bytes()
+    with Recording.open(path) as recording:
+        size = recording.frame(0).rgb.size
+    path.write_bytes(whole[: len(whole) - size // 2])
+    first = go(path, out=out)
+    path.write_bytes(whole)
+    again = go(path, out=out)
+    assert first.done < 4
+    assert (again.done + first.done, again.bad) == (4, 0)
+    (late,) = list(plan(path, out=out))[3:]
+    frames_of_before = replace(late, stamp="2026-11-22T08:00:00+00:00 3")
+    (row,) = frame_work.work(settings, out, [frames_of_before])
+    assert "another one than when the run was begun" in row.error

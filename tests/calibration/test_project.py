@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gelpolight_core.calibration import stages
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject, Cancelled
@@ -17,7 +20,7 @@ from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.decisions import PlacedCircle
 from gelpolight_core.session.description import create_session
-from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session import Session, read_session
 
 
 @pytest.fixture
@@ -244,3 +247,64 @@ def test_a_session_that_somebody_broke_can_be_kept_as_it_was_read(
     project.overwrite()
     assert project.changed_outside() == ()
     assert read_session(before.folder) == before
+
+
+def test_a_single_view_that_cannot_take_the_place_of_the_former_is_not_kept(
+    project: CalibrationProject,
+) -> None:
+    """Two in use would be averaged."""
+    project.exclude(Stage.BALLS, project.session.found("balls")[0].name)
+    decisions = project.session.folder / "decisions.toml"
+    decisions.write_text(decisions.read_text() + "# by another program\n")
+    before = project.session.captured("whiteboard")
+    with pytest.raises(InputError, match="nothing was written"):
+        project.add_capture(Stage.RADIANCE, [np.full((240, 320, 3), 90, np.uint8)])
+    assert read_session(project.session.folder).captured("whiteboard") == before
+
+
+def test_an_import_that_the_disk_ends_leaves_nothing_behind(
+    project: CalibrationProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, files = project.session, []
+    press = cv2.imread(str(before.found("balls")[0]))
+    for number in range(3):
+        files.append(tmp_path / f"press{number}.png")
+        cv2.imwrite(str(files[-1]), np.roll(press, number + 1, axis=0))
+    third = f"{len(before.captured('balls')) + 3:03d}.png"
+
+    def full_after_two(move: Callable[..., None]) -> Callable[..., None]:
+        def moved(source: Path, target: Path) -> None:
+            if str(target).endswith(third):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            move(source, target)
+
+        return moved
+
+    for name in ("link", "replace"):
+        monkeypatch.setattr(os, name, full_after_two(getattr(os, name)))
+    with pytest.raises(InputError, match="the disk is full"):
+        project.import_files(Stage.BALLS, files, radius_mm=2.5)
+    monkeypatch.undo()
+    assert read_session(before.folder) == before == project.session
+    assert len(project.import_files(Stage.BALLS, files, radius_mm=2.5)) == 3
+
+
+def test_a_press_that_is_captured_while_the_others_are_looked_at_waits_for_the_next_time(
+    project: CalibrationProject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inputs_of = stages.inputs_of
+    captured: list[str] = []
+
+    def slow(session: Session) -> object:
+        found = inputs_of(session)
+        frame = cv2.imread(str(session.found("balls")[0]))[..., ::-1]
+        captured.append(project.add_capture(Stage.BALLS, [frame], radius_mm=3.0))
+        return found
+
+    monkeypatch.setattr(stages, "inputs_of", slow)
+    project.set_ball_radius(project.session.found("balls")[0].name, 3.01)
+    project.compute(Stage.BALLS)
+    monkeypatch.undo()
+    assert captured
+    assert project.statuses()[Stage.BALLS].state is StageState.STALE
+    assert project.compute(Stage.BALLS).state in (StageState.PASS, StageState.WARN)

@@ -18,6 +18,6 @@ def test_what_is_appended_stands_behind_what_was_there(tmp_path: Path) -> None:
 
 
 def test_a_file_that_cannot_be_added_to_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be written") as refusal:
+    with pytest.raises(InputError, match="a folder stands where the file should be") as refusal:
         append_durably(tmp_path, b"one\n")
     assert refusal.value.where == str(tmp_path)

@@ -28,3 +28,16 @@ def test_a_run_that_was_left_can_be_written_by_another(tmp_path: Path) -> None:
 def test_a_folder_that_is_not_there_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         RunLock(tmp_path / "nowhere")
+
+
+def test_a_system_that_knows_no_users_has_runs_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a container that is run under a bare number."""
+
+    def nobody() -> str:
+        raise KeyError("getpwuid(): uid not found: 1234")
+
+    monkeypatch.setattr(getpass, "getuser", nobody)
+    with RunLock(tmp_path), pytest.raises(InputError, match="process"):
+        RunLock(tmp_path)

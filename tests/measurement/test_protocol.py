@@ -250,3 +250,15 @@ def test_a_new_run_does_not_take_the_place_of_another(tmp_path: Path) -> None:
         begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     with pytest.raises(InputError, match=r"there is no protocol\.toml"):
         open_run(tmp_path)
+
+
+def test_of_several_pictures_that_were_taken_away_all_are_asked_for_again(tmp_path: Path) -> None:
+    run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
+    for press in run.wanted:
+        run.accept(press, frames(10))
+    for press in run.wanted[1:]:
+        run.picture(press).unlink()
+    again = open_run(run.folder)
+    again.accept(run.wanted[1], frames(20))
+    assert again.left == (run.wanted[2],)
+    assert open_run(run.folder).left == (run.wanted[2],)

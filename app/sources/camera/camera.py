@@ -29,7 +29,9 @@ from gelpolight_core.translation import tr
 _LOG = logging.getLogger(__name__)
 
 SILENCE_S = 3.0
-SLOW_OPEN_S = 8.0
+STILL_OPENING_S, SLOW_OPEN_S = 2.0, 8.0
+"""From when it is said that it takes a while to open, and that no picture comes. The first is less
+than what a stream may be silent for: opened anew, the camera would count as lost."""
 CHECK_S = 5.0
 CLOSE_S = 0.5
 """A camera that is still being opened is left to its thread; who stops a stream waits a second."""
@@ -121,6 +123,8 @@ class Camera:
         late = state.phase == "opening" and silent_s > SLOW_OPEN_S
         if late or (state.phase == "live" and silent_s > self._silence_s):
             return str(self._silent(silent_s))
+        if state.phase == "opening" and silent_s > STILL_OPENING_S:
+            return tr("The camera is being opened; some take ten seconds.")
         return ""
 
     def attach(self, reader: Reader) -> None:

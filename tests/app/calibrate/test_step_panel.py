@@ -25,3 +25,18 @@ def test_a_step_that_is_computed_does_not_show_the_figures_of_the_one_before(
     panel.show_running()
     assert not panel.quality.texts() and panel.quality.isHidden()
     assert not panel.finished and "bold" not in panel.next.styleSheet()
+
+
+def test_the_button_says_whether_a_further_picture_takes_the_place_of_the_one_before(
+    qtbot: QtBot,
+) -> None:
+    panel = StepPanel()
+    qtbot.addWidget(panel)
+    said = {}
+    for step in all_steps():
+        panel.show_step(step, following="")
+        panel.show_count(1)
+        said[step.key] = panel.capture.text().replace("&", "")
+    assert said["top_pose"] == "Capture another"
+    assert said["background"] == said["lights"] == "Capture again"
+    assert said["balls"] == "Capture  (1 of 10)"

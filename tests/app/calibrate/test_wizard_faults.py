@@ -177,6 +177,22 @@ def test_a_full_disk_is_said_and_nothing_half_written_counts(
     technician.rest()
 
 
+def test_a_picture_that_cannot_be_kept_is_told_though_the_session_was_left(
+    technician: Technician, computed_project: Made, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    project = computed_project()
+    technician.begin(project, "balls")
+    press = cv2.imread(str(project.session.found("balls")[0]))
+    cv2.imwrite(str(tmp_path / "press.png"), np.roll(press, 1, axis=0))
+    full_disk(monkeypatch)
+    technician.wizard.controller.import_files(Stage.BALLS, [tmp_path / "press.png"])
+    technician.page._leave_session()
+    assert "disk is full" in caplog.text
+    monkeypatch.undo()
+    technician.begin(project, "balls")
+
+
 def test_a_ball_that_could_not_be_written_leaves_no_radius_behind(
     computed_project: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:

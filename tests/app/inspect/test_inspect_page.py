@@ -236,6 +236,19 @@ def test_a_recording_is_made_and_replayed(
     assert source.header.calibration_id == small_calibration.identity  # type: ignore[attr-defined]
 
 
+def test_a_recording_ends_where_the_camera_is_opened_again(
+    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_depth(page, qtbot)
+    page.recorder.start()
+    qtbot.wait(300)
+    page.link.open()
+    assert not page.recorder.action.isChecked()
+    qtbot.waitUntil(lambda: not page.recorder.busy, timeout=WAIT_MS)
+
+
 def test_zero_puts_the_background_of_now_into_use_and_can_be_undone(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
     qtbot: QtBot,

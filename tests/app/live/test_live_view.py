@@ -20,6 +20,7 @@ from app.live.drawing import ROLE_COLOURS
 from app.live.live_view import LiveView
 from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay
 from app.live.picture_checks import pixel_text
+from app.shell.shortcuts import shortcuts_of
 from gelpolight_core.errors import InputError
 
 HEIGHT, WIDTH = 60, 80
@@ -493,3 +494,10 @@ def test_the_exposures_advice_is_never_cut_off_and_moves_nothing(
         assert label.wordWrap() or label.sizeHint().width() <= label.width()
         heights.add(child(view, "live.checks").height())
     assert len(heights) == 1
+
+
+def test_the_keys_of_the_picture_are_on_the_sheet_of_shortcuts(qtbot: QtBot) -> None:
+    view = LiveView()
+    qtbot.addWidget(view)
+    told = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(view)}
+    assert ("live", "Z", "Stripes where saturated") in told

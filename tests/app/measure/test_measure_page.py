@@ -6,6 +6,7 @@ import csv
 import json
 import shutil
 import sqlite3
+import threading
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -28,6 +29,7 @@ from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.measurement.tools import ProfileWidth
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME
 
 PATIENCE_MS = 60_000
@@ -344,3 +346,27 @@ def test_a_recording_is_gone_through_frame_by_frame(
     desk.replay.findChild(QAction, "replay.on").trigger()
     assert desk.work.taken is None
     qtbot.waitUntil(lambda: desk.hold_action.isEnabled(), timeout=PATIENCE_MS)
+
+
+def test_another_workspace_is_read_at_once_and_what_was_meant_for_the_first_is_refused(
+    page: MeasurePage, context: AppContext, qtbot: QtBot, tmp_path: Path
+) -> None:
+    book, go = page.book, threading.Event()
+    record = MeasurementRecord("A-1", "", "distance", (Quantity("distance_mm", 9.0),))
+    book.add(record, lambda _number: None)
+    _kept(page, qtbot, 1)
+    book.remove((book.records[0].id,))
+    _kept(page, qtbot, 0)
+    refused: list[str] = []
+    book.refused.connect(refused.append)
+    book.change("Waiting", lambda _records: go.wait(20.0))
+    book.add(record, lambda _number: None)
+    context.workspace.folder = tmp_path / "other"
+    context.requests.calibrations_changed.emit()
+    assert not book.undo.canUndo()
+    go.set()
+    qtbot.waitUntil(lambda: not book.busy)
+    assert "another workspace was chosen meanwhile" in refused[0]
+    assert book.records == ()
+    assert not (tmp_path / "other" / NAME).exists()
+    context.toasts.clear()

@@ -109,3 +109,58 @@ def test_work_that_hangs_does_not_keep_the_page_from_closing(
     assert "hanging did not stop" in caplog.text
     go.set()
     assert join_left_behind(10.0)
+
+
+def test_what_had_to_be_done_and_failed_is_told_though_its_page_is_closed() -> None:
+    jobs, told = Jobs("jobs"), list[str]()
+    jobs.refused.connect(told.append)
+    go = threading.Event()
+
+    def refuse(_tell: Tell) -> None:
+        go.wait(10.0)
+        raise InputError("the disk is full", where="a.png", advice="Free some space")
+
+    jobs.submit(Job("save", refuse, must=True))
+    jobs.submit(Job("compute", refuse))
+    go.set()
+    assert jobs.close()
+    (sentence,) = told
+    assert "the disk is full" in sentence
+
+
+def test_what_had_to_be_done_and_hangs_is_told_and_done_when_it_can(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    jobs, told, written, go = Jobs("jobs"), list[str](), list[str](), threading.Event()
+    jobs.refused.connect(told.append)
+    jobs.submit(Job("wait", lambda _tell: go.wait(30.0), must=True))
+    jobs.submit(Job("save", lambda _tell: written.append("saved"), must=True))
+    assert not jobs.close(timeout_s=0.05)
+    assert [sentence.partition(":")[0] for sentence in told] == ["wait", "save"]
+    assert "save was not done when it was closed" in caplog.text
+    go.set()
+    assert join_left_behind(10.0)
+    assert written == ["saved"]
+
+
+@pytest.mark.parametrize("end", ["done", "refused", "faulty", "stopped", "dropped"])
+def test_who_asked_is_told_that_a_job_ended_however_it_did(end: str, qtbot: QtBot) -> None:
+    jobs, ended, go = Jobs("jobs"), list[str](), threading.Event()
+
+    def work(tell: Tell) -> None:
+        if end == "refused":
+            raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+        if end == "faulty":
+            raise ValueError("nobody thought of this")
+        assert go.wait(10.0)
+        tell(0.5)
+
+    if end == "dropped":
+        jobs.submit(Job("first", lambda _tell: go.wait(10.0)))
+    jobs.submit(Job("export", work, ended=lambda: ended.append(end)))
+    if end in ("stopped", "dropped"):
+        jobs.cancel()
+    go.set()
+    qtbot.waitUntil(lambda: not jobs.busy)
+    assert ended == [end]
+    assert jobs.close()

@@ -263,3 +263,20 @@ def test_what_is_not_as_it_was_stored_is_told(camera: Camera, stream: Stream) ->
         "Exposure by the camera is on, not off",
         "Gain is 64, not 10",
     )
+
+
+def test_a_slow_new_opening_does_not_end_a_stream(
+    camera: Camera, fake: FakeCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.sources.camera.camera.STILL_OPENING_S", 0.05)
+    stream = Stream(CameraSource(camera), silence_s=0.5)
+    stream.start()
+    stream.capture(1).result(20.0)
+    fake.hangs = threading.Event()
+    camera.want(STORED)
+    eventually(lambda: "being opened" in (stream.figures().lost or ""))
+    time.sleep(0.7)  # longer than a stream may be silent
+    fake.hangs.set()
+    eventually(lambda: stream.figures().lost is None)
+    assert len(stream.capture(1).result(20.0)) == 1
+    stream.stop()
