@@ -8,6 +8,6 @@ import getpass
 def user_name() -> str:
     """Return the name of the user; empty on a system that knows none, such as a bare container."""
     try:
-        return getpass.getuser()
+        return getpass.getuser().encode("utf-8", "backslashreplace").decode()
     except (KeyError, OSError, ImportError):  # which of them depends on system and Python
         return ""

@@ -217,8 +217,7 @@ class CameraPanel(QWidget):
         """Return how the camera is and what to do next, and in which colour."""
         state = self.camera.state
         if why := self.camera.trouble():
-            slow = state.phase == "opening" and not state.sentence
-            return why, "warn" if slow else "fail"
+            return why, "fail"
         if state.phase != "live":
             return tr("The camera is being opened; some take ten seconds."), "text"
         what, clauses = self._desk.differs(self.camera)

@@ -13,12 +13,13 @@ from app.command_line.common import (
     add_model,
     quality_lines,
     refuse_overwriting,
+    session_files,
     write_json,
 )
 from app.command_line.terminal import say
 from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session, source_files
+from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.session.session import read_session
 from gelpolight_core.translation import tr
@@ -38,8 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
     session = read_session(options.session)
     outputs = [path for path in (options.output, options.json) if path is not None]
-    used = source_files(session)
-    refuse_overwriting(outputs, [session.folder / "session.toml", *used])
+    refuse_overwriting(outputs, session_files(session))
     for path in outputs:
         refuse_unwritable(path)
     with StageProgress() as tell:

@@ -17,12 +17,15 @@ from tqdm import tqdm
 from app.command_line.terminal import harmless
 from gelpolight_core.calibration.calibration import MODELS
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.pipeline import STAGES
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import write_atomically
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.reconstruction.plan import EFFORTS, Plan
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
+from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
+from gelpolight_core.session.session import Session, read_picture, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -125,6 +128,31 @@ def points(given: Iterable[Iterable[float]], *, where: str) -> list[tuple[float,
             advice=tr("Give X and Y in mm for each place"),
         )
     return list(zip(flat[::2], flat[1::2], strict=True))
+
+
+def one_place(given: Iterable[Iterable[float]], *, where: str) -> tuple[float, float]:
+    """Return the one place of an argument, as :func:`points` does.
+
+    Raises
+    ------
+    InputError
+        If it is not one.
+    """
+    places = points(given, where=where)
+    if len(places) != 1:
+        raise InputError(
+            tr("{n} places are given").format(n=len(places)),
+            where=where,
+            advice=tr("Give one: X and Y in mm"),
+        )
+    return places[0]
+
+
+def session_files(session: Session) -> tuple[Path, ...]:
+    """Return what no result may take the place of: all that was captured, stated and decided."""
+    stages = (*session.optional_stages, *STAGES)
+    pictures = (path for stage in stages for path in session.captured(stage))
+    return (session.folder / DESCRIPTION, session.folder / DECISIONS, *pictures)
 
 
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:

@@ -9,6 +9,8 @@ from typing import Any
 from app.command_line.common import (
     add_model,
     load_reconstructor,
+    numbers,
+    one_place,
     read_frame,
     refuse_overwriting,
     write_json,
@@ -44,10 +46,10 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument(
         "--seed",
-        type=float,
-        nargs=2,
-        metavar=("X", "Y"),
-        help=tr("a point (mm) on the object to measure, where several are pressed"),
+        type=numbers,
+        nargs="+",
+        metavar="X Y",
+        help=tr("a point (mm) on the object to measure, where several are pressed; with --shape"),
     )
     parser.add_argument("--json", type=Path, metavar="FILE")
     add_model(parser)
@@ -61,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
         refuse_overwriting([options.json], filter(None, used))
         refuse_unwritable(options.json)
     tools = chosen_tools(options)
-    truth = _truth(options)
+    truth, seed = _truth(options), _seed(options)
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     frame = read_frame(options.image, reconstructor)
     heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
@@ -75,7 +77,6 @@ def run(options: argparse.Namespace) -> int:
         }
         lines = [line for result in results for line in tool_lines(result)]
     else:
-        seed = tuple(options.seed) if options.seed else None
         shape = options.shape if options.shape != AUTO else _proposed(heightmap, seed, options)
         measurement = measure_heightmap(heightmap, shape=shape, seed_mm=seed)
         comparison = None if truth is None else compare(measurement, truth)
@@ -107,6 +108,19 @@ def _truth(options: argparse.Namespace) -> Truth | None:
             advice=tr("Add the picture with its shape and true sizes"),
         )
     return rows[options.image.name]
+
+
+def _seed(options: argparse.Namespace) -> tuple[float, float] | None:
+    """Return the point on the object to measure, where one is named."""
+    if options.seed is None:
+        return None
+    if options.shape is None:
+        raise InputError(
+            tr("it does not go with a measuring tool"),
+            where="--seed",
+            advice=tr("Use it with --shape; a place for --tool is given by --at"),
+        )
+    return one_place(options.seed, where="--seed")
 
 
 def _proposed(

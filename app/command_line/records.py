@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from app.command_line.common import refuse_overwriting
 from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError
+from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.translation import tr
@@ -43,6 +45,9 @@ def run(options: argparse.Namespace) -> int:
                 "Name the folder of the sensors with --workspace, or measure something first"
             ),
         )
+    if options.csv is not None:
+        refuse_overwriting([options.csv], [path])
+        refuse_unwritable(options.csv)
     with Records.open(path) as records:
         if records.notice:
             say(records.notice, file=sys.stderr)

@@ -6,26 +6,22 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import StageProgress, refuse_overwriting
+from app.command_line.common import StageProgress, refuse_overwriting, session_files
 from app.command_line.terminal import say
 from gelpolight_core.calibration.calibration import MODELS, Calibration
 from gelpolight_core.calibration.file import read_calibration
-from gelpolight_core.calibration.pipeline import calibrate_session, source_files
+from gelpolight_core.calibration.pipeline import calibrate_session
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.measurement.evaluation import evaluate_presses
+from gelpolight_core.measurement.presses import picture_reconstruction
+from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
 from gelpolight_core.measurement.truth import read_truth
-from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.report.build import calibration_report, run_report, validation_of
 from gelpolight_core.report.document import Report, Validation
 from gelpolight_core.report.file import refuse_other_endings, write_report
-from gelpolight_core.session.session import (
-    Session,
-    read_picture,
-    read_session,
-    require_colour,
-)
+from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.translation import tr
 
 
@@ -43,7 +39,7 @@ def add_parser(commands: Any) -> None:
         "--presses",
         type=Path,
         metavar="PRESSES",
-        help=tr("presses of known size, with truth.csv, to validate the calibration with"),
+        help=tr("folder of presses with truth.csv, or of a run of the protocol, to validate with"),
     )
     parser.add_argument(
         "--model", choices=MODELS, help=tr("to calibrate a session for (full unless stated)")
@@ -54,10 +50,9 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the report and say where it is."""
     refuse_other_endings(options.output)
-    if options.presses:
-        read_truth(options.presses)  # before minutes of work for nothing
+    presses = _presses(options.presses)  # before minutes of work for nothing
     make = _of_session if options.source.is_dir() else _of_calibration
-    report = make(options)
+    report = make(options, presses)
     write_report(report, options.output)
     say(
         tr("Report written to {path}: {verdict}").format(
@@ -67,7 +62,23 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _of_calibration(options: argparse.Namespace) -> Report:
+def _presses(given: Path | None) -> Path | None:
+    """Return the folder of the presses to validate with; refuse what cannot be used."""
+    if given is None:
+        return None
+    if not given.is_dir():
+        raise InputError(
+            tr("it is not a folder"),
+            where=str(given),
+            advice=tr("Name the folder that holds truth.csv and its pictures"),
+        )
+    presses = presses_folder(given)
+    read_truth(presses)
+    crossing_of(presses)
+    return presses
+
+
+def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report:
     if options.model:
         raise InputError(
             tr("a calibration has its model already"),
@@ -78,18 +89,17 @@ def _of_calibration(options: argparse.Namespace) -> Report:
     refuse_unwritable(options.output)
     calibration = read_calibration(options.source)
     with StageProgress() as tell:
-        validation = _validate(calibration, options.presses, tell)
+        validation = _validate(calibration, presses, tell)
     return calibration_report(calibration, validation=validation)
 
 
-def _of_session(options: argparse.Namespace) -> Report:
+def _of_session(options: argparse.Namespace, presses: Path | None) -> Report:
     session: Session = read_session(options.source)
-    used = source_files(session)
-    refuse_overwriting([options.output], [session.folder / "session.toml", *used])
+    refuse_overwriting([options.output], session_files(session))
     refuse_unwritable(options.output)
     with StageProgress() as tell:
         result = calibrate_session(session, model=options.model or MODELS[-1], progress=tell)
-        validation = _validate(result.calibration, options.presses, tell)
+        validation = _validate(result.calibration, presses, tell)
         tell(tr("report"), 1.0)
         return run_report(result, session, validation=validation)
 
@@ -97,11 +107,6 @@ def _of_session(options: argparse.Namespace) -> Report:
 def _validate(calibration: Calibration, presses: Path | None, tell: Any) -> Validation | None:
     if presses is None:
         return None
-    reconstructor = Reconstructor(calibration)
-
-    def reconstruct(path: Path) -> HeightMap:
-        picture = read_picture(path, response=reconstructor.calibration.response)
-        require_colour(picture, where=str(path))
-        return reconstructor.depth(picture.rgb, name=path.name, normals=False)
-
-    return validation_of(evaluate_presses(presses, reconstruct, progress=tell))
+    reconstruct = picture_reconstruction(Reconstructor(calibration))
+    crossing = crossing_of(presses)
+    return validation_of(evaluate_presses(presses, reconstruct, progress=tell, crossing=crossing))

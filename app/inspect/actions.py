@@ -108,20 +108,21 @@ class Deeds(QObject):
             Job(
                 tr("Setting to zero"),
                 lambda _tell: zero_calibration(workspace, used, frames),
-                lambda done: self._on_zeroed(done, used),
+                self._on_zeroed,
                 lambda sentence: self._tell(sentence, "fail"),
             )
         )
 
-    def _on_zeroed(self, done: Zeroed, before: Path) -> None:
+    def _on_zeroed(self, done: Zeroed) -> None:
         self._context.requests.calibrations_changed.emit()
         poor = [f for f in done.before.quality.figures if f.verdict is not Verdict.PASS]
-        text = tr("Set to zero; the calibration before it is kept.")
+        text = tr("Set to zero; the calibration that it was made of is kept.")
         if poor:
             text += " " + tr("The background had moved: {what} {v:.2g} {unit}.").format(
                 what=poor[0].label, v=poor[0].value, unit=poor[0].unit
             )
-        undo = (tr("Undo"), lambda: self._use(before))
+        # Where it was set to zero before, that one is overwritten: only the original is there.
+        undo = (tr("Undo"), lambda: self._use(done.origin))
         self._tell(text, "warn" if poor else "pass", actions=(undo,))
 
     def _use(self, path: Path) -> None:

@@ -72,7 +72,8 @@ class CalibrationChoice(QObject):
     Signals
     -------
     loaded(object, object)
-        Reconstructors of the calibration in use, for live and for standing pictures, or None.
+        Reconstructors of the calibration in use, for live and for standing pictures; None where
+        there is none, or until it is read.
     """
 
     loaded = Signal(object, object)
@@ -101,10 +102,10 @@ class CalibrationChoice(QObject):
         if state == self._state:
             return
         self._state = state
-        if used is None:
-            self.loaded.emit(None, None)
-            return
-        self._read(used.path)
+        if used is not None:
+            self._read(used.path)
+        # The one before must not measure under another's name, even where the reading fails.
+        self.loaded.emit(None, None)
 
     @property
     def is_reading(self) -> bool:

@@ -168,7 +168,6 @@ class LiveLink(QObject):
         self.close()
         info = self._context.source.info
         if info is not None and self._page_shown:
-            self.last = None
             self._inbox.unprocessed = 0
             self.stream = Stream(info.open())
             if not self._paused:
@@ -190,6 +189,7 @@ class LiveLink(QObject):
             self._resting = False
             self.stream.stop()
             self.stream = None
+        self.last = None
         self._inbox.box.take()
         self._outbox.take()
         self._shown_s.clear()
@@ -202,7 +202,7 @@ class LiveLink(QObject):
 
     def _take(self) -> None:
         item = self._outbox.take()
-        if item is None:
+        if item is None or item.generation != self._processor.generation:
             return
         if isinstance(item, Failure):
             self._say(item.sentence)

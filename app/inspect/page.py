@@ -211,6 +211,8 @@ class InspectPage(QWidget):
         self._loaded = None, None
         self._look_for_drift()
         self.link.use(None)
+        self._places = None
+        self._forget()
         self.ways.take(live, best)
 
     def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
@@ -260,10 +262,13 @@ class InspectPage(QWidget):
         self.recorder.stop()
         self._size = None
         self._look_for_drift()
+        self._forget()
         self.link.open()
         self._advise()
 
     def _on_switched(self) -> None:
+        # What stood was of the stream that has gone: nothing could be made anew of it.
+        self.pause(False)
         self.views.follow_source()
         self.replay.follow(None if self.link.stream is None else self.link.stream.source)
 
@@ -298,6 +303,11 @@ class InspectPage(QWidget):
         self._places = None if live is None else PixelPlaces(live.calibration.table)
         if live is not None:
             self.views.prepare()
+        self._forget()
+
+    def _forget(self) -> None:
+        """Show and read no depth: what was seen is of another calibration or source."""
+        self._shown = None
         self.views.forget()
 
     def _on_act(self, name: str) -> None:

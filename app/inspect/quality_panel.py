@@ -97,13 +97,21 @@ class QualityPanel(QWidget):
             text = legend(shown.heightmap.flags) if misfit is None else misfit_text(misfit)
             self._legend.setText(text)
 
-    def _on_chosen(self) -> None:
-        # What is shown is of another figure: neither its colours nor its words stay for this one.
+    def say(self, text: str) -> None:
+        """Show words in the place of a picture and of what its colours mean."""
+        self._forget_colours()
+        self.map.say(text)
+
+    def _forget_colours(self) -> None:
         self.bar.hide()
         self._legend.clear()
+        self._count = 0
+
+    def _on_chosen(self) -> None:
+        # What is shown is of another figure: neither its colours nor its words stay for this one.
+        self._forget_colours()
         if self.map.has_picture:
             self.map.say(tr("One moment."))
-        self._count = 0
         self.chosen.emit()
 
 

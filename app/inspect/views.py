@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.inspect.cuts import Section
+from app.inspect.cuts import Cut, Section
 from app.inspect.draped import DrapedLine
 from app.inspect.height_panel import HeightPanel
 from app.inspect.look import Look, look_as_text, look_from_text
@@ -226,13 +226,14 @@ class Views(QMainWindow):
             self.surface.load()
 
     def forget(self) -> None:
-        """Show no depth: there is another calibration, or none."""
+        """Show no depth: there is another calibration or source, or none."""
         words = tr("No depth yet.")
         self._has_depth = False
         self._on_section()
         self.surface.show_surface(None)
-        for view in (self.height.map, self.normals.map, self.quality.map):
+        for view in (self.height.map, self.normals.map, self.quality):
             view.say(words)
+        self.section.show_cut(Cut())
 
     def show_cursor(self, x_mm: float, y_mm: float) -> None:
         """Mark a place in every view of the depth."""

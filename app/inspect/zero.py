@@ -30,11 +30,14 @@ class Zeroed:
     ----------
     path : Path
         The calibration with the present background.
+    origin : Path
+        The calibration that it was made of, which is kept.
     before : BackgroundDrift
-        The picture against the calibration that it was made of.
+        The picture against that one.
     """
 
     path: Path
+    origin: Path
     before: BackgroundDrift
 
 
@@ -65,7 +68,7 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
     path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")
     write_calibration(changed, path)
     workspace.use(path)
-    return Zeroed(path, before)
+    return Zeroed(path, origin, before)
 
 
 def original_of(used: Path) -> Path:

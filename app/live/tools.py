@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QEvent, QSize, Qt, Signal
-from PySide6.QtGui import QIcon, QKeySequence, QPalette, QShortcut
+from PySide6.QtCore import QEvent, QSize, Signal
+from PySide6.QtGui import QIcon, QPalette
 from PySide6.QtWidgets import QHBoxLayout, QToolButton, QWidget
 
 from app.live.icons import SIDE, tool_icon
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
+from app.widgets.tool_key import add_tool_key
 from gelpolight_core.translation import tr
 
 # name: (key, stays pressed)
@@ -77,11 +78,7 @@ class PictureTools(QWidget):
             button.toggled.connect(lambda on: self.switched.emit(name, on))
         else:
             button.clicked.connect(lambda: self.pressed.emit(name))
-        shortcut = QShortcut(QKeySequence(key), owner)
-        shortcut.setObjectName(f"live.key.{name}")
-        shortcut.setWhatsThis(text)  # for the sheet of shortcuts
-        shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        shortcut.activated.connect(button.click)
+        add_tool_key(owner, key, button.click, name=f"live.key.{name}", purpose=text)
         self._buttons[name] = button
         return button
 

@@ -193,7 +193,8 @@ class Desk(DeskFrame):
         if self.work.taken is None and shown is not None:
             now = datetime.now().astimezone()
             name = tr("{camera}, {time:%H:%M:%S}").format(camera=self._camera(), time=now)
-            self._take(Taken(name, frame=shown.frame), propose=not by_hand)
+            taken = Taken(name, frame=shown.frame, serial=self.link.serial)
+            self._take(taken, propose=not by_hand)
         self._follow_hold()
 
     def release(self) -> None:
@@ -337,10 +338,14 @@ class Desk(DeskFrame):
         self._refused, self._shown = "", None
         self.drift.again()
         self.link.use(None)
-        self.work.use(best)
+        # Before the tools are drawn again: it says where in the camera's picture they are.
         self.details.use(None if best is None else best.calibration)
-        if self.work.taken is None:
+        self.work.use(best)
+        taken = self.work.taken
+        if best is None or taken is None:
             self.map.say(tr("No depth yet."))
+        else:
+            self.map.say(tr("Reconstructing {name}…").format(name=taken.name))
         self.show_validated()
         self._refresh()
 

@@ -92,6 +92,8 @@ class Details(QTabWidget):
     def use(self, calibration: Calibration | None) -> None:
         """Place tools in the camera's picture by this calibration."""
         self._calibration, self._places = calibration, None
+        self._answer = None
+        self.surface.show_surface(None)
 
     # What is shown
 

@@ -6,6 +6,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from app.measure.judging import DEPTH_FIGURES
 from app.shell import theme
 from app.shell.settings import Limits
 from app.widgets.naming import named
@@ -66,7 +67,7 @@ class DriftPlot(QWidget):
         for record in sorted(records, key=lambda r: r.time):
             for quantity in record.quantities:
                 if quantity.error_percent is not None:
-                    in_depth = quantity.name in ("height_mm", "step_height_mm")
+                    in_depth = quantity.name.rpartition("_")[0] in DEPTH_FIGURES
                     place = (record.time.timestamp(), quantity.error_percent)
                     found["depth" if in_depth else "plane"].append(place)
         self.shown = found

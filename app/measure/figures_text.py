@@ -21,10 +21,20 @@ def decimals_for(sd: float | None, unit: str) -> int:
     return wanted if wanted <= MOST_DECIMALS else usual
 
 
+def unit_behind(unit: str) -> str:
+    """Return a unit as it stands behind a number."""
+    return UNITS.get(unit, f" {unit}")
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that the name of a kept quantity ends in: ``mm`` of ``diameter_mm``."""
+    return name.rpartition("_")[2]
+
+
 def value_text(value: float, sd: float | None, unit: str) -> str:
     """Return ``5.012 ± 0.024 mm``, or the value alone where no standard deviation is stated."""
     decimals = decimals_for(sd, unit)
-    behind = UNITS.get(unit, f" {unit}")
+    behind = unit_behind(unit)
     if not math.isfinite(value):
         return tr("unknown")
     number = f"{value:.{decimals}f}"

@@ -44,11 +44,14 @@ class Taken:
         Its file; None for one that the camera gave.
     frame : Frame or None
         What the camera gave; None for a file.
+    serial : str
+        Of the sensor that it is known to be of; empty where that is not known.
     """
 
     name: str
     path: Path | None = None
     frame: Frame | None = None
+    serial: str = ""
 
     def picture(self, response: CameraResponse | None) -> Picture:
         """Return it as linear light.
@@ -147,7 +150,7 @@ class Measuring:
         Raises
         ------
         InputError
-            If the picture cannot be used, or is not of the calibration's size.
+            If the picture cannot be used, or is not of the calibration's sensor or size.
         """
         if question is None:
             self._forget()
@@ -165,6 +168,7 @@ class Measuring:
         reconstructor = self._reconstructor_for(question)
         if question.taken is not self._taken or self._shown is None:
             self._taken = None
+            _require_sensor(question.taken, question.calibration)
             picture = question.taken.picture(question.calibration.response)
             heightmap = reconstructor.depth(
                 picture.rgb, name=question.taken.name, normals=False, uncertainty=True
@@ -185,6 +189,18 @@ class Measuring:
             self._taken = None
         assert self._reconstructor is not None
         return self._reconstructor
+
+
+def _require_sensor(taken: Taken, calibration: Calibration) -> None:
+    serial = calibration.sensor.serial
+    if taken.serial not in ("", serial):
+        raise InputError(
+            tr("the picture is of {other}, the calibration in use is of {one}").format(
+                other=taken.serial, one=serial
+            ),
+            where=taken.name,
+            advice=tr("Choose a calibration of that sensor"),
+        )
 
 
 def apply_tool(tool: Tool, heightmap: HeightMap) -> ToolResult | str:

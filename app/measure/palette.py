@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
 
 from app.measure.placing import Kind, kinds
 from app.shell.icons import icon
 from app.widgets.naming import named
+from app.widgets.tool_key import add_tool_key
 from gelpolight_core.translation import tr
 
 SIDE = 26
@@ -47,11 +47,9 @@ class Palette(QWidget):
         button.setCheckable(True)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         button.clicked.connect(lambda on, name=kind.name: self._on_clicked(name, on))
-        shortcut = QShortcut(QKeySequence(kind.key), owner)
-        shortcut.setObjectName(f"measure.key.{kind.name}")
-        shortcut.setWhatsThis(kind.label)  # for the sheet of shortcuts
-        shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        shortcut.activated.connect(button.click)
+        add_tool_key(
+            owner, kind.key, button.click, name=f"measure.key.{kind.name}", purpose=kind.label
+        )
         self.buttons[kind.name] = button
         return button
 

@@ -56,6 +56,7 @@ class ResultView(QWidget):
         named(self, "protocol.result", tr("Result of the evaluation"))
         self._work, self._context = work, context
         self._evaluation: Evaluation | None = None
+        self._limits_percent = (0.0, 0.0)
         column = QVBoxLayout(self)
         column.setContentsMargins(12, 10, 12, 10)
         column.setSpacing(8)
@@ -113,9 +114,8 @@ class ResultView(QWidget):
         """Show what came out."""
         self._evaluation = evaluation
         limits = self._context.settings.limits
-        document = evaluation_document(
-            evaluation, limits_percent=(limits.size_percent, limits.height_percent)
-        )
+        self._limits_percent = limits.size_percent, limits.height_percent
+        document = evaluation_document(evaluation, limits_percent=self._limits_percent)
         progress = self._work.run.progress
         word = verdict_word(document.verdict)
         state = (
@@ -169,7 +169,7 @@ class ResultView(QWidget):
         self.progress.setValue(round(100 * share))
 
     def save(self, folder: Path) -> None:
-        """Write every file of the report into a folder."""
+        """Write every file of the report, judged as it is shown, into a folder."""
         if self._evaluation is None:
             return
 
@@ -181,7 +181,7 @@ class ResultView(QWidget):
                 actions=((tr("Open the folder"), lambda: QDesktopServices.openUrl(url)),),
             )
 
-        self._work.write_report(self._evaluation, folder, done)
+        self._work.write_report(self._evaluation, folder, done, limits_percent=self._limits_percent)
 
     def _save_as(self) -> None:
         chosen = QFileDialog.getExistingDirectory(

@@ -169,14 +169,33 @@ class ProtocolWork(QObject):
         self._jobs.submit(Job(tr("Evaluating"), work, self.evaluated.emit, self.refused.emit))
 
     def write_report(
-        self, evaluation: Evaluation, folder: Path, done: Callable[[tuple[Path, ...]], None]
+        self,
+        evaluation: Evaluation,
+        folder: Path,
+        done: Callable[[tuple[Path, ...]], None],
+        *,
+        limits_percent: tuple[float, float],
     ) -> None:
-        """Write every file of the report into a folder, then call `done` with their places."""
+        """Write every file of the report into a folder, then call `done` with their places.
+
+        Parameters
+        ----------
+        evaluation : Evaluation
+            What is reported.
+        folder : Path
+            Made where it is missing.
+        done : callable
+            Given the places of what was written.
+        limits_percent : (float, float)
+            Largest mean absolute errors, planar and in depth, for it to pass.
+        """
 
         def work(tell: Callable[[float], None]) -> tuple[Path, ...]:
             tell(0.1)
             make_folder(folder)
-            return write_evaluation_files(evaluation, folder, calibration=self.calibration)
+            return write_evaluation_files(
+                evaluation, folder, calibration=self.calibration, limits_percent=limits_percent
+            )
 
         self._jobs.submit(Job(tr("Writing the report"), work, done, self.refused.emit))
 

@@ -68,7 +68,7 @@ class RecordBook(QObject):
             self.undo.clear()
             self._take(())  # numbers of the other workspace's are others' here
         if (folder / NAME).exists():
-            self._do(tr("Reading the records"), lambda _records: None)
+            self._do(tr("Reading the records"), _nothing)
         else:
             self._take(())
 
@@ -134,13 +134,15 @@ class RecordBook(QObject):
         folder = workspace.folder
 
         def work(_tell: object) -> tuple[object, tuple[MeasurementRecord, ...], str]:
-            if workspace.folder != folder:
+            records = workspace.records if workspace.folder == folder else None
+            if records is None or records.path != folder / NAME:
+                if change is _nothing:
+                    return None, (), ""  # the other workspace's are read by a job of their own
                 raise InputError(
                     tr("{title}: another workspace was chosen meanwhile").format(title=title),
                     where=str(folder),
                     advice=tr("Choose that workspace again, and do it again"),
                 )
-            records = workspace.records
             result = change(records)
             return result, records.measurements(), records.notice
 
@@ -160,6 +162,10 @@ class RecordBook(QObject):
         if records != self.records:
             self.records = records
             self.changed.emit()
+
+
+def _nothing(_records: Records) -> None:
+    """Change nothing: the records are read."""
 
 
 class _Removal(QUndoCommand):

@@ -13,7 +13,7 @@ from PySide6.QtCore import (
     Signal,
 )
 
-from app.measure.figures_text import value_text
+from app.measure.figures_text import unit_behind, unit_of, value_text
 from app.measure.placing import kind_label
 from app.shell import theme
 from app.shell.icons import icon
@@ -33,8 +33,8 @@ _VERDICTS = {PASSED: ("pass", "pass"), FAILED: ("fail", "fail"), DOUBTFUL: ("war
 def headers() -> tuple[str, ...]:
     """Return what stands above the columns."""
     return (
-        tr("When"), tr("Sensor"), tr("What"), tr("Size or figure"), tr("Error (mm, %)"),
-        tr("Depth"), tr("Error (mm, %)"), tr("Verdict"), tr("Who"), tr("Note"), tr("Picture"),
+        tr("When"), tr("Sensor"), tr("What"), tr("Size or figure"), tr("Error"),
+        tr("Depth"), tr("Error"), tr("Verdict"), tr("Who"), tr("Note"), tr("Picture"),
     )  # fmt: skip
 
 
@@ -53,14 +53,15 @@ def shape_label(shape: str) -> str:
 
 def quantity_text(quantity: Quantity) -> str:
     """Return a value as people write it."""
-    return value_text(quantity.value, quantity.sd, quantity.name.rpartition("_")[2])
+    return value_text(quantity.value, quantity.sd, unit_of(quantity.name))
 
 
 def error_text(quantity: Quantity | None) -> str:
     """Return an error in its unit and in percent; empty where no truth is known."""
     if quantity is None or quantity.error is None or quantity.error_percent is None:
         return ""
-    return f"{quantity.error:+.3f}, {quantity.error_percent:+.2f} %"
+    behind = unit_behind(unit_of(quantity.name))
+    return f"{quantity.error:+.3f}{behind}, {quantity.error_percent:+.2f} %"
 
 
 class RecordModel(QAbstractTableModel):

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.measure.drift_plot import DriftPlot
+from app.measure.figures_text import unit_behind, unit_of
 from app.measure.record_book import RecordBook
 from app.measure.record_table import (
     NOTE,
@@ -263,10 +264,10 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
         return ""
     first = group[0]
     title = tr("{n} x {what}").format(n=len(group), what=shape_label(first.shape))
-    known = [q.truth for q in first.quantities if q.truth is not None]
+    known = [q for q in first.quantities if q.truth is not None]
     if known:
-        sizes = ", ".join(f"{value:g}" for value in known)
-        title += tr(", true {sizes} mm").format(sizes=sizes)
+        sizes = ", ".join(f"{q.truth:g}{unit_behind(unit_of(q.name))}" for q in known)
+        title += tr(", true {sizes}").format(sizes=sizes)
     rows = []
     for quantity in first.quantities[:2]:
         found = [record.quantity(quantity.name) for record in group]

@@ -111,6 +111,11 @@ class TruthForm(QGroupBox):
         """Offer these known indenters."""
         self._indenters = indenters
         self._fill_known()
+        for kind, stated in self._kept.items():
+            self._kept[kind] = self._listed(kind, stated.name) or stated
+        found = self._listed(self._kind, self.known.currentData())
+        if found is not None:
+            self.state(found)
 
     def show_kind(self, kind: str, label: str, unit: str) -> None:
         """Ask for the truth of a kind of tool; what was stated of it before is still there.
@@ -163,11 +168,17 @@ class TruthForm(QGroupBox):
                     self.known.addItem(indenter.name, indenter.name)
             self.known.setCurrentIndex(max(self.known.findData(chosen), 0))
 
+    def _listed(self, kind: str, name: str) -> Stated | None:
+        """Return what the list says of an indenter; None where it does not know it."""
+        for indenter in self._indenters:
+            if (indenter.shape, indenter.name) == (kind, name):
+                return Stated(indenter.mean_size_mm, indenter.height_mm, name)
+        return None
+
     def _on_known(self) -> None:
-        name = self.known.currentData()
-        found = next((i for i in self._indenters if i.name == name), None)
+        found = self._listed(self._kind, self.known.currentData())
         if found is not None:
-            self._show(Stated(found.mean_size_mm, found.height_mm, found.name))
+            self._show(found)
         self.changed.emit()
 
     def _on_typed(self) -> None:

@@ -118,6 +118,7 @@ class Work(QObject):
         self._reconstructor = reconstructor
         self.answer = None
         self.picture_changed.emit()
+        self.changed.emit()
         self._ask()
 
     def take(self, taken: Taken | None, *, propose: bool = False) -> None:
@@ -231,7 +232,7 @@ class Work(QObject):
             self._say_busy(False)
         if answered is None or answered.question is None:
             return
-        if answered.question.taken is not self.taken:
+        if not self._is_of_now(answered.question):
             return
         if isinstance(answered.error, InputError):
             self.refused.emit(str(answered.error))
@@ -241,6 +242,16 @@ class Work(QObject):
             self.refused.emit(tr("A fault of this program: {k}; the log has it.").format(k=kind))
         elif answered.answer is not None:
             self._show(answered.question, answered.answer)
+
+    def _is_of_now(self, question: Question) -> bool:
+        """Return whether a question is of the picture and the calibration that are in use."""
+        maker = self._reconstructor
+        return (
+            maker is not None
+            and question.calibration is maker.calibration
+            and question.model == maker.model
+            and question.taken is self.taken
+        )
 
     def _show(self, question: Question, answer: Answer) -> None:
         before, self.answer = self.answer, answer

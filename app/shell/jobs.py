@@ -140,6 +140,7 @@ class Jobs(QObject):
         assert job.future is not None
         if not job.future.done():  # it goes on as long as the program runs
             _LOG.error("%s was not done when it was closed", job.title)
+            job.future.add_done_callback(partial(_log_late, job.title))
             sentence = tr("{title}: not done yet; leave the program running for a while")
             self.refused.emit(sentence.format(title=job.title))
             return
@@ -215,3 +216,9 @@ class Jobs(QObject):
         if said != self._said:
             self._said = said
             self.progressed.emit(*said)
+
+
+def _log_late(title: str, future: Future[Any]) -> None:
+    """Log what became of a job that nobody waits for any more; in whatever thread ends it."""
+    if not future.cancelled() and (error := future.exception()) is not None:
+        _LOG.error("%s failed after it was closed", title, exc_info=error)

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QScrollArea, QVBoxLayou
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from app.widgets.qt_tree import below
+from app.widgets.tool_key import PURPOSE
 from gelpolight_core.translation import tr
 
 # What a group is called where its part of the program has another name than people know.
@@ -31,8 +32,8 @@ class Shortcut:
 def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
     """Return the shortcuts in a window that can be used, in the order of their groups.
 
-    They are those of named actions, and named shortcuts that say what they are for (``whatsThis``).
-    The group is the first part of the object name (``sensors.import``).
+    They are those of named actions and of tools. The group is the first part of the object name
+    (``sensors.import``).
     """
     found = []
     for action in below(window, QAction):
@@ -43,10 +44,11 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
             group = action.objectName().partition(".")[0]
             found.append(Shortcut(group, keys, action.text().replace("&", "").rstrip(".… ")))
     for shortcut in below(window, QShortcut):
-        if shortcut.objectName() and shortcut.whatsThis() and shortcut.isEnabled():
+        purpose = shortcut.property(PURPOSE)
+        if purpose and shortcut.isEnabled():
             group = shortcut.objectName().partition(".")[0]
             keys = shortcut.key().toString(QKeySequence.SequenceFormat.NativeText)
-            found.append(Shortcut(group, keys, shortcut.whatsThis()))
+            found.append(Shortcut(group, keys, purpose))
     return tuple(sorted(dict.fromkeys(found), key=lambda s: s.group))
 
 

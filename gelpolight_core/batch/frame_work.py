@@ -30,6 +30,7 @@ from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
+from gelpolight_core.recording.recording import RecordedFrame
 from gelpolight_core.session.picture import Picture, linear_picture
 from gelpolight_core.session.session import read_picture, require_colour
 from gelpolight_core.translation import tr
@@ -149,6 +150,17 @@ class _FrameWorker:
         return _described(row, heightmap, shape), heightmap
 
     def _recorded(self, job: Job, index: int, row: FrameRow) -> tuple[Picture, FrameRow]:
+        try:
+            frame = self._frame(job, index)
+        except InputError:
+            if not self._forget_changed():
+                raise
+            frame = self._frame(job, index)
+        response = self._reconstructor.calibration.response
+        picture = linear_picture(frame.rgb, job.name, response=response)
+        return picture, replace(row, number=frame.number, time_s=frame.time_s)
+
+    def _frame(self, job: Job, index: int) -> RecordedFrame:
         recording = self._opened(job.path)
         if index >= len(recording):
             raise InputError(
@@ -163,19 +175,30 @@ class _FrameWorker:
                 where=str(job.path),
                 advice=tr("Give the command again, which looks at the recording anew"),
             )
-        response = self._reconstructor.calibration.response
-        picture = linear_picture(frame.rgb, job.name, response=response)
-        return picture, replace(row, number=frame.number, time_s=frame.time_s)
+        return frame
 
     def _opened(self, path: Path) -> Recording:
         """Return a recording; its frames come one by one, and finding them takes a while."""
-        mark = _file_mark(path)
-        if self._recording is None or self._recording.path != path or self._mark != mark:
-            if self._recording is not None:
-                self._recording.close()
-                self._recording = None
+        if self._recording is None or self._recording.path != path:
+            self._close()
+            mark = _file_mark(path)
             self._recording, self._mark = Recording.open(path), mark
         return self._recording
+
+    def _forget_changed(self) -> bool:
+        """Close a recording whose file is another than when it was opened; return whether it was.
+
+        A cluster's workers live long; but one that grows is not searched anew for every frame.
+        """
+        if self._recording is None or self._mark == _file_mark(self._recording.path):
+            return False
+        self._close()
+        return True
+
+    def _close(self) -> None:
+        if self._recording is not None:
+            self._recording.close()
+            self._recording = None
 
     def _write(self, heightmap: HeightMap, job: Job) -> None:
         folder = self._out / PurePosixPath(job.output).parent
@@ -196,7 +219,7 @@ class _CannotWrite(Exception):
 
 
 def _file_mark(path: Path) -> tuple[int, ...]:
-    """Return what tells that a file was replaced or written on; a cluster's workers live long."""
+    """Return what tells that a file was replaced or written on."""
     try:
         found = path.stat()
     except OSError:  # opening it says why, in words

@@ -69,6 +69,7 @@ class KeptSession:
         self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
         self._session = read_session(folder)
         self._replaced: dict[str, _Replaced] = {}
+        self._dropped = 0  # how often pictures were written that did not stay
 
     @property
     def session(self) -> Session:
@@ -181,6 +182,7 @@ class KeptSession:
         return tuple(names)
 
     def _drop(self, folder: str, names: Sequence[str]) -> None:
+        self._dropped += 1
         for name in names:
             (self._session.folder / folder / name).unlink(missing_ok=True)
         radii = self._session.ball_radii_mm
@@ -379,7 +381,7 @@ class KeptSession:
             now = self._session.decisions
             # A spot was placed in the picture that goes.
             spots = {} if folder == FOLDERS[Stage.LIGHTS] else now.spots_px
-            if former:
+            if former or spots != now.spots_px:
                 self.decide(replace(now, excluded=now.excluded | former, spots_px=spots))
                 gone = {k: v for k, v in now.spots_px.items() if k not in spots}
                 first = min(f"{folder}/{name}" for name in names)

@@ -265,7 +265,10 @@ def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
 
 
 def _provenance(session: Session) -> Provenance:
-    sources = {f"{path.parent.name}/{path.name}": file_hash(path) for path in source_files(session)}
+    sources = {
+        _as_text(f"{path.parent.name}/{path.name}"): file_hash(path)
+        for path in source_files(session)
+    }
     for name in ("session.toml", DECISIONS_FILE):
         if (session.folder / name).is_file():
             sources[name] = file_hash(session.folder / name)
@@ -274,8 +277,13 @@ def _provenance(session: Session) -> Provenance:
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         operator=user_name(),
         program_version=__version__,
-        session=session.folder.resolve().name,
+        session=_as_text(session.folder.resolve().name),
         sources=sources,
         inputs=all_inputs(session),
         camera_settings={} if camera is None else camera.as_texts(),
     )
+
+
+def _as_text(name: str) -> str:
+    """Return a file's name so that a calibration file can hold it, in whatever bytes it is kept."""
+    return name.encode("utf-8", "backslashreplace").decode()

@@ -21,7 +21,7 @@ from gelpolight_core.calibration.inputs import (
     inputs_of,
 )
 from gelpolight_core.calibration.kept_session import KeptSession
-from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, stages_of
+from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, source_files, stages_of
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.status import StageState, StageStatus, judged
@@ -110,7 +110,8 @@ class CalibrationProject(KeptSession):
     def compute(self, stage: Stage, tell: Callable[[float], None] | None = None) -> StageStatus:
         """Run one stage on the present pictures and decisions, and keep its result.
 
-        A stage that cannot be completed keeps its fault as its status.
+        A stage that cannot be completed keeps its fault as its status. One whose earlier stages
+        have to be computed first stays as it is.
 
         Parameters
         ----------
@@ -120,17 +121,23 @@ class CalibrationProject(KeptSession):
             Told the share done; it may raise :class:`Cancelled`, which leaves all as it was.
         """
         with self._lock:
-            session, results = self._session, self._results
+            session, results, dropped = self._session, self._results, self._dropped
             inputs = inputs_of(session, self._hashes)
+            for earlier in NEEDS[stage]:
+                outcome = self._outcomes.get(earlier)
+                if outcome is not None and outcome.inputs != inputs[earlier]:
+                    return self._status(stage, inputs)
         fault = None
         try:
             results = run_stage(stage, session, results, tell=tell)
         except InputError as error:
             fault = error
         with self._lock:
-            if fault is None:
-                self._results = results
-            self._outcomes[stage] = _Outcome(inputs[stage], fault)
+            # A picture that came and went meanwhile may be in the result, and in no input.
+            if self._dropped == dropped:
+                if fault is None:
+                    self._results = results
+                self._outcomes[stage] = _Outcome(inputs[stage], fault)
             return self._status(stage, inputs_of(self._session, self._hashes))
 
     def finish(self, *, model: str = MODELS[-1]) -> CalibrationRun:
@@ -155,7 +162,7 @@ class CalibrationProject(KeptSession):
                 if fault is not None:
                     raise fault
             session, results = self._session, self._results
-        refuse_copies(path for folder in FOLDERS.values() for path in session.files(folder))
+        refuse_copies(source_files(session))
         return assemble(session, results, model=model)
 
     def _status(self, stage: Stage, inputs: Mapping[Stage, StageInputs]) -> StageStatus:

@@ -21,6 +21,10 @@ def jackknife_covariance(
 ) -> Array:
     """Return the covariance of the parameters that all presses share.
 
+    A lone press leaves nothing out to compare it with. What is returned then is a lower bound: the
+    covariance of least squares, as if the pixels erred each by itself, and as much larger as the
+    residuals exceed their weights.
+
     Parameters
     ----------
     jacobians : sequence of (N_i, P)
@@ -44,6 +48,11 @@ def jackknife_covariance(
     normal = [j.T @ j for j in jacobians]
     total = np.sum(normal, axis=0) + prior
     count = len(jacobians)
+    inverse = np.linalg.pinv(total, hermitian=True)
+    by_priors = (inverse @ prior @ inverse)[:common, :common]
+    if count < 2:
+        excess = max(_reduced_chi_square(jacobians, residuals), 1.0)
+        return np.asarray(excess * (inverse @ normal[0] @ inverse)[:common, :common] + by_priors)
     moves = np.array(
         [
             np.linalg.pinv(total - own, hermitian=True)[:common] @ (j.T @ r)
@@ -51,6 +60,11 @@ def jackknife_covariance(
         ]
     )
     moves -= moves.mean(axis=0)
-    inverse = np.linalg.pinv(total, hermitian=True)
-    by_priors = (inverse @ prior @ inverse)[:common, :common]
     return np.asarray((count - 1) / count * moves.T @ moves + by_priors)
+
+
+def _reduced_chi_square(jacobians: Sequence[Array], residuals: Sequence[Array]) -> float:
+    # Pixels of weight 0 have empty rows, parameters that are held or not seen empty columns.
+    rows = np.concatenate(jacobians) != 0.0
+    freedom = int(rows.any(axis=1).sum()) - int(rows.any(axis=0).sum())
+    return float(np.sum(np.concatenate(residuals) ** 2)) / max(freedom, 1)

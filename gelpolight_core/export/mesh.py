@@ -158,7 +158,8 @@ class _AppendedArrays:
 
     def add_text(self, name: str, text: str) -> str:
         """Append one text: its UTF-8 bytes and a closing NUL."""
-        codes = np.frombuffer(text.encode() + b"\0", dtype=np.uint8)
+        # A file's name need not be text: bytes of it that are none stay readable as \udcXX.
+        codes = np.frombuffer(text.encode("utf-8", "backslashreplace") + b"\0", dtype=np.uint8)
         return self.add(name, codes, "String", 'NumberOfTuples="1"')
 
 

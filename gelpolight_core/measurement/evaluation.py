@@ -457,32 +457,64 @@ def _repeatability(results: Sequence[PressResult]) -> tuple[Repeatability, ...]:
 
 def _variances(results: Sequence[PressResult], direction: str) -> tuple[float, float]:
     """Return the variances (mm**2) within a region and between regions."""
-    squares, freedom = 0.0, 0
-    spread: list[tuple[float, int, float]] = []
-    for presses in _by_object(results).values():
-        places: dict[str, list[float]] = defaultdict(list)
-        for result in presses:
-            value = _measured_mm(result, direction)
-            # "random" names no place: two such presses are not repeats of each other.
-            if math.isfinite(value) and result.press.region:
-                said = result.press.region
-                key = f"{said} {result.press.file}" if said.lower() == "random" else said
-                places[key].append(value)
-        for values in places.values():
-            squares += float(np.var(values)) * len(values)
-            freedom += len(values) - 1
-        if len(places) > 1:
-            means = [float(np.mean(values)) for values in places.values()]
-            share = float(np.mean([1.0 / len(values) for values in places.values()]))
-            spread.append((float(np.var(means, ddof=1)), len(means) - 1, share))
-    within = squares / freedom if freedom else math.nan
-    if not spread:
+    objects = [lengths_by_place(own, direction) for own in _by_object(results).values()]
+    within = variance_within([place for places in objects for place in places])
+    moved = [places for places in objects if len(places) > 1]
+    if not moved:
         return within, math.nan
-    # The means of few repeats scatter by themselves; only what exceeds that is due to the place.
     noise = 0.0 if math.isnan(within) else within
-    degrees = sum(n for _, n, _ in spread)
-    between = sum(n * (variance - share * noise) for variance, n, share in spread) / degrees
-    return within, max(between, 0.0)
+    degrees = sum(len(places) - 1 for places in moved)
+    between = sum((len(places) - 1) * variance_between(places, noise) for places in moved)
+    return within, max(between / degrees, 0.0)
+
+
+def lengths_by_place(results: Iterable[PressResult], direction: str) -> list[list[float]]:
+    """Return the measured lengths (mm) of an object, a list for each place it was pressed at.
+
+    Parameters
+    ----------
+    results : iterable of PressResult
+        Of one object; presses without a region or a measurement are left out.
+    direction : str
+        ``planar`` (its size) or ``depth`` (its height).
+    """
+    places: dict[str, list[float]] = defaultdict(list)
+    for result in results:
+        value = _measured_mm(result, direction)
+        # "random" names no place: two such presses are not repeats of each other.
+        if math.isfinite(value) and result.press.region:
+            said = result.press.region
+            key = f"{said} {result.press.file}" if said.lower() == "random" else said
+            places[key].append(value)
+    return list(places.values())
+
+
+def variance_within(places: Sequence[Sequence[float]]) -> float:
+    """Return the variance (mm**2) of repeats at one place, pooled; NaN without repeats.
+
+    Parameters
+    ----------
+    places : sequence of sequences of float
+        Lengths (mm) from :func:`lengths_by_place`, of one object or of several.
+    """
+    freedom = sum(len(values) - 1 for values in places)
+    squares = sum(float(np.var(values)) * len(values) for values in places)
+    return squares / freedom if freedom else math.nan
+
+
+def variance_between(places: Sequence[Sequence[float]], within: float) -> float:
+    """Return the variance (mm**2) that going to another place adds, below 0 where it adds none.
+
+    Parameters
+    ----------
+    places : sequence of sequences of float
+        Lengths (mm) of one object from :func:`lengths_by_place`, of two places or more.
+    within : float
+        Variance (mm**2) of repeats at one place.
+    """
+    # The means of few repeats scatter by themselves; only what exceeds that is due to the place.
+    share = float(np.mean([1.0 / len(values) for values in places]))
+    return float(np.var([np.mean(values) for values in places], ddof=1)) - share * within
 
 
 def _measured_mm(result: PressResult, direction: str) -> float:

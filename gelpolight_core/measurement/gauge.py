@@ -14,7 +14,10 @@ from gelpolight_core.measurement.evaluation import (
     SAME,
     Evaluation,
     PressResult,
+    lengths_by_place,
     region_kinds,
+    variance_between,
+    variance_within,
 )
 from gelpolight_core.measurement.result import Truth
 
@@ -26,11 +29,11 @@ class Series:
     Attributes
     ----------
     count : int
-        Measured presses.
+        Measured presses, or regions.
     mean_mm : float
         NaN without any.
     sd_mm : float
-        Standard deviation; NaN with fewer than two.
+        Standard deviation; NaN where there are too few.
     """
 
     count: int
@@ -49,9 +52,10 @@ class GaugeRow:
     truth : Truth
         The object.
     same : Series
-        Repeats in one region: their sd is the repeatability.
+        Repeats in one region, or in each of several: their sd about the region's mean is the
+        repeatability.
     random : Series
-        One press in each of several regions.
+        One value for each of several regions: its press, or the mean of its repeats.
     reproducibility_mm : float
         Standard deviation that going to another region adds to the repeatability; NaN where one
         of the two is not known.
@@ -85,9 +89,9 @@ def gauge_rows(evaluation: Evaluation) -> tuple[GaugeRow, ...]:
         )
         objects = sorted({*same, *random}, key=lambda t: (t.shape, t.size_mm, t.height_mm))
         for truth in objects:
-            here = _series(same.get(truth, []), direction)
-            there = _series(random.get(truth, []), direction)
-            rows.append(GaugeRow(direction, truth, here, there, _added(here, there)))
+            repeated = lengths_by_place(same.get(truth, []), direction)
+            regions = lengths_by_place(random.get(truth, []), direction)
+            rows.append(_row(direction, truth, repeated, regions))
     return tuple(rows)
 
 
@@ -98,18 +102,27 @@ def _by_object(results: tuple[PressResult, ...]) -> dict[Truth, list[PressResult
     return objects
 
 
-def _series(results: list[PressResult], direction: str) -> Series:
-    found = [r.measurement for r in results if r.measurement is not None]
-    values = np.array([m.size_mm if direction == "planar" else m.height_mm for m in found])
-    return Series(
-        int(values.size),
-        float(values.mean()) if values.size else math.nan,
-        float(values.std(ddof=1)) if values.size > 1 else math.nan,
+def _row(
+    direction: str, truth: Truth, repeated: list[list[float]], regions: list[list[float]]
+) -> GaugeRow:
+    within = variance_within(repeated)
+    presses = [value for values in repeated for value in values]
+    means = [float(np.mean(values)) for values in regions]
+    added = math.nan
+    if len(means) > 1 and math.isfinite(within):
+        added = math.sqrt(max(variance_between(regions, within), 0.0))
+    return GaugeRow(
+        direction,
+        truth,
+        Series(len(presses), _mean(presses), math.sqrt(within)),
+        Series(len(means), _mean(means), _sd(means)),
+        added,
     )
 
 
-def _added(same: Series, random: Series) -> float:
-    """Return what regions add: presses in different regions scatter by repeats too."""
-    if math.isnan(same.sd_mm) or math.isnan(random.sd_mm):
-        return math.nan
-    return math.sqrt(max(random.sd_mm**2 - same.sd_mm**2, 0.0))
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values)) if values else math.nan
+
+
+def _sd(values: list[float]) -> float:
+    return float(np.std(values, ddof=1)) if len(values) > 1 else math.nan

@@ -74,14 +74,13 @@ def evaluation_document(
 
 def _judged(evaluation: Evaluation, direction: str, limits: dict[str, float]) -> tuple[Figure, ...]:
     name = {"planar": tr("planar"), "depth": tr("depth")}[direction]
-    mean = evaluation.overall(direction).mean_absolute_percent
-    if not math.isfinite(mean) and not evaluation.failed:
+    if not evaluation.series(direction):
         return ()  # no press was made yet that says something of this direction
     found = [
         judge(
             f"{direction}_mean",
             tr("Mean absolute error, {direction}").format(direction=name),
-            mean,
+            evaluation.overall(direction).mean_absolute_percent,
             "%",
             fail=limits[direction],
             advice=tr("Calibrate again, or look at the presses that are worst"),
@@ -253,18 +252,20 @@ def _sentence(evaluation: Evaluation) -> str:
     measured = count - len(evaluation.failed)
     if not measured:
         return tr("None of {n} presses could be measured").format(n=count)
-    return tr(
-        "{measured} of {n} presses were measured; mean absolute error {planar:.2f} % in the planar "
-        "direction and {depth:.2f} % in the depth direction (the paper: about {p:.0f} % and "
-        "{d:.0f} %)"
-    ).format(
-        measured=measured,
-        n=count,
-        planar=evaluation.overall("planar").mean_absolute_percent,
-        depth=evaluation.overall("depth").mean_absolute_percent,
-        p=PAPER_PERCENT["planar"],
-        d=PAPER_PERCENT["depth"],
-    )
+    said = [tr("{measured} of {n} presses were measured").format(measured=measured, n=count)]
+    texts = {
+        "planar": tr(
+            "mean absolute error in the planar direction {e:.2f} % (paper: about {p:.0f} %)"
+        ),
+        "depth": tr(
+            "mean absolute error in the depth direction {e:.2f} % (paper: about {p:.0f} %)"
+        ),
+    }
+    for direction, text in texts.items():
+        error = evaluation.overall(direction).mean_absolute_percent
+        if math.isfinite(error):
+            said.append(text.format(e=error, p=PAPER_PERCENT[direction]))
+    return "; ".join(said)
 
 
 def _percent(value: float, *, sign: bool = False) -> str:

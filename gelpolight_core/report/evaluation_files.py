@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.measurement.evaluation import Evaluation
+from gelpolight_core.measurement.evaluation import PAPER_PERCENT, Evaluation
 from gelpolight_core.measurement.evaluation_report import write_evaluation
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
 from gelpolight_core.report.evaluation_document import evaluation_document
@@ -32,7 +32,11 @@ GAUGE_COLUMNS = (
 
 
 def write_evaluation_files(
-    evaluation: Evaluation, folder: Path, *, calibration: Calibration | None = None
+    evaluation: Evaluation,
+    folder: Path,
+    *,
+    calibration: Calibration | None = None,
+    limits_percent: tuple[float, float] = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"]),
 ) -> tuple[Path, ...]:
     """Write ``evaluation.txt``, ``.csv``, ``.json``, ``.png``, ``.html``, ``.pdf`` and a gauge CSV.
 
@@ -44,6 +48,8 @@ def write_evaluation_files(
         Where to; it must exist.
     calibration : Calibration, optional
         Named in the report.
+    limits_percent : (float, float), optional
+        Largest mean absolute errors, planar and in depth, for it to pass.
 
     Returns
     -------
@@ -56,7 +62,9 @@ def write_evaluation_files(
         A file cannot be written.
     """
     written = list(write_evaluation(evaluation, folder))
-    document = evaluation_document(evaluation, facts=calibration_facts(calibration))
+    document = evaluation_document(
+        evaluation, facts=calibration_facts(calibration), limits_percent=limits_percent
+    )
     for ending in (".html", ".pdf"):
         path = folder / f"evaluation{ending}"
         write_report(document, path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.report.drawing import CHANNELS
 from gelpolight_core.translation import tr
 
@@ -91,20 +91,10 @@ def _crosstalk_facts(c: Calibration) -> Facts:
 def _joint_facts(c: Calibration) -> Facts:
     assert c.full is not None
     m = c.full.membrane
-    before, after = c.full.held_out
-    kept = {
-        "refined": tr("the refined ones: they explain held-out presses better"),
-        "mirror": tr("the mirror's: refining them did not help on held-out presses"),
-    }.get(c.full.kept, c.full.kept)
     return (
-        (tr("LEDs that are used"), kept),
+        *_kept_facts(c.full),
         *_led_facts(c.full.led_positions_mm, c.full.led_sd_mm),
-        (
-            tr("Loss on held-out presses"),
-            tr("{before:.3g} with the mirror's LEDs, {after:.3g} refined").format(
-                before=before, after=after
-            ),
-        ),
+        *_loss_facts(c.full),
         (
             tr("Membrane ({form})").format(form=tr(c.full.membrane_kept)),
             tr(
@@ -112,6 +102,29 @@ def _joint_facts(c: Calibration) -> Facts:
             ).format(gloss=m.gloss, roughness=m.roughness, bounce=m.bounce),
         ),
     )
+
+
+def _kept_facts(full: FullModel) -> Facts:
+    kept = {
+        "refined": tr("the refined ones: they explain held-out presses better"),
+        "mirror": tr("the mirror's: refining them did not help on held-out presses"),
+    }.get(full.kept, full.kept)
+    if full.kept == "mirror" and not _held_out(full):
+        kept = tr("the mirror's: there were too few presses to hold any out")
+    return ((tr("LEDs that are used"), kept),)
+
+
+def _loss_facts(full: FullModel) -> Facts:
+    if not _held_out(full):
+        return ()
+    before, after = full.held_out
+    text = tr("{before:.3g} with the mirror's LEDs, {after:.3g} refined")
+    return ((tr("Loss on held-out presses"), text.format(before=before, after=after)),)
+
+
+def _held_out(full: FullModel) -> bool:
+    """Return whether presses were held out: without any, no loss was measured."""
+    return full.held_out[0] > 0.0
 
 
 def _vector(values: np.ndarray, digits: int) -> str:

@@ -91,9 +91,12 @@ class Session:
 
     @property
     def optional_stages(self) -> tuple[str, ...]:
-        """The stages that this session has, of those that a session may lack."""
-        has_series = bool(self.exposures_ms) or (self.folder / "response").is_dir()
-        has_single = (self.folder / "single_led").is_dir()
+        """The stages that this session has, of those that a session may lack.
+
+        An empty folder is none; exposure times without pictures are: something is missing there.
+        """
+        has_series = bool(self.exposures_ms or self.captured("response"))
+        has_single = bool(self.captured("single_led"))
         return ("response",) * has_series + ("single_led",) * has_single
 
     def captured(self, stage: str) -> tuple[Path, ...]:

@@ -127,7 +127,7 @@ def test_inputs_that_cannot_be_are_refused_in_one_line(
     (frames / "run" / "run_000003.png").write_bytes((day / "left" / "a.png").read_bytes())
     (frames / "run" / "run_000004.png").write_bytes((day / "left" / "a.png").read_bytes())
     for inputs, words in (
-        ([frames], "two inputs would have results named frames/run/run_000003"),
+        ([frames], "the name of a frame's result: frames/run/run_000003"),
         ([tmp_path / "empty"], "there are no frames"),
         ([tmp_path / "none"], "there is no such file or folder"),
         ([day, "-o", tmp_path], "the input lies in the folder of the results"),
@@ -135,6 +135,15 @@ def test_inputs_that_cannot_be_are_refused_in_one_line(
     ):
         assert command(*inputs) == MENDABLE
         assert words in said(capsys)
+
+
+def test_a_picture_called_as_a_frame_that_is_not_wanted_is_no_trouble(
+    command, day: Path, tmp_path: Path
+) -> None:
+    (day / "run").mkdir()
+    (day / "run" / "run_000003.png").write_bytes((day / "left" / "a.png").read_bytes())
+    assert command(day, "--frames", "0:1") == 0
+    assert command(day, "-o", tmp_path / "all") == MENDABLE
 
 
 def test_results_within_the_input_are_no_input(command, day: Path) -> None:

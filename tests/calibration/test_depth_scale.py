@@ -103,6 +103,23 @@ def test_leaving_presses_out_shows_errors_that_a_press_has_as_a_whole() -> None:
     assert np.sqrt(np.mean(naive)) < 0.3 * seen
 
 
+def test_a_lone_press_is_known_no_better_than_its_own_pixels_say() -> None:
+    random = np.random.default_rng(4)
+    rows = np.stack([np.ones(40), random.uniform(size=40), np.zeros(40)], axis=1)
+    errors = random.normal(size=40)
+    left = errors - rows @ np.linalg.lstsq(rows, errors, rcond=None)[0]
+    weightless = np.zeros((5, 3))
+    inverse = np.linalg.inv(rows[:, :2].T @ rows[:, :2])
+    prior = np.zeros((1, 3))
+    # Larger residuals than the weights say widen it; smaller ones do not narrow it.
+    for size, excess in ((3.0, 9.0 * float(left @ left) / 38), (0.1, 1.0)):
+        residuals = size * np.concatenate([left, np.zeros(5)])
+        covariance = jackknife_covariance(
+            [np.concatenate([rows, weightless])], [residuals], prior, common=2
+        )
+        np.testing.assert_allclose(covariance, excess * inverse, rtol=1e-9)
+
+
 def test_a_prior_that_alone_decides_gives_its_own_deviation() -> None:
     weak = [np.array([[1e-6]])] * 4
     prior = np.array([[1.0 / 0.05]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import cv2
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.pipeline import calibrate_session
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.pipeline import assemble, calibrate_session
+from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.session import read_session
 
@@ -35,3 +38,20 @@ def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
     cv2.imwrite(str(path), np.round(0.1 * picture).astype(np.uint8))
     with pytest.raises(InputError, match="whiteboard"):
         calibrate_session(read_session(session))
+
+
+def test_names_that_are_not_text_make_a_calibration_that_can_be_read(
+    small_project: CalibrationProject, tmp_path: Path
+) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    try:
+        shutil.copytree(small_project.session.folder, folder)
+        path = folder / "background" / "background.png"
+        path.rename(path.with_name(os.fsdecode(b"b\xe9.png")))
+    except OSError:
+        pytest.skip("this disk keeps names as text")
+    calibration = assemble(read_session(folder), small_project.results).calibration
+    write_calibration(calibration, tmp_path / "c.gplcal")
+    provenance = read_calibration(tmp_path / "c.gplcal").provenance
+    assert provenance.session == r"caf\udce9"
+    assert r"background/b\udce9.png" in provenance.sources

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from gelpolight_core.calibration import project as project_module
 from gelpolight_core.calibration import stages
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.inputs import Stage
@@ -308,3 +309,45 @@ def test_a_press_that_is_captured_while_the_others_are_looked_at_waits_for_the_n
     assert captured
     assert project.statuses()[Stage.BALLS].state is StageState.STALE
     assert project.compute(Stage.BALLS).state in (StageState.PASS, StageState.WARN)
+
+
+def test_a_stage_is_not_computed_on_what_is_stale_itself(project: CalibrationProject) -> None:
+    project.exclude(Stage.LENS, project.session.found("checkerboard")[0].name)
+    assert project.compute(Stage.TOP_POSE).state is StageState.STALE
+    assert Stage.TOP_POSE in project.stale()
+    project.compute(Stage.LENS)
+    assert Stage.TOP_POSE in project.stale()
+
+
+def test_a_picture_that_comes_and_goes_while_a_stage_is_computed_is_in_no_result(
+    project: CalibrationProject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project.exclude(Stage.RADIANCE, "none.png")
+    run_stage = project_module.run_stage
+
+    def meanwhile(*arguments: object, **options: object) -> object:
+        decisions = project.session.folder / "decisions.toml"
+        text = decisions.read_text()
+        decisions.write_text(text + "# by another program\n")
+        with pytest.raises(InputError, match="nothing was written"):
+            project.add_capture(Stage.RADIANCE, [np.full((240, 320, 3), 90, np.uint8)])
+        decisions.write_text(text)
+        return run_stage(*arguments, **options)
+
+    monkeypatch.setattr(project_module, "run_stage", meanwhile)
+    before = project.results
+    project.compute(Stage.RADIANCE)
+    assert project.results is before
+    monkeypatch.undo()
+    project.compute(Stage.RADIANCE)
+    assert project.results is not before
+
+
+def test_a_spot_placed_in_a_view_that_was_left_out_is_not_kept_for_the_next(
+    project: CalibrationProject,
+) -> None:
+    project.place_spot(1, (100.25, 50.5))
+    for path in project.session.found("mirror"):
+        project.exclude(Stage.LIGHTS, path.name)
+    project.add_capture(Stage.LIGHTS, [np.zeros((240, 320, 3), np.uint8)])
+    assert not project.session.decisions.spots_px

@@ -44,6 +44,30 @@ def test_the_shape_is_found_by_itself(
     assert capsys.readouterr().out.splitlines()[0].split() == ["shape", "cylinder"]
 
 
+@pytest.mark.parametrize(
+    ("seed", "place"),
+    [(["9", "-9"], "(9, -9)"), (["9,-9"], "(9, -9)"), (["-9,9"], "(-9, 9)")],
+)
+def test_the_object_is_named_by_a_place_in_either_manner(
+    calibration: Path,
+    press: Path,
+    capsys: pytest.CaptureFixture[str],
+    seed: list[str],
+    place: str,
+) -> None:
+    arguments = ("measure", str(calibration), str(press), "--shape", "cylinder", "--seed", *seed)
+    assert f"no object lies at the seed point {place} mm" in refusal(capsys, *arguments)
+
+
+def test_a_place_on_an_object_is_not_ignored_beside_stored_tools(
+    press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored = tmp_path / "tools.json"
+    stored.write_text('[{"tool": "ball"}]')
+    arguments = ("measure", "none.gplcal", str(press), "--tools", str(stored), "--seed", "1,2")
+    assert "--seed: it does not go with" in refusal(capsys, *arguments)
+
+
 def test_a_profile_is_written_as_a_table(calibration: Path, press: Path, tmp_path: Path) -> None:
     file = tmp_path / "section.csv"
     ends = ["--from", "-6,0.5", "--to", "6", "-0.5", "--width", "0.4"]
@@ -79,6 +103,9 @@ def test_drift_is_told_and_the_zeroed_calibration_is_usable(
         (["--tools", "nowhere.json"], "cannot be read as JSON"),
         (["--shape", "ball", "--at", "1", "2"], "does not go with --shape"),
         (["--tool", "ball", "--truth", "truth.csv"], "--truth"),
+        (["--tool", "ball", "--seed", "1", "2"], "--seed: it does not go with"),
+        (["--shape", "ball", "--seed", "1", "2", "3,4"], "2 places are given"),
+        (["--shape", "ball", "--seed", "1"], "1 numbers"),
     ],
 )
 def test_a_tool_that_is_not_described_is_refused_in_one_line(

@@ -56,3 +56,23 @@ def test_a_folder_without_records_is_refused_and_stays_empty(
 ) -> None:
     assert "there are no records" in refusal(capsys, "records", "--workspace", str(tmp_path))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_table_does_not_take_the_place_of_the_records(
+    workspace: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    chosen = ("records", "--workspace", str(workspace), "--csv")
+    kept = (workspace / NAME).read_bytes()
+    assert "take the place" in refusal(capsys, *chosen, str(workspace / NAME))
+    assert (workspace / NAME).read_bytes() == kept
+
+
+def test_a_table_that_cannot_be_written_is_refused_before_the_records_are_read(
+    workspace: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_arguments: object) -> None:
+        raise AssertionError("the records are read")
+
+    monkeypatch.setattr(Records, "measurements", fail)
+    chosen = ("records", "--workspace", str(workspace), "--csv")
+    assert "a folder stands" in refusal(capsys, *chosen, str(workspace))

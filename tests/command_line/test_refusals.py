@@ -18,6 +18,7 @@ from app.command_line import calibrate
 from app.command_line import main as main_module
 from app.command_line.main import MENDABLE, OUR_FAULT, main
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.decisions import Decisions, write_decisions
 
 
 def damaged(session: Path, tmp_path: Path, damage: Callable[[Path], None]) -> Path:
@@ -189,6 +190,32 @@ def test_no_result_takes_the_place_of_what_it_is_made_of(
         assert "take the place" in refusal(capsys, *arguments)
     assert [path.read_bytes() for path in (picture, cal, ball)] == kept
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize("option", ["-o", "--json"])
+@pytest.mark.parametrize("name", ["session.toml", "decisions.toml", "balls/ball_00.png"])
+def test_no_result_takes_the_place_of_what_a_session_holds(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, option: str
+) -> None:
+    """The picture is excluded: it is not used, and can still be taken back."""
+    decided = Decisions(excluded=frozenset({"balls/ball_00.png"}))
+    folder = damaged(session, tmp_path, lambda copy: write_decisions(decided, copy))
+    kept = (folder / name).read_bytes()
+    output = () if option == "-o" else ("-o", str(tmp_path / "c.gplcal"))
+    given = ("calibrate", str(folder), *output, option, str(folder / name))
+    assert "take the place" in refusal(capsys, *given)
+    assert (folder / name).read_bytes() == kept
+
+
+@pytest.mark.parametrize("name", ["decisions.toml", "balls/ball_00.png"])
+def test_no_report_takes_the_place_of_what_a_session_holds(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    decided = Decisions(excluded=frozenset({"balls/ball_00.png"}))
+    folder = damaged(session, tmp_path, lambda copy: write_decisions(decided, copy))
+    (tmp_path / "r.html").symlink_to(folder / name)
+    given = ("report", str(folder), "-o", str(tmp_path / "r.html"))
+    assert "take the place" in refusal(capsys, *given)
 
 
 def test_what_the_system_refuses_is_a_sentence(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import struct
@@ -21,7 +22,7 @@ from hypothesis.extra import numpy as arrays
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
-from gelpolight_core.export.mesh import mesh_of
+from gelpolight_core.export.mesh import mesh_of, write_vtp
 from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, Flag, HeightMap
 
 ROWS, COLUMNS, PITCH_MM = 17, 23, 0.125
@@ -313,6 +314,12 @@ def test_vtp_says_where_it_comes_from(tmp_path: Path, heightmap: HeightMap) -> N
     for name in ("calibration_id", "model", "source"):
         assert data.GetAbstractArray(name).GetValue(0) == getattr(heightmap, name)
     assert "dark=4" in data.GetAbstractArray("flag_names").GetValue(0)
+
+
+def test_vtp_names_a_picture_whose_name_is_not_text(heightmap: HeightMap) -> None:
+    file = io.BytesIO()
+    write_vtp(mesh_of(heightmap), file, pitch_mm=PITCH_MM, about={"source": "caf\udce9.png"})
+    assert b"caf\\udce9.png\0" in file.getvalue()
 
 
 @pytest.mark.parametrize("name", ["vtp", "ply"])

@@ -279,6 +279,19 @@ def test_a_run_that_is_not_over_is_not_judged_by_what_it_has_not_pressed_yet() -
     evaluation = evaluate(rows, found, crossing=Crossing(size_mm=5.0, height_mm=1.0))
     document = evaluation_document(evaluation)
     assert document.verdict is Verdict.PASS
+    assert document.validation is not None
+    assert "planar direction 1.00 %" in document.validation.sentence
+    assert "nan" not in document.validation.sentence and "depth" not in document.validation.sentence
+
+
+def test_a_press_that_failed_does_not_count_in_a_direction_it_says_nothing_of() -> None:
+    rows = [press("cylinder", 4.0, 1.0, region=region) for region in ("same", "r1")]
+    found = [measurement("cylinder", 4.04, 1.0), "no object is pressed"]
+    crossing = Crossing(size_mm=5.0, height_mm=1.0)
+    document = evaluation_document(evaluate(rows, found, crossing=crossing))
+    assert document.verdict is Verdict.PASS
+    nothing = evaluation_document(evaluate(rows, found[1:] * 2, crossing=crossing))
+    assert nothing.verdict is Verdict.FAIL
 
 
 def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -> None:
@@ -301,6 +314,22 @@ def test_the_gauge_tells_repeatability_from_reproducibility_for_every_object() -
     assert gauge_rows(evaluate([press("cuboid", 5.0, 1.0)], found[:1])) == ()
 
 
+def test_the_gauge_takes_repeats_of_several_regions_about_each_regions_own_mean() -> None:
+    rows = [press("cuboid", 5.0, 1.0, region=r, repeat=str(k)) for r in "AB" for k in range(3)]
+    heights_mm = [0.99, 1.0, 1.01, 1.09, 1.1, 1.11]
+    evaluation = evaluate(rows, [measurement("cuboid", 5.0, h) for h in heights_mm])
+    _, depth = gauge_rows(evaluation)
+    assert (depth.same.count, depth.random.count) == (6, 2)
+    assert depth.same.sd_mm == pytest.approx(0.01)
+    assert depth.random.mean_mm == pytest.approx(1.05)
+    assert depth.random.sd_mm == pytest.approx(0.1 / math.sqrt(2))
+    # Means of three repeats scatter by a third of the repeats' variance.
+    assert depth.reproducibility_mm == pytest.approx(math.sqrt(0.1**2 / 2 - 0.01**2 / 3))
+    pooled = {gauge.direction: gauge for gauge in evaluation.repeatability}["depth"]
+    assert pooled.within_region_mm == pytest.approx(depth.same.sd_mm)
+    assert pooled.between_regions_mm == pytest.approx(depth.reproducibility_mm)
+
+
 def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
     evaluation = paper_protocol(sizes=[5.0])
     written = write_evaluation_files(evaluation, tmp_path, calibration=scene.calibration())
@@ -319,6 +348,14 @@ def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
     assert evaluation_document(evaluation).verdict is Verdict.PASS
     strict = evaluation_document(evaluation, limits_percent=(5.0, 0.1))
     assert strict.verdict is Verdict.FAIL
+
+
+def test_the_reports_files_are_judged_by_the_limits_that_are_given(tmp_path: Path) -> None:
+    evaluation = paper_protocol(sizes=[5.0])
+    write_evaluation_files(evaluation, tmp_path)
+    assert "Fail</span>" not in (tmp_path / "evaluation.html").read_text()
+    write_evaluation_files(evaluation, tmp_path, limits_percent=(5.0, 0.1))
+    assert "Fail</span>" in (tmp_path / "evaluation.html").read_text()
 
 
 def test_a_report_without_regions_or_measurements_says_so(tmp_path: Path) -> None:

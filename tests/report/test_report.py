@@ -29,6 +29,7 @@ from gelpolight_core.report.build import calibration_report, run_report
 from gelpolight_core.report.document import Report, limit_text
 from gelpolight_core.report.html import report_html
 from gelpolight_core.report.pdf import line_width_mm, report_pdf, wrap
+from gelpolight_core.report.stage_facts import stage_facts
 from gelpolight_core.report.typeface import printable
 from gelpolight_core.session.session import read_session
 
@@ -112,6 +113,19 @@ def test_the_pictures_are_whole(whole: Report) -> None:
 
 def test_a_calibration_without_known_objects_is_said_to_be_not_validated(whole: Report) -> None:
     assert any("Not validated" in text for text in parsed(whole).seen)
+
+
+def test_presses_too_few_to_hold_any_out_are_said_to_be_too_few(
+    virtual_calibration: Calibration,
+) -> None:
+    """Nothing was compared: neither a loss nor a verdict on the refinement can be stated."""
+    full = virtual_calibration.full
+    assert full is not None
+    assert "Loss on held-out presses" in dict(stage_facts(virtual_calibration, "joint"))
+    few = replace(virtual_calibration, full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
+    facts = dict(stage_facts(few, "joint"))
+    assert "too few presses" in facts["LEDs that are used"]
+    assert "Loss on held-out presses" not in facts
 
 
 def test_names_from_files_are_shown_and_never_obeyed() -> None:

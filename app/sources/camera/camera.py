@@ -29,9 +29,9 @@ from gelpolight_core.translation import tr
 _LOG = logging.getLogger(__name__)
 
 SILENCE_S = 3.0
-STILL_OPENING_S, SLOW_OPEN_S = 2.0, 8.0
-"""From when it is said that it takes a while to open, and that no picture comes. The first is less
-than what a stream may be silent for: opened anew, the camera would count as lost."""
+SLOW_OPEN_S = 8.0
+SLOW_REOPEN_S = 2.0
+"""Less than a stream may be silent for."""
 CHECK_S = 5.0
 CLOSE_S = 0.5
 """A camera that is still being opened is left to its thread; who stops a stream waits a second."""
@@ -91,6 +91,7 @@ class Camera:
         self._reopen = threading.Event()
         self._number, self._unsettled, self._pending = 0, 0, 0
         self._since_s = self._checked_s = 0.0
+        self._was_live = False
 
     # Any thread
 
@@ -123,9 +124,15 @@ class Camera:
         late = state.phase == "opening" and silent_s > SLOW_OPEN_S
         if late or (state.phase == "live" and silent_s > self._silence_s):
             return str(self._silent(silent_s))
-        if state.phase == "opening" and silent_s > STILL_OPENING_S:
-            return tr("The camera is being opened; some take ten seconds.")
         return ""
+
+    @property
+    def reopening(self) -> bool:
+        """Whether it was live and is being opened anew for a while, with nothing wrong."""
+        with self._lock:
+            silent_s = time.monotonic() - self._since_s
+            anew = self._was_live and self._state.phase == "opening"
+            return anew and not self._state.sentence and silent_s > SLOW_REOPEN_S
 
     def attach(self, reader: Reader) -> None:
         """Hand every frame to `reader`, in the camera's thread; the first one opens the camera."""
@@ -136,6 +143,7 @@ class Camera:
             before, self._end = self._thread, threading.Event()
             self._since_s = time.monotonic()
             self._state = replace(self._state, phase="opening", sentence="")
+            self._was_live = False
             self._thread = threading.Thread(
                 target=self._run,
                 args=(self._end, before),
@@ -275,6 +283,7 @@ class Camera:
         state = CameraState("live", "", got, offered, opened.controls(), applied)
         with self._lock:
             self._state, self._since_s = state, time.monotonic()
+            self._was_live = True
             self._unsettled = UNSETTLED_FRAMES if applied else 0
             self._checked_s = self._since_s
         self._told()

@@ -60,6 +60,9 @@ class CameraSource:
         frame = self._newest.take(timeout_s)
         if frame is None and (why := self.camera.trouble()):
             raise SourceAway(why)
+        if frame is None and self.camera.reopening:
+            # Else a stream would count a slow change of the format as the camera's loss.
+            raise SourceAway(tr("The camera is being opened anew; some take ten seconds."))
         return frame
 
     def settings(self) -> tuple[Setting, ...]:

@@ -61,6 +61,27 @@ def test_one_whose_reading_was_stopped_is_read_when_it_is_asked_for_again(
     assert jobs.job is second
 
 
+def test_the_calibration_before_is_let_go_when_another_is_put_into_use(
+    context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    """Otherwise it measures on under the other's name, where that is not read to its end."""
+    path = context.workspace.calibration_path("virtual-1", "small")
+    write_calibration(small_calibration, path)
+    box, jobs = CalibrationBox(), Waiting()
+    qtbot.addWidget(box)
+    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    told: list[tuple[object, object, bool]] = []
+    choice.loaded.connect(lambda live, best: told.append((live, best, choice.is_reading)))
+    choice.refresh()
+    assert told == []
+    choice.use_what_fits("", None)
+    choice.refresh()
+    assert told == [(None, None, True)]
+    jobs.job.done((path, "live", "best"))
+    choice.refresh()
+    assert told[1:] == [("live", "best", False)]
+
+
 @pytest.mark.parametrize(("serial", "shown"), [("A", "A-12ab"), ("B", "B  A-12ab")])
 def test_a_calibration_is_named_once_and_can_be_told_from_others(
     serial: str, shown: str, qtbot: QtBot

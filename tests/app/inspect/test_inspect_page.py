@@ -17,11 +17,14 @@ from pytestqt.qtbot import QtBot
 from app.inspect.actions import POLL_MS
 from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
+from app.inspect.zero import FRAMES, zero_calibration
 from app.shell.context import AppContext
+from app.sources.processor import Outcome
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.session import read_picture
 
 WAIT_MS = 60_000
 
@@ -186,6 +189,63 @@ def test_a_calibration_of_another_sensor_is_refused_and_says_whose(
     assert page.link.live is None
 
 
+def _wait_for_section(page: InspectPage, qtbot: QtBot) -> None:
+    qtbot.waitUntil(lambda: page.views.section.cut.profile is not None, timeout=WAIT_MS)
+
+
+def test_nothing_of_a_calibration_stays_when_it_is_no_longer_looked_through(
+    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_section(page, qtbot)
+    views, link = page.views, page.link
+    page.views.pointed.emit(1.0, 2.0)
+    figures = page.findChild(QLabel, "inspect.section.figures")
+    readout = page.findChild(QLabel, "inspect.readout")
+    assert figures is not None and readout is not None
+    assert views.height.map.has_picture and figures.text() and readout.text()
+    late = Outcome(link._processor.generation, link.last.frame, link.last)  # type: ignore[union-attr]
+    page.calibrations.loaded.emit(None, None)
+    link._outbox.put(late)
+    link._take()
+    page._tell()
+    assert not views.height.map.has_picture
+    assert views.section.cut.profile is None
+    assert (figures.text(), readout.text()) == ("", "")
+    assert page._places is None
+
+
+def test_a_picture_stands_no_longer_than_the_page_is_looked_at(
+    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_depth(page, qtbot)
+    page.pause(True)
+    page.leave()
+    page.enter()
+    assert not page.link.paused and not page.pause_action.isChecked()
+    _wait_for_depth(page, qtbot)
+
+
+def test_a_standing_picture_goes_with_its_source(
+    page: InspectPage, presses: Path, small_session: Path, context: AppContext,
+    small_calibration: Calibration, qtbot: QtBot,
+) -> None:  # fmt: skip
+    from app.sources.listing import picture_folders
+
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_section(page, qtbot)
+    page.pause(True)
+    (info,) = picture_folders([small_session / "background"])()
+    context.source.choose(info)
+    assert not page.views.height.map.has_picture
+    assert not page.link.paused and not page.pause_action.isChecked()
+    _wait_for_section(page, qtbot)
+
+
 def test_the_layout_is_found_again_as_it_was_left(
     page: InspectPage, context: AppContext, qtbot: QtBot
 ) -> None:
@@ -268,6 +328,27 @@ def test_zero_puts_the_background_of_now_into_use_and_can_be_undone(
     qtbot.waitUntil(lambda: not page.jobs.busy, timeout=4 * WAIT_MS)
     page.deeds._use(path)
     assert context.workspace.in_use == path
+
+
+def test_undo_of_a_second_zero_brings_back_what_is_kept(
+    page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    workspace, offered = context.workspace, []
+    path = workspace.calibration_path(small_calibration.sensor.serial, "mine")
+    write_calibration(small_calibration, path)
+    kept = path.read_bytes()
+    picture = min((small_session / "background").glob("*.png"))
+    frames = [read_picture(picture).rgb] * FRAMES
+    first = zero_calibration(workspace, path, frames)
+    second = zero_calibration(workspace, first.path, frames)
+    assert workspace.in_use == first.path == second.path != path
+    monkeypatch.setattr(context.toasts, "show", lambda *_, actions: offered.extend(actions))
+    page.deeds._on_zeroed(second)
+    ((_, undo),) = offered
+    undo()
+    assert workspace.in_use == path
+    assert path.read_bytes() == kept
 
 
 def test_leaving_while_zero_waits_for_its_frames_is_no_failure(

@@ -10,6 +10,8 @@ from pytestqt.qtbot import QtBot
 
 from app.measure.drift_plot import DriftPlot
 from app.shell import theme
+from app.shell.settings import Limits
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
 
 @pytest.fixture
@@ -25,3 +27,13 @@ def test_its_legend_can_be_read_in_both_themes(qapp: QApplication, plot: DriftPl
         theme.apply(qapp, name)
         for _, label in plot._legend.items:
             assert theme.COLOURS["text"][dark] in label.item.toHtml()
+
+
+def test_what_is_measured_along_the_depth_is_judged_by_the_limit_of_heights(
+    plot: DriftPlot,
+) -> None:
+    quantities = tuple(
+        Quantity(f"{name}_mm", 1.02, truth=1.0) for name in ("depth_difference", "distance")
+    )
+    plot.show_records((MeasurementRecord("A-1", "", "distance", quantities),), Limits())
+    assert [len(points) for points in plot.shown.values()] == [1, 1]

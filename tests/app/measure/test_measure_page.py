@@ -30,7 +30,7 @@ from gelpolight_core.measurement.tools import ProfileWidth
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
-from gelpolight_core.records.records import NAME
+from gelpolight_core.records.records import NAME, Records
 
 PATIENCE_MS = 60_000
 
@@ -359,7 +359,14 @@ def test_another_workspace_is_read_at_once_and_what_was_meant_for_the_first_is_r
     _kept(page, qtbot, 0)
     refused: list[str] = []
     book.refused.connect(refused.append)
-    book.change("Waiting", lambda _records: go.wait(20.0))
+    waiting = threading.Event()
+
+    def wait(_records: Records) -> None:
+        waiting.set()
+        go.wait(20.0)
+
+    book.change("Waiting", wait)
+    assert waiting.wait(20.0)
     book.add(record, lambda _number: None)
     context.workspace.folder = tmp_path / "other"
     context.requests.calibrations_changed.emit()

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import threading
 import weakref
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import cv2
+import pytest
 from pytestqt.qtbot import QtBot
 
-from app.measure.measuring import Taken
+from app.calibrate.lut_worker import Answered, NewestWins
+from app.measure.measuring import Answer, Measuring, Question, Taken
+from app.measure.sheet import Sheet
 from app.measure.work import Work
+from app.sources.source import Frame
 from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
 PATIENCE_MS = 60_000
+
+
+def _other_sensors(calibration: Calibration) -> Calibration:
+    return replace(calibration, sensor=replace(calibration.sensor, serial="B-2"))
 
 
 def test_a_picture_that_is_put_away_is_let_go_and_the_next_one_is_measured(
@@ -31,3 +44,58 @@ def test_a_picture_that_is_put_away_is_let_go_and_the_next_one_is_measured(
     work.take(taken)
     qtbot.waitUntil(lambda: work.answer is not None and not work.busy, timeout=PATIENCE_MS)
     work.close()
+
+
+def test_what_an_earlier_calibration_says_is_not_shown_for_the_one_in_use(
+    small_calibration: Calibration,
+    small_session: Path,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first, second = small_calibration, _other_sensors(small_calibration)
+    go = {calibration.sensor.serial: threading.Event() for calibration in (first, second)}
+    begun, arrived = threading.Event(), list[str]()
+
+    class Slow(Measuring):
+        def __call__(self, question: Question | None) -> Answer | None:
+            if question is not None:
+                begun.set()
+                assert go[question.calibration.sensor.serial].wait(60.0)
+            return super().__call__(question)
+
+    class Watched(NewestWins[Any, Any]):
+        def take(self) -> Answered[Any, Any] | None:
+            found = super().take()
+            if found is not None:
+                arrived.append(found.question.calibration.sensor.serial)
+            return found
+
+    monkeypatch.setattr("app.measure.work.Measuring", Slow)
+    monkeypatch.setattr("app.measure.work.NewestWins", Watched)
+    work = Work()
+    work.use(Reconstructor(first))
+    work.take(Taken("press", next((small_session / "presses").glob("cylinder*.png"))))
+    assert begun.wait(60.0)
+    work.use(Reconstructor(second))
+    go[first.sensor.serial].set()
+    qtbot.waitUntil(lambda: arrived == [first.sensor.serial], timeout=PATIENCE_MS)
+    assert work.heightmap is None
+    go[second.sensor.serial].set()
+    qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
+    assert work.heightmap is not None
+    assert work.heightmap.calibration_id == second.identity
+    work.close()
+
+
+def test_a_frame_of_another_sensor_is_refused_though_its_size_fits(
+    small_calibration: Calibration, small_session: Path
+) -> None:
+    path = next((small_session / "presses").glob("cylinder*.png"))
+    frame = Frame(cv2.imread(str(path))[..., ::-1].copy(), 0, 0.0)
+    measuring, model = Measuring(), small_calibration.model
+    for serial in ("", small_calibration.sensor.serial):
+        taken = Taken("press", frame=frame, serial=serial)
+        assert measuring(Question(small_calibration, model, taken, Sheet())) is not None
+    taken = Taken("press", frame=frame, serial="B-2")
+    with pytest.raises(InputError, match="the picture is of B-2"):
+        measuring(Question(small_calibration, model, taken, Sheet()))

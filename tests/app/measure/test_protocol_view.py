@@ -18,6 +18,7 @@ from app.measure.protocol_bench import BenchHand
 from app.measure.protocol_look import TOLERANCE_MM, PictureMap, PressLooker, make_target
 from app.measure.protocol_view import ProtocolView
 from app.shell.context import AppContext
+from app.shell.settings import Limits
 from app.sources.bench import Bench
 from app.sources.source import SourceInfo
 from gelpolight_core.calibration.file import write_calibration
@@ -182,6 +183,7 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
     qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
     assert view.work.run.folder == folder
     take_bare(view, qtbot)
+    context.settings.limits = Limits(size_percent=1e-6, height_percent=1e-6)
     press_next(view, camera, qtbot)
 
     # The last press leads to the result by itself.
@@ -189,10 +191,16 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
     assert [(r.shape, r.picture, r.serial) for r in kept] == [
         ("evaluation", str(folder), view.work.run.content.serial)
     ]
+    context.settings.limits = Limits()
     view.result.save(folder / "report")
     qtbot.waitUntil((folder / "report" / "gauge.csv").is_file, timeout=WAIT_MS)
     names = {path.suffix for path in (folder / "report").iterdir()}
     assert {".csv", ".html", ".pdf"} <= names
+
+    # The report is judged as it was shown, whatever the limits are now.
+    assert context.settings.limits == Limits()
+    assert "Fail (" in view.result.verdict.text()
+    assert "Fail</span>" in (folder / "report" / "evaluation.html").read_text()
 
     calibration = context.workspace.entries()[0].path
     assert main(["evaluate", str(calibration), str(folder), "-o", str(tmp_path / "out")]) == 0

@@ -135,12 +135,14 @@ def test_what_had_to_be_done_and_hangs_is_told_and_done_when_it_can(
     jobs.refused.connect(told.append)
     jobs.submit(Job("wait", lambda _tell: go.wait(30.0), must=True))
     jobs.submit(Job("save", lambda _tell: written.append("saved"), must=True))
+    jobs.submit(Job("keep", lambda _tell: written.remove("nothing"), must=True))
     assert not jobs.close(timeout_s=0.05)
-    assert [sentence.partition(":")[0] for sentence in told] == ["wait", "save"]
+    assert [sentence.partition(":")[0] for sentence in told] == ["wait", "save", "keep"]
     assert "save was not done when it was closed" in caplog.text
     go.set()
     assert join_left_behind(10.0)
     assert written == ["saved"]
+    assert "keep failed after it was closed" in caplog.text
 
 
 @pytest.mark.parametrize("end", ["done", "refused", "faulty", "stopped", "dropped"])

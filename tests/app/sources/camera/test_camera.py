@@ -268,15 +268,32 @@ def test_what_is_not_as_it_was_stored_is_told(camera: Camera, stream: Stream) ->
 def test_a_slow_new_opening_does_not_end_a_stream(
     camera: Camera, fake: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.sources.camera.camera.STILL_OPENING_S", 0.05)
+    monkeypatch.setattr("app.sources.camera.camera.SLOW_REOPEN_S", 0.05)
     stream = Stream(CameraSource(camera), silence_s=0.5)
     stream.start()
     stream.capture(1).result(20.0)
     fake.hangs = threading.Event()
     camera.want(STORED)
-    eventually(lambda: "being opened" in (stream.figures().lost or ""))
+    eventually(lambda: "being opened anew" in (stream.figures().lost or ""))
     time.sleep(0.7)  # longer than a stream may be silent
+    assert camera.trouble() == ""
     fake.hangs.set()
     eventually(lambda: stream.figures().lost is None)
     assert len(stream.capture(1).result(20.0)) == 1
+    stream.stop()
+
+
+def test_a_slow_first_opening_is_no_loss(
+    camera: Camera, fake: FakeCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.sources.camera.camera.SLOW_REOPEN_S", 0.0)
+    fake.hangs = threading.Event()
+    stream = Stream(CameraSource(camera))
+    stream.start()
+    waiting = stream.capture(1)
+    eventually(lambda: camera.state.phase == "opening")
+    time.sleep(0.3)
+    assert stream.figures().lost is None
+    fake.hangs.set()
+    assert len(waiting.result(20.0)) == 1
     stream.stop()

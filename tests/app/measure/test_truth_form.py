@@ -1,0 +1,51 @@
+"""The truth that is stated follows the list of known indenters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pytestqt.qtbot import QtBot
+
+from app.measure.judging import Stated
+from app.measure.truth_form import TruthForm
+from app.workspace.indenters import Indenter
+
+BALL = Indenter("Ball 8 mm", "ball", 8.0)
+ROD = Indenter("Rod", "cylinder", 5.0, height_mm=1.0)
+
+
+def _choose(form: TruthForm, name: str) -> None:
+    form.known.setCurrentIndex(form.known.findData(name))
+    form.known.activated.emit(form.known.currentIndex())
+
+
+def test_an_indenter_that_is_corrected_in_the_list_is_corrected_where_it_is_chosen(
+    qtbot: QtBot,
+) -> None:
+    form = TruthForm()
+    qtbot.addWidget(form)
+    form.show_indenters((BALL, ROD))
+    form.show_kind("cylinder", "diameter", "mm")
+    _choose(form, "Rod")
+    form.show_kind("ball", "diameter", "mm")
+    _choose(form, "Ball 8 mm")
+    with qtbot.waitSignal(form.changed):
+        form.show_indenters((replace(BALL, size_mm=7.95), replace(ROD, height_mm=0.75)))
+    assert form.stated == Stated(7.95, None, "Ball 8 mm")
+    form.show_kind("cylinder", "diameter", "mm")
+    assert form.stated == Stated(5.0, 0.75, "Rod")
+
+
+def test_what_was_typed_or_is_no_longer_listed_keeps_its_numbers_and_no_name(qtbot: QtBot) -> None:
+    form = TruthForm()
+    qtbot.addWidget(form)
+    form.show_indenters((BALL, ROD))
+    form.show_kind("ball", "diameter", "mm")
+    _choose(form, "Ball 8 mm")
+    form.show_indenters((ROD,))
+    assert form.stated == Stated(8.0)
+    form.show_kind("cylinder", "diameter", "mm")
+    _choose(form, "Rod")
+    form.size.setValue(5.1)
+    form.show_indenters((BALL, ROD))
+    assert form.stated == Stated(5.1, 1.0)

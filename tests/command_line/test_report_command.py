@@ -1,0 +1,52 @@
+"""The report by command, validated with presses of known size."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from one_line import refusal
+
+from app.command_line.main import main
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_file import ProtocolFile, write_protocol_file
+
+
+@pytest.fixture
+def run_folder(session: Path, tmp_path: Path) -> Path:
+    """Return a run of the protocol with one press of each series, none of them of both."""
+    names = ("cuboid_s4_d100.png", "cylinder_s5_d050.png")
+    presses = tmp_path / "run" / "presses"
+    presses.mkdir(parents=True)
+    for name in names:
+        shutil.copy(session / "presses" / name, presses)
+    rows = (session / "presses" / "truth.csv").read_text().splitlines()
+    kept = [row for row in rows if row.startswith(("file", *names))]
+    (presses / "truth.csv").write_text("\n".join(kept) + "\n")
+    write_protocol_file(ProtocolFile(Protocol(), "A", "c"), presses.parent)
+    return presses.parent
+
+
+@pytest.mark.parametrize("named", [".", "presses"])
+def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
+    calibration: Path, run_folder: Path, tmp_path: Path, named: str
+) -> None:
+    presses, page = str(run_folder / named), tmp_path / "r.html"
+    assert main(["evaluate", str(calibration), presses, "-o", str(tmp_path / "e")]) == 0
+    overall = json.loads((tmp_path / "e" / "evaluation.json").read_text())["overall"]
+    assert {overall[direction]["count"] for direction in ("planar", "depth")} == {1}
+    assert main(["report", str(calibration), "-o", str(page), "--presses", presses]) == 0
+    planar, depth = (overall[name]["mean_absolute_percent"] for name in ("planar", "depth"))
+    said = f"mean absolute error {planar:.1f} % in size and {depth:.1f} % in height"
+    assert said in page.read_text()
+
+
+@pytest.mark.parametrize("named", ["presses/truth.csv", "none"])
+def test_presses_that_are_no_folder_are_refused_before_any_work(
+    run_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], named: str
+) -> None:
+    presses, page = str(run_folder / named), str(tmp_path / "r.html")
+    line = refusal(capsys, "report", "none.gplcal", "-o", page, "--presses", presses)
+    assert "it is not a folder" in line
