@@ -9,8 +9,6 @@ from typing import Any
 from app.command_line.common import (
     add_model,
     load_reconstructor,
-    numbers,
-    one_place,
     read_frame,
     refuse_overwriting,
     write_json,
@@ -46,9 +44,9 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument(
         "--seed",
-        type=numbers,
-        nargs="+",
-        metavar="X Y",
+        type=float,
+        nargs=2,
+        metavar=("X", "Y"),
         help=tr("a point (mm) on the object to measure, where several are pressed; with --shape"),
     )
     parser.add_argument("--json", type=Path, metavar="FILE")
@@ -120,7 +118,7 @@ def _seed(options: argparse.Namespace) -> tuple[float, float] | None:
             where="--seed",
             advice=tr("Use it with --shape; a place for --tool is given by --at"),
         )
-    return one_place(options.seed, where="--seed")
+    return options.seed[0], options.seed[1]
 
 
 def _proposed(

@@ -159,8 +159,9 @@ class CalibrationChoice(QObject):
             return path, live, Reconstructor(calibration)
 
         def done(found: tuple[Path, object, object]) -> None:
-            if self._reading is reading:
-                self._reading = None
+            if self._reading is not reading:
+                return  # it was asked for anew: the file may be another by now
+            self._reading = None
             if self._state[:1] == found[:1]:
                 self.loaded.emit(*found[1:])
 

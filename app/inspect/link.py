@@ -131,6 +131,8 @@ class LiveLink(QObject):
         wanted, self._maker = self._maker.wanted, Maker(live, best)
         self._maker.wanted = wanted
         self._processor.replace(self._maker)
+        if self.last is not None:
+            self.last = Shown(self.last.frame)  # its depth is of the calibration before
         self._again()
 
     def want(self, wanted: Wanted) -> None:

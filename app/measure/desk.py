@@ -203,8 +203,8 @@ class Desk(DeskFrame):
         self.work.take(None)
         self.link.pause(False)
         self._follow_hold()
-        if self.link.stream is None:
-            self.map.say(tr("No depth yet."))
+        if self.link.stream is None or not self.map.view.has_picture:
+            self._say_what_comes()
 
     def _take(self, taken: Taken, *, propose: bool = False) -> None:
         self.link.pause(True)
@@ -212,8 +212,16 @@ class Desk(DeskFrame):
         self.panel.say_kept("")
         self.work.take(taken, propose=propose)
         if taken.path is not None:
-            self.map.say(tr("Reconstructing {name}…").format(name=taken.name))
+            self._say_what_comes()
         self._follow_hold()
+
+    def _say_what_comes(self) -> None:
+        """Put words in the place of the map."""
+        taken = self.work.taken
+        if taken is None or self._loaded[1] is None:
+            self.map.say(tr("No depth yet."))
+        else:
+            self.map.say(tr("Reconstructing {name}…").format(name=taken.name))
 
     def _follow_hold(self) -> None:
         held = self.work.taken is not None
@@ -341,11 +349,7 @@ class Desk(DeskFrame):
         # Before the tools are drawn again: it says where in the camera's picture they are.
         self.details.use(None if best is None else best.calibration)
         self.work.use(best)
-        taken = self.work.taken
-        if best is None or taken is None:
-            self.map.say(tr("No depth yet."))
-        else:
-            self.map.say(tr("Reconstructing {name}…").format(name=taken.name))
+        self._say_what_comes()
         self.show_validated()
         self._refresh()
 

@@ -69,7 +69,7 @@ class KeptSession:
         self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
         self._session = read_session(folder)
         self._replaced: dict[str, _Replaced] = {}
-        self._dropped = 0  # how often pictures were written that did not stay
+        self._dropped = 0  # how often pictures went, which a computation may have seen
 
     @property
     def session(self) -> Session:
@@ -145,6 +145,7 @@ class KeptSession:
             excluded = (now.excluded | taken) - former.pictures
             spots = {**now.spots_px, **former.spots_px}
             self.decide(replace(now, excluded=excluded, spots_px=spots))
+            self._dropped += 1
 
     def take_again(self, stage: Stage, names: Sequence[str]) -> None:
         """Take in what was taken back.
@@ -182,7 +183,7 @@ class KeptSession:
         return tuple(names)
 
     def _drop(self, folder: str, names: Sequence[str]) -> None:
-        self._dropped += 1
+        self._dropped += bool(names)
         for name in names:
             (self._session.folder / folder / name).unlink(missing_ok=True)
         radii = self._session.ball_radii_mm
@@ -248,6 +249,7 @@ class KeptSession:
             names = self._session.decisions.excluded
             names = names | {key} if excluded else names - {key}
             self.decide(replace(self._session.decisions, excluded=names))
+            self._dropped += excluded
 
     def place_spot(self, led: int, place: Point | None) -> None:
         """Set an LED's mirror spot by hand; None goes back to what was detected.

@@ -242,7 +242,7 @@ def _chosen_region(
                 count=len(tall), places=places
             ),
             where=tr("depth map"),
-            advice=tr("Choose one: give --seed X,Y with a point on it"),
+            advice=tr("Choose one: give --seed X Y with a point on it"),
         )
     return tall[0]
 

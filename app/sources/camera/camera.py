@@ -29,7 +29,7 @@ from gelpolight_core.translation import tr
 _LOG = logging.getLogger(__name__)
 
 SILENCE_S = 3.0
-SLOW_OPEN_S = 8.0
+SLOW_OPEN_S = 15.0
 SLOW_REOPEN_S = 2.0
 """Less than a stream may be silent for."""
 CHECK_S = 5.0

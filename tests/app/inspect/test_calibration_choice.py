@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,31 @@ def test_the_calibration_before_is_let_go_when_another_is_put_into_use(
     jobs.job.done((path, "live", "best"))
     choice.refresh()
     assert told[1:] == [("live", "best", False)]
+
+
+def test_what_was_read_before_the_file_was_replaced_is_not_used(
+    context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    """As by a second zero while the first is still being read."""
+    path = context.workspace.calibration_path("virtual-1", "small")
+    write_calibration(small_calibration, path)
+    box, jobs = CalibrationBox(), Waiting()
+    qtbot.addWidget(box)
+    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    choice.refresh()
+    choice.use_what_fits("", None)
+    choice.refresh()
+    first = jobs.job
+    write_calibration(replace(small_calibration, factors=0.9 * small_calibration.factors), path)
+    choice.refresh()
+    second = jobs.job
+    assert second is not first
+    told: list[tuple[object, object]] = []
+    choice.loaded.connect(lambda live, best: told.append((live, best)))
+    first.done((path, "live 1", "best 1"))
+    assert told == []
+    second.done((path, "live 2", "best 2"))
+    assert told == [("live 2", "best 2")]
 
 
 @pytest.mark.parametrize(("serial", "shown"), [("A", "A-12ab"), ("B", "B  A-12ab")])

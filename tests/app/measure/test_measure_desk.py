@@ -93,3 +93,5 @@ def test_a_held_frame_is_not_measured_with_another_sensors_calibration(
     qtbot.waitUntil(lambda: said in advice.text(), timeout=PATIENCE_MS)
     assert desk.work.heightmap is None
     assert not desk.map.view.has_picture
+    desk.release()
+    assert desk.map.view._words.text() == "No depth yet."

@@ -16,6 +16,6 @@ def test_a_true_angle_is_said_in_degrees(context: AppContext, qtbot: QtBot) -> N
     qtbot.addWidget(view)
     quantities = (Quantity("angle_deg", 31.0, truth=30.0),)
     book.add(MeasurementRecord("A", "A-1", "angle", quantities), lambda _number: None)
-    qtbot.waitUntil(lambda: len(book.records) == 1 and not book.busy)
+    qtbot.waitUntil(lambda: len(book.records) == 1 and not book.busy, timeout=60_000)
     assert "true 30°" in view.statistics.text()
     book.close()
