@@ -44,6 +44,8 @@ class CalibrationController(QObject):
         Captures, decisions or results changed.
     captured(str, str)
         Stage and name of a new picture.
+    photographed(str)
+        Stage of a new picture that the camera took; of an imported one it is not told.
     progressed(str, float)
         Title of the computation that runs (empty: none) and its share done.
     refused(str)
@@ -52,6 +54,7 @@ class CalibrationController(QObject):
 
     changed = Signal()
     captured = Signal(str, str)
+    photographed = Signal(str)
     progressed = Signal(str, float)
     refused = Signal(str)
 
@@ -92,7 +95,7 @@ class CalibrationController(QObject):
             def work(_tell: Callable[[float], None]) -> tuple[str, ...]:
                 return (self.project.add_capture(stage, frames, radius_mm=radius_mm),)
 
-            taken = partial(self._taken, stage)
+            taken = partial(self._taken, stage, by_camera=True)
             self.desk.submit(Job(tr("Saving the picture"), work, taken, must=True))
 
         self.watching.capture(step.frames, keep)
@@ -108,7 +111,7 @@ class CalibrationController(QObject):
         taken = partial(self._taken, stage)
         self.desk.submit(Job(tr("Importing pictures"), work, taken, must=True))
 
-    def _taken(self, stage: Stage, names: tuple[str, ...]) -> None:
+    def _taken(self, stage: Stage, names: tuple[str, ...], *, by_camera: bool = False) -> None:
         text = tr("Import {n} pictures").format(n=len(names))
         if len(names) == 1:
             text = tr("Take {name}").format(name=names[0])
@@ -118,6 +121,8 @@ class CalibrationController(QObject):
         self.changed.emit()
         for name in names:
             self.captured.emit(stage.value, name)
+        if by_camera:
+            self.photographed.emit(stage.value)
         if stage is Stage.LENS:
             self.look_for_boards()
         self.compute(stage)

@@ -73,7 +73,13 @@ class CurveStep(QWidget):
         self.close_editor()
         self._say(tr("Gathering the pixels of the ball presses."))
         self._controller.jobs.submit(
-            Job(tr("Gathering the scatter"), lambda _tell: _gather(project), self._show, self._fail)
+            Job(
+                tr("Gathering the scatter"),
+                lambda _tell: _gather(project),
+                self._show,
+                self._fail,
+                stopped=self._on_stopped,
+            )
         )
 
     def close_editor(self) -> None:
@@ -89,6 +95,10 @@ class CurveStep(QWidget):
         self._said.show()
 
     def _fail(self, sentence: str) -> None:
+        self._say(sentence)
+
+    def _on_stopped(self, sentence: str) -> None:
+        self._made_of = None  # the next look gathers anew
         self._say(sentence)
 
     def _show(self, material: Material) -> None:

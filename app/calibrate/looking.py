@@ -68,7 +68,10 @@ class Looking(QObject):
     @property
     def radius_mm(self) -> float | None:
         """Radius of the ball of the next press; None in other steps."""
-        return self._panel.radius.value() if self.step.stage is Stage.BALLS else None
+        if self.step.stage is not Stage.BALLS:
+            return None
+        self._panel.radius.interpretText()  # what is typed counts, Enter or not
+        return self._panel.radius.value()
 
     @property
     def has_pictures(self) -> bool:
@@ -209,7 +212,7 @@ class Looking(QObject):
             self.good.emit()
 
     def captured(self) -> None:
-        """Wait for another view before the next capture by itself."""
+        """Wait for another view before the next capture by itself, however this one came."""
         self._controller.watching.forget_movement()
         self._paused_until = time.monotonic() + PAUSE_S
         self.arm(anew=True)
@@ -251,7 +254,8 @@ class Looking(QObject):
 
     def refresh(self) -> None:
         """Follow what has changed: results, views, corrections and their undoing."""
-        self._show_radius()
+        if not self._panel.types_radius:
+            self._show_radius()
         self.arm()
 
 

@@ -61,8 +61,11 @@ class Saving(QObject):
         self, title: str, work: Callable[[object], Any], done: Callable[[Any], None]
     ) -> None:
         self._view.show_saved(title + "…")
-        job = Job(title, work, done, lambda sentence: self._view.show_saved(sentence, "fail"))
-        self._controller.jobs.submit(job)
+
+        def failed(sentence: str) -> None:
+            self._view.show_saved(sentence, "fail")
+
+        self._controller.jobs.submit(Job(title, work, done, failed, stopped=failed))
 
     def report(self) -> None:
         """Ask for a place, and write the report there."""

@@ -86,14 +86,14 @@ class SessionCamera(QObject):
     def __init__(self, controller: CalibrationController, *, context: AppContext) -> None:
         super().__init__(controller)
         self._controller, self._context = controller, context
-        controller.captured.connect(self._on_captured)
+        controller.photographed.connect(self._on_photographed)
 
     def refer(self) -> None:
         """Hold the camera to the settings of the session."""
         stored = self._controller.project.session.camera_settings
         self._context.cameras.refer(tr("the pictures of this session"), stored)
 
-    def _on_captured(self, stage: str, _name: str) -> None:
+    def _on_photographed(self, stage: str) -> None:
         """Note how the camera is set, as long as nothing rests on how it was set before."""
         camera = self._context.cameras.of(self._context.source.info)
         if camera is None or camera.state.phase != "live":

@@ -212,6 +212,12 @@ class SetupForm(QScrollArea):
         self.ball.setValue(session.ball_default_radius_mm or 3.0)
         self.accept.setText(tr("&Begin the calibration") if new else tr("&Take these values"))
         self._check()
+        self._known = self.stated()
+
+    @property
+    def edited(self) -> bool:
+        """Whether it states anything else than when it was filled, or taken last."""
+        return self.stated() != self._known  # not the session: the fields round what they show
 
     def stated(self) -> Session:
         """Return the session as the form states it."""
@@ -262,7 +268,8 @@ class SetupForm(QScrollArea):
         show_meaning(self.problem, "")
 
     def _on_accept(self) -> None:
-        self.accepted.emit(self.stated())
+        self._known = self.stated()
+        self.accepted.emit(self._known)
 
 
 class _BoardRow(QWidget):

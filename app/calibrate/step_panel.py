@@ -205,6 +205,11 @@ class StepPanel(QWidget):
         self.show_work("", 0.0)
         return foot
 
+    @property
+    def types_radius(self) -> bool:
+        """Whether a radius is being typed: the field's value is still the one before."""
+        return self.radius.cleanText() != self.radius.textFromValue(self.radius.value())
+
     def show_step(self, step: Step, *, following: str) -> None:
         """Show another step's task; `following`: the title of the step after it, if any."""
         if step is not self._step:

@@ -39,11 +39,12 @@ class Taking(QObject):
             self._looking.live()
         elif self._looking.has_pictures:
             self._panel.show_notice("", "pass")
+            self._looking.captured()
             self._controller.capture(self._frame.step, radius_mm=self._looking.radius_mm)
 
     def _capture_by_itself(self) -> None:
-        if self._panel.automatic.isChecked():
-            self._looking.captured()
+        # Not while a radius is being typed: half a number is none.
+        if self._panel.automatic.isChecked() and not self._panel.types_radius:
             self.capture()
 
     def _on_captured(self, stage: str, name: str) -> None:

@@ -23,6 +23,7 @@ from app.sources.source import Frame
 from app.workspace.entries import read_entry
 from app.workspace.validation import Validation, read_validation, write_validation
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -50,6 +51,7 @@ class Validating(QObject):
         self.jobs.refused.connect(controller.refused)
         self._reconstructor: Reconstructor | None = None
         self._trial: tuple[Trial, str] | None = None
+        self._asked = object()  # for the newest trial; what comes of one before is let go
         self._capture: Future[list[Frame]] | None = None
         self._shown: Callable[[Panel], None] = lambda _panel: None
         self._poll = QTimer(self)
@@ -75,6 +77,8 @@ class Validating(QObject):
         found = self._recorded()
         if found is None:
             return "empty", tr("Not validated yet")
+        if not self.saved:
+            return "stale", tr("What the calibration was made from has changed since it was tried")
         if found.passed:
             return "pass", tr("Validated")
         return "fail", tr("The last validation failed")
@@ -88,12 +92,17 @@ class Validating(QObject):
 
     def take(self, path: str) -> None:
         """Try this saved calibration from now on."""
-        self._path, self._reconstructor, self._trial = Path(path), None, None
+        self._path, self._reconstructor = Path(path), None
         summary = read_entry(self._path).summary
         self._inputs = "" if summary is None else summary.inputs
         self._show_calibration()
-        self._panel.show_trial(None)
+        self._ask_anew()
         self._show_verdict()
+
+    def _ask_anew(self) -> None:
+        """Let go of the trial that is shown, and of one that is still to come."""
+        self._asked, self._trial = object(), None
+        self._panel.show_trial(None)
 
     def _find_earlier(self) -> None:
         """Go on with the calibration of the present captures, or the session's newest."""
@@ -132,6 +141,7 @@ class Validating(QObject):
         """Capture the press, then measure it."""
         stream = self._controller.watching.stream
         if stream is not None and self._capture is None and self._path is not None:
+            self._ask_anew()
             self._panel.say(tr("Capturing: hold the object still."))
             self._capture = stream.capture(FRAMES)
             self._panel.show_work(0.0)
@@ -175,35 +185,43 @@ class Validating(QObject):
         self._measure([frame.rgb for frame in future.result()])
 
     def _measure(self, frames: list[NDArray[Any]]) -> None:
-        panel = self._panel
-        known, path = panel.known(), self._path
+        self._ask_anew()
+        panel, asked = self._panel, self._asked
+        known, path, present = panel.known(), self._path, self._reconstructor
         size_limit, height_limit = panel.size_limit.value(), panel.height_limit.value()
 
-        def work(tell: Callable[[float], None]) -> Trial:
-            if self._reconstructor is None:
+        def work(tell: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
+            reconstructor = present
+            if reconstructor is None:
                 assert path is not None
-                self._reconstructor = Reconstructor(read_calibration(path))
-            return run_trial(
+                reconstructor = Reconstructor(read_calibration(path))
+            trial = run_trial(
                 frames,
-                self._reconstructor,
+                reconstructor,
                 known,
                 size_limit_percent=size_limit,
                 height_limit_percent=height_limit,
                 tell=tell,
             )
+            return reconstructor, trial
 
         text = tr("{shape}, {size:g} mm").format(
             shape=panel.shape.currentText(), size=known.size_mm
         )
 
-        def done(trial: Trial) -> None:
-            self._show(trial, text)
+        def done(found: tuple[Reconstructor, Trial]) -> None:
+            if self._asked is asked:
+                self._show(*found, text)
+
+        def failed(sentence: str) -> None:
+            if self._asked is asked:
+                self._refuse(sentence)
 
         self._panel.say(tr("Measuring."))
-        self.jobs.submit(Job(tr("Measuring the press"), work, done, self._refuse))
+        self.jobs.submit(Job(tr("Measuring the press"), work, done, failed))
 
-    def _show(self, trial: Trial, text: str) -> None:
-        self._trial = trial, text
+    def _show(self, reconstructor: Reconstructor, trial: Trial, text: str) -> None:
+        self._reconstructor, self._trial = reconstructor, (trial, text)
         self._panel.show_work(None)
         self._panel.show_trial(trial)
         self._shown(Panel(tr("Depth as measured"), trial.shaded))
@@ -239,10 +257,13 @@ class Validating(QObject):
         if self._path is None:
             return None
         try:
-            return read_validation(self._path)
+            found = read_validation(self._path)
+            if found is not None and found.identity != read_summary(self._path).identity:
+                return None  # it is of another calibration
         except InputError as error:
             self._context.toasts.show(str(error), "warn")
             return None
+        return found
 
     def _show_verdict(self) -> None:
         found = self._recorded()

@@ -42,10 +42,13 @@ class Watching(QObject):
         An Outcome or Failure of the detection on the live picture.
     refused(str)
         A sentence: why a capture came to nothing.
+    given_up(str)
+        A sentence: a capture was under way when the stream was taken away.
     """
 
     detected = Signal(object)
     refused = Signal(str)
+    given_up = Signal(str)
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -64,17 +67,21 @@ class Watching(QObject):
 
     def set_stream(self, stream: Stream | None) -> None:
         """Look at another stream; the owner starts and stops it."""
+        unfinished, self._capture = self.capturing, None
         if self.stream is not None:
             self.stream.remove_tap(self._inbox.put)
             self._processor.stop()
             self._tick.stop()
-            self._capture = None
         self.stream = stream
         if stream is not None:
             self._still = Still()
             stream.add_tap(self._inbox.put)
             self._processor.start()
             self._tick.start()
+        if unfinished:
+            self.given_up.emit(
+                tr("The picture was not taken: the camera was let go. Capture it again.")
+            )
 
     def look_with(self, detect: Looker | None) -> None:
         """Use a detection from the next frame on; None: look for nothing."""
@@ -114,7 +121,8 @@ class Watching(QObject):
 
     def _poll(self) -> None:
         item = self._outbox.take()
-        if item is not None:
+        # What was seen for the step before is no word on this one.
+        if item is not None and item.generation == self._processor.generation:
             self.detected.emit(item)
         if self._capture is not None and self._capture.done():
             future, self._capture = self._capture, None

@@ -92,6 +92,8 @@ class Wizard(WizardFrame):
         controller.changed.connect(self.standing.refresh)
         controller.progressed.connect(self.standing.show_progress)
         controller.refused.connect(self._refuse)
+        # Not beside the step: whoever took the camera away has left it.
+        controller.watching.given_up.connect(lambda text: self.context.toasts.show(text, "fail"))
         controller.changed.connect(self.outside.look)
         self.saving.saved.connect(self.validating.take)
         self.validating.show_pictures_in(self._show_trial)
@@ -133,6 +135,8 @@ class Wizard(WizardFrame):
         self.controller.refused.disconnect(self._refuse)
         toasts = self.context.toasts
         self.controller.refused.connect(lambda text: toasts.show(text, "fail"))
+        if self.step.key == "setup":
+            self._take_setup()
         self.controller.close()
 
     def _on_camera(self) -> None:
@@ -173,6 +177,7 @@ class Wizard(WizardFrame):
 
     def go_to(self, key: str) -> None:
         """Show a step."""
+        left = self.step
         self.step = next(step for step in self.steps if step.key == key)
         row = self.steps.index(self.step)
         self.step_list.go_to(row)
@@ -188,6 +193,8 @@ class Wizard(WizardFrame):
         self._capture_key.setEnabled(self.step.stage is not None and key != "refraction")
         self.looking.take_step(self.step)
         self.camera.use(self.looking.has_pictures or key == "validation")
+        if left.key == "setup" and left is not self.step:
+            self._take_setup()
         self._compute_what_never_was()
         self.standing.refresh()
         centre: dict[str, QWidget] = {"setup": self.setup, "result": self.result}
@@ -252,6 +259,19 @@ class Wizard(WizardFrame):
     def _on_stated(self, stated: Session) -> None:
         self.controller.describe(stated)
         self.panel.show_notice(tr("Taken. What rests on it is computed again."), "pass")
+
+    def _take_setup(self) -> None:
+        """Take what is stated in the set-up, which is left without the button at its foot."""
+        if not self.setup.edited:
+            return
+        if not self.setup.accept.isEnabled():
+            text = tr("The set-up is not taken: it gives the sensor no serial number.")
+            self.context.toasts.show(text, "warn")
+            return
+        before = self.project.session
+        self.controller.describe(self.setup.stated())
+        if self.project.session is not before:
+            self.context.toasts.show(tr("What was changed in the set-up is taken."))
 
     def _recompute(self) -> None:
         self.controller.compute(self.step.stages[-1] if self.step.stages else None)

@@ -76,7 +76,7 @@ class SensorsPage(QWidget):
             self,
             "sensors.new",
             tr("&New sensor"),
-            lambda: requests.page.emit("calibrate"),
+            requests.new_sensor.emit,
             keys=("Ctrl+N",),
             icon_name="add",
             tip=tr("Calibrate a sensor from its camera"),

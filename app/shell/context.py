@@ -92,6 +92,7 @@ class Requests(QObject):
     path = Signal(str, str)  # name, path: show that page and let it open a folder or file
     session = Signal(str)  # folder: calibrate from it, and remember it
     choose_session = Signal()  # the same, with the folder still to be chosen by the person
+    new_sensor = Signal()  # begin to calibrate another one; an open session is closed
     demo = Signal()  # put the virtual sensor in as the source
     begin_demo = Signal()  # that, and begin to calibrate it
     calibrations_changed = Signal()  # calibrations were added, removed, validated or put into use

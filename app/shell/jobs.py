@@ -40,6 +40,9 @@ class Job:
         Called in the GUI thread with what `work` returned.
     failed : callable or None
         Called in the GUI thread with a sentence where it came to nothing; None: Jobs.refused.
+    stopped : callable or None
+        Called in the GUI thread with a sentence where it was cancelled, as it ran or before it
+        began; None: Jobs.refused, and only where it ran. Not once Jobs are closed.
     ended : callable
         Called in the GUI thread before any of these, however it ended; not once Jobs are closed.
     must : bool
@@ -52,6 +55,7 @@ class Job:
     work: Callable[[Callable[[float], None]], Any]
     done: Callable[[Any], None] = field(default=lambda _result: None)
     failed: Callable[[str], None] | None = None
+    stopped: Callable[[str], None] | None = None
     ended: Callable[[], object] = field(default=lambda: None)
     must: bool = False
     over: bool = False
@@ -191,6 +195,8 @@ class Jobs(QObject):
         assert future is not None
         job.ended()
         if future.cancelled():
+            if job.stopped is not None:
+                job.stopped(_stopped(job))
             return
         error = future.exception()
         if error is None:
@@ -200,7 +206,7 @@ class Jobs(QObject):
 
     def _tell_failure(self, job: Job, error: BaseException) -> None:
         if isinstance(error, Cancelled):
-            self.refused.emit(tr("{title}: stopped").format(title=job.title))
+            (job.stopped or self.refused.emit)(_stopped(job))
         elif isinstance(error, InputError):
             (job.failed or self.refused.emit)(str(error))
         else:
@@ -216,6 +222,10 @@ class Jobs(QObject):
         if said != self._said:
             self._said = said
             self.progressed.emit(*said)
+
+
+def _stopped(job: Job) -> str:
+    return tr("{title}: stopped").format(title=job.title)
 
 
 def _log_late(title: str, future: Future[Any]) -> None:

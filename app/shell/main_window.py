@@ -95,6 +95,7 @@ class MainWindow(QMainWindow):
         requests.path.connect(self.open_path_in)
         requests.session.connect(self.open_session)
         requests.choose_session.connect(self.choose_session)
+        requests.new_sensor.connect(self.begin_new_sensor)
         requests.demo.connect(context.source.choose_virtual_sensor)
         requests.begin_demo.connect(self.begin_demo)
         context.source.changed.connect(self._remember_source)
@@ -207,6 +208,11 @@ class MainWindow(QMainWindow):
             _call(page, "open_path", path)
         except InputError as error:
             self.context.toasts.show(str(error), "fail")
+
+    def begin_new_sensor(self) -> None:
+        """Begin to calibrate a sensor, where that is there."""
+        if "calibrate" in self.entries:
+            self._with_page("calibrate", lambda page: _call(page, "begin"))
 
     def begin_demo(self) -> None:
         """Put the virtual sensor in as the source, and begin to calibrate it where that is there.

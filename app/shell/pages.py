@@ -21,8 +21,8 @@ class PageEntry:
 
     A page is a QWidget whose class takes the keyword ``context`` (an AppContext). It may have
     ``enter()`` and ``leave()`` (it is shown, it is left), ``may_close() -> bool`` (asked before
-    the window closes), ``open_path(path)`` (a folder or file was dropped or chosen) and
-    ``begin_demo()`` (begin on the virtual sensor).
+    the window closes), ``open_path(path)`` (a folder or file was dropped or chosen),
+    ``begin()`` (begin on a new sensor) and ``begin_demo()`` (begin on the virtual sensor).
 
     Attributes
     ----------

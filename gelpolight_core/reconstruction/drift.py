@@ -17,6 +17,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import LEAST_FACTOR, SATURATED, flat_cosines
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.quality import QualityTable, Verdict, judge
+from gelpolight_core.radiance import whiteboard
 from gelpolight_core.reconstruction.full import COARSE, as_linear
 from gelpolight_core.reconstruction.texture_shift import texture_shift_px
 from gelpolight_core.translation import tr
@@ -179,7 +180,9 @@ def _factors(present: Map, calibration: Calibration) -> Map:
     factors = np.zeros(present.shape, np.float32)
     np.divide(present, theory, out=factors, where=theory > 0.0, casting="same_kind")
     known = (factors > LEAST_FACTOR).all(axis=2) & np.isfinite(factors).all(axis=2)
-    known &= (present < SATURATED).all(axis=2) & (calibration.radiance > 0.0).all(axis=2)
+    # As the calibration asks of the white board: what was dim there stays out.
+    lit = calibration.radiance * flat_cosines(calibration.table, calibration.led_positions_mm)
+    known &= (present < SATURATED).all(axis=2) & (lit > whiteboard.LEAST_LIGHT).all(axis=2)
     factors[~known] = 0.0
     return factors
 

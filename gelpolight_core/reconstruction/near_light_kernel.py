@@ -59,6 +59,8 @@ def _response(lx, ly, lz, nx, ny, nz, vx, vy, vz, shape, curves, k):  # type: ig
 def _limit(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Return the normal at unit length and not steeper than can be seen."""
     size = sqrt(nx * nx + ny * ny + nz * nz)
+    if size < 1e-12:  # all channels black: no light tells of a slope
+        return 0.0, 0.0, -1.0
     nx, ny, nz = nx / size, ny / size, nz / size
     if nz > -STEEPEST_NZ:
         level = sqrt(nx * nx + ny * ny)

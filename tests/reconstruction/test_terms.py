@@ -146,6 +146,15 @@ def test_a_pixel_that_is_not_a_number_is_missing_whatever_is_believed(
     assert np.isfinite(result.depth_mm).all()
 
 
+def test_a_black_place_is_flat_where_dark_channels_are_believed(
+    rgb: Map, virtual_calibration: Calibration
+) -> None:
+    black = rgb.copy()
+    black[230:233, 120:123] = 0.0
+    result = solved(black, virtual_calibration, shadows=False)
+    assert np.isfinite(result.depth_mm).all()
+
+
 def test_without_weights_what_cannot_be_seen_spoils_the_depth(
     rgb: Map, whole: FullDepth, virtual_calibration: Calibration, virtual_session: Path
 ) -> None:

@@ -119,6 +119,18 @@ def test_the_mirror_may_have_an_exposure_of_its_own(
     context.toasts.clear()
 
 
+def test_imported_pictures_say_nothing_of_the_camera_that_is_live(
+    technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
+    small_session: Path, qtbot: QtBot,
+) -> None:  # fmt: skip
+    technician.begin(fresh, "balls")
+    live(context, qtbot)
+    technician.wizard.taking.import_files([small_session / "balls" / "ball_01.png"])
+    technician.rest()
+    assert fresh.session.captured("balls")
+    assert read_session(fresh.session.folder).camera_settings is None
+
+
 def test_a_calibration_is_told_how_its_camera_was_set(computed_project: Made) -> None:
     project, stored = computed_project(), settings_of_texts(TEXTS)
     before = {stage: status.state for stage, status in project.statuses().items()}

@@ -16,7 +16,9 @@ from pytestqt.qtbot import QtBot
 from technician import Technician, ToldCamera, read_rgb
 
 from app.calibrate.steps import all_steps
+from app.calibrate.watching import Seen
 from app.shell import theme
+from app.sources.processor import Outcome
 from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.project import CalibrationProject
@@ -45,6 +47,30 @@ def test_a_capture_is_on_disk_when_it_is_told_with_the_radius_stated(
     assert kept.ball_radii_mm[name] == 2.5
     assert kept.picture(technician.session / "balls" / name).size == (320, 240)
     assert name in technician.wizard.panel.notice.text()
+
+
+def test_a_radius_that_is_typed_stays_and_is_stated_without_enter(
+    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path,
+    qtbot: QtBot,
+) -> None:  # fmt: skip
+    technician.begin(computed_project(), "balls")
+    camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
+    wizard, told = technician.wizard, list[str]()
+    wizard.controller.captured.connect(lambda _stage, name: told.append(name))
+    panel = wizard.panel
+    panel.radius.setFocus()
+    panel.radius.selectAll()
+    qtbot.keyClicks(panel.radius, "4")
+    wizard.controller.changed.emit()
+    assert panel.radius.cleanText() == "4"
+    panel.automatic.setChecked(True)
+    wizard.looking.good.emit()
+    assert not wizard.controller.watching.capturing  # half a number, perhaps
+    panel.automatic.setChecked(False)
+    qtbot.keyClick(panel.radius, Qt.Key.Key_F5)
+    technician.until(lambda: told)
+    assert read_session(technician.session).ball_radii_mm[told[0]] == 4.0
+    technician.rest()
 
 
 def test_captures_do_not_wait_for_a_computation(
@@ -209,6 +235,24 @@ def test_capturing_by_itself_waits_for_still_and_good_and_takes_no_view_twice(
     assert len(fresh.session.captured("checkerboard")) == 1
     camera.show(read_rgb(second))
     technician.until(lambda: len(fresh.session.captured("checkerboard")) == 2)
+    technician.rest()
+
+
+def test_what_was_captured_by_hand_is_not_captured_by_itself(
+    technician: Technician, camera: ToldCamera, fresh: CalibrationProject, small_session: Path
+) -> None:
+    view = read_rgb(min((small_session / "checkerboard").glob("*.png")))
+    camera.show(np.full_like(view, 60))
+    technician.begin(fresh, "lens")
+    items: list[Outcome[Seen]] = []
+    technician.wizard.controller.watching.detected.connect(items.append)
+    technician.until(lambda: items)
+    camera.show(view)
+    technician.until(lambda: items[-1].value.still and items[-1].value.moved)
+    technician.capture()
+    items.clear()
+    technician.until(lambda: items and items[-1].value.still)
+    assert not any(item.value.moved for item in items)
     technician.rest()
 
 

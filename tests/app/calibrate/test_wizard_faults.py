@@ -52,6 +52,30 @@ def test_a_camera_that_stops_is_named_and_can_be_connected_again(
 
 
 @pytest.mark.parametrize(
+    "leave",
+    [
+        pytest.param(lambda one: one.wizard.go_to("result"), id="step"),
+        pytest.param(lambda one: one.page.leave(), id="page"),
+        pytest.param(lambda one: one.page._leave_session(), id="session"),
+    ],
+)
+def test_a_capture_that_is_left_before_it_is_complete_is_told_as_not_taken(
+    technician: Technician, camera: ToldCamera, computed_project: Made, context: AppContext,
+    leave: Callable[[Technician], None],
+) -> None:  # fmt: skip
+    """The camera shows nothing yet, so that the frames of a capture cannot come."""
+    context.toasts.attach(technician.page, lambda: None)
+    technician.begin(computed_project(), "background")
+    controller = technician.wizard.controller
+    technician.click("calibrate.capture")
+    assert controller.watching.capturing
+    leave(technician)
+    assert not controller.watching.capturing
+    assert ["not taken" in toast.text for toast in context.toasts.shown()] == [True]
+    context.toasts.clear()
+
+
+@pytest.mark.parametrize(
     ("step", "shown", "said"),
     [
         pytest.param("lights", "background/background.png", "", id="membrane left on"),

@@ -59,6 +59,13 @@ def test_a_first_start_offers_ways_to_begin(page: SensorsPage) -> None:
     assert any(button.objectName() == "welcome.sensors.import" for button in buttons)
 
 
+def test_a_new_sensor_is_asked_for_and_not_the_page_of_another(
+    page: SensorsPage, context: AppContext, qtbot: QtBot
+) -> None:
+    with qtbot.waitSignal(context.requests.new_sensor):
+        page.new.trigger()
+
+
 def test_an_imported_calibration_is_shown_with_every_stage(
     page: SensorsPage, source: Path, context: AppContext
 ) -> None:

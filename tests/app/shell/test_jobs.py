@@ -166,3 +166,27 @@ def test_who_asked_is_told_that_a_job_ended_however_it_did(end: str, qtbot: QtBo
     qtbot.waitUntil(lambda: not jobs.busy)
     assert ended == [end]
     assert jobs.close()
+
+
+@pytest.mark.parametrize("runs", [True, False])
+def test_who_asked_is_told_that_a_job_was_stopped(runs: bool, qtbot: QtBot) -> None:
+    jobs, told, refused = Jobs("jobs"), list[str](), list[str]()
+    begun, go = threading.Event(), threading.Event()
+    jobs.refused.connect(refused.append)
+
+    def work(tell: Tell) -> None:
+        begun.set()
+        assert go.wait(10.0)
+        tell(0.5)
+
+    if not runs:
+        jobs.submit(Job("first", lambda _tell: go.wait(10.0)))
+    jobs.submit(Job("export", work, stopped=told.append))
+    if runs:
+        assert begun.wait(10.0)
+    jobs.cancel()
+    go.set()
+    qtbot.waitUntil(lambda: not jobs.busy)
+    assert told == ["export: stopped"]
+    assert not refused
+    assert jobs.close()

@@ -57,6 +57,9 @@ class Page(QWidget):
     def may_close(self) -> bool:
         return self.closable
 
+    def begin(self) -> None:
+        self.events.append("begin")
+
     def begin_demo(self) -> None:
         self.events.append("begin demo")
 
@@ -482,6 +485,14 @@ def test_the_demo_puts_the_virtual_sensor_in_once(window: MainWindow) -> None:
     assert chosen[0].open().bench is bench
     assert window.page_name == "calibrate"
     assert window.page("calibrate").events == ["enter", "begin demo"]
+
+
+def test_a_new_sensor_is_begun_though_the_page_shows_another(window: MainWindow) -> None:
+    window.show_page("calibrate")
+    window.show_page("sensors")
+    window.context.requests.new_sensor.emit()
+    assert window.page_name == "calibrate"
+    assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
 
 
 def test_frames_that_are_not_looked_at_are_told_as_a_rate_of_the_last_seconds() -> None:
