@@ -88,6 +88,7 @@ class Looking(QObject):
 
     def live(self) -> None:
         """Show the live picture again."""
+        self._panel.radius.interpretText()  # what is typed is of the picture that was looked at
         self.name = ""
         self._pictures.strip.choose("")
         self._pictures.show_looked_at("")
@@ -144,6 +145,7 @@ class Looking(QObject):
             If it cannot be read.
         """
         raw = read_raw(self._path(name))
+        self._panel.radius.interpretText()  # what is typed is not of this picture
         self.name = name
         view = self._pictures.view
         view.set_stream(None)

@@ -91,9 +91,10 @@ class CalibratePage(QWidget):
     # Ways to begin
 
     def begin(self) -> None:
-        """Ask what is known of a new sensor."""
+        """Ask what is known of a new sensor; what was typed of it already stays."""
         self._close_wizard()
-        self.form.show_session(self._proposal(), new=True)
+        if self._stack.currentWidget() is not self.form or not self.form.edited:
+            self.form.show_session(self._proposal(), new=True)
         self._stack.setCurrentWidget(self.form)
         self.form.serial.setFocus()
 
@@ -101,6 +102,7 @@ class CalibratePage(QWidget):
         """Begin on the virtual sensor."""
         self.context.requests.demo.emit()
         self.begin()
+        self.form.show_session(self._proposal(), new=True)
 
     def choose_folder(self) -> None:
         """Let the person choose a session folder."""

@@ -216,7 +216,7 @@ class SetupForm(QScrollArea):
 
     @property
     def edited(self) -> bool:
-        """Whether it states anything else than when it was filled, or taken last."""
+        """Whether it states anything else than when it was filled."""
         return self.stated() != self._known  # not the session: the fields round what they show
 
     def stated(self) -> Session:
@@ -268,8 +268,7 @@ class SetupForm(QScrollArea):
         show_meaning(self.problem, "")
 
     def _on_accept(self) -> None:
-        self._known = self.stated()
-        self.accepted.emit(self._known)
+        self.accepted.emit(self.stated())
 
 
 class _BoardRow(QWidget):

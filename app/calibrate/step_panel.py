@@ -208,7 +208,7 @@ class StepPanel(QWidget):
     @property
     def types_radius(self) -> bool:
         """Whether a radius is being typed: the field's value is still the one before."""
-        return self.radius.cleanText() != self.radius.textFromValue(self.radius.value())
+        return self.radius.valueFromText(self.radius.text()) != self.radius.value()
 
     def show_step(self, step: Step, *, following: str) -> None:
         """Show another step's task; `following`: the title of the step after it, if any."""

@@ -43,9 +43,13 @@ class Taking(QObject):
             self._controller.capture(self._frame.step, radius_mm=self._looking.radius_mm)
 
     def _capture_by_itself(self) -> None:
-        # Not while a radius is being typed: half a number is none.
-        if self._panel.automatic.isChecked() and not self._panel.types_radius:
-            self.capture()
+        if not self._panel.automatic.isChecked():
+            return
+        if self._panel.types_radius:  # half a number is none
+            text = tr("Press Enter after the radius: then pictures are taken by themselves.")
+            self._panel.show_notice(text, "warn")
+            return
+        self.capture()
 
     def _on_captured(self, stage: str, name: str) -> None:
         shown = self._frame.step.stage

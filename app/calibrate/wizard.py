@@ -125,6 +125,7 @@ class Wizard(WizardFrame):
 
     def close_session(self) -> None:
         """End all work; everything captured and decided is on disk."""
+        self.panel.radius.interpretText()  # while it can still be kept
         self.context.source.changed.disconnect(self.camera.open)
         self.setup_camera.close()
         self.leave()
@@ -135,8 +136,8 @@ class Wizard(WizardFrame):
         self.controller.refused.disconnect(self._refuse)
         toasts = self.context.toasts
         self.controller.refused.connect(lambda text: toasts.show(text, "fail"))
-        if self.step.key == "setup":
-            self._take_setup()
+        if self.setup.edited:
+            toasts.show(tr("What was changed in the set-up was not taken."), "warn")
         self.controller.close()
 
     def _on_camera(self) -> None:
@@ -184,7 +185,7 @@ class Wizard(WizardFrame):
         following = self.steps[row + 1].title if row + 1 < len(self.steps) else ""
         self.panel.show_step(self.step, following=following)
         self.side.setCurrentWidget(self.validation if key == "validation" else self.panel)
-        if key == "setup":
+        if key == "setup" and not self.setup.edited:
             self.setup.show_session(self.project.session, new=False)
         self.pictures.strip.setVisible(self.step.stage is not None)
         self.pictures.show_tab(PICTURE, key != "refraction")
@@ -193,8 +194,9 @@ class Wizard(WizardFrame):
         self._capture_key.setEnabled(self.step.stage is not None and key != "refraction")
         self.looking.take_step(self.step)
         self.camera.use(self.looking.has_pictures or key == "validation")
-        if left.key == "setup" and left is not self.step:
-            self._take_setup()
+        if left.key == "setup" and left is not self.step and self.setup.edited:
+            text = tr("What was changed in the set-up is not taken yet: go back to it for that.")
+            self.context.toasts.show(text, "warn")
         self._compute_what_never_was()
         self.standing.refresh()
         centre: dict[str, QWidget] = {"setup": self.setup, "result": self.result}
@@ -257,21 +259,12 @@ class Wizard(WizardFrame):
             self.standing.show_refraction()
 
     def _on_stated(self, stated: Session) -> None:
-        self.controller.describe(stated)
-        self.panel.show_notice(tr("Taken. What rests on it is computed again."), "pass")
-
-    def _take_setup(self) -> None:
-        """Take what is stated in the set-up, which is left without the button at its foot."""
-        if not self.setup.edited:
-            return
-        if not self.setup.accept.isEnabled():
-            text = tr("The set-up is not taken: it gives the sensor no serial number.")
-            self.context.toasts.show(text, "warn")
-            return
         before = self.project.session
-        self.controller.describe(self.setup.stated())
-        if self.project.session is not before:
-            self.context.toasts.show(tr("What was changed in the set-up is taken."))
+        self.controller.describe(stated)
+        if self.project.session is before:
+            return  # why is said already
+        self.setup.show_session(self.project.session, new=False)
+        self.panel.show_notice(tr("Taken. What rests on it is computed again."), "pass")
 
     def _recompute(self) -> None:
         self.controller.compute(self.step.stages[-1] if self.step.stages else None)

@@ -1,8 +1,7 @@
-"""What is changed in the set-up is not lost where it is left by another way than its button."""
+"""What is changed in the set-up and not taken is neither lost nor left in silence."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 
 import pytest
@@ -14,44 +13,46 @@ from gelpolight_core.session.session import read_session
 Made = Callable[[], CalibrationProject]
 
 
-def test_what_was_changed_is_taken_as_the_step_is_left_and_can_be_undone(
-    technician: Technician, computed_project: Made
+def test_what_was_changed_stays_and_is_told_as_the_step_is_left(
+    technician: Technician, computed_project: Made, caplog: pytest.LogCaptureFixture
 ) -> None:
     technician.begin(computed_project(), "setup")
     wizard = technician.wizard
     before = read_session(technician.session).sensor.led_height_mm
+    wizard.go_to("lens")
+    assert "set-up" not in caplog.text
+    wizard.go_to("setup")
     wizard.setup.led_height.setValue(before + 0.5)
-    technician.click("calibrate.next")
-    assert wizard.step.key == "lens"
-    assert read_session(technician.session).sensor.led_height_mm == before + 0.5
-    assert wizard.controller.undo.count() == 1
-    wizard.controller.undo.undo()
+    wizard.go_to("lens")
+    assert "in the set-up is not taken yet" in caplog.text
     assert read_session(technician.session).sensor.led_height_mm == before
     wizard.go_to("setup")
-    wizard.go_to("balls")
-    assert not wizard.controller.undo.canUndo()
+    assert wizard.setup.led_height.value() == before + 0.5
+    wizard.setup.accept.click()
+    assert read_session(technician.session).sensor.led_height_mm == before + 0.5
+    assert not wizard.setup.edited
     wizard.controller.jobs.cancel()
     technician.rest()
 
 
-def test_what_was_changed_is_taken_as_the_session_is_left(
-    technician: Technician, computed_project: Made
-) -> None:
-    technician.begin(computed_project(), "setup")
-    folder, form = technician.session, technician.wizard.setup
-    form.led_height.setValue(form.led_height.value() + 0.5)
-    stated = form.led_height.value()
-    technician.page.begin()
-    assert technician.page.wizard is None
-    assert read_session(folder).sensor.led_height_mm == stated
-
-
-def test_a_set_up_that_cannot_be_taken_is_told(
+def test_what_was_changed_is_told_as_the_session_is_left(
     technician: Technician, computed_project: Made, caplog: pytest.LogCaptureFixture
 ) -> None:
     technician.begin(computed_project(), "setup")
-    technician.wizard.setup.serial.clear()
-    with caplog.at_level(logging.INFO):
-        technician.wizard.go_to("lens")
-    assert "no serial number" in caplog.text
-    assert technician.wizard.controller.undo.count() == 0
+    folder, form = technician.session, technician.wizard.setup
+    before = read_session(folder)
+    form.led_height.setValue(form.led_height.value() + 0.5)
+    technician.page.begin()
+    assert technician.page.wizard is None
+    assert "in the set-up was not taken" in caplog.text
+    assert read_session(folder) == before
+
+
+def test_what_was_typed_of_a_new_sensor_stays_when_it_is_begun_again(
+    technician: Technician,
+) -> None:
+    page = technician.page
+    page.begin()
+    page.form.serial.setText("B-002")
+    page.begin()
+    assert page.form.serial.text() == "B-002"
