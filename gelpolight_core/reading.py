@@ -147,6 +147,11 @@ def written_text(value: Any, most: int = 1_000_000) -> str:
     return value
 
 
+def as_text(name: str) -> str:
+    """Return a name so that it can be written: what of it is no text is spelt by its codes."""
+    return name.encode("utf-8", "backslashreplace").decode()
+
+
 def is_file_name(name: str) -> bool:
     """Return whether a text names a file in a folder, and nothing outside of it."""
     forbidden = set(name) & {"/", "\\", "\0"}

@@ -77,7 +77,7 @@ class CurveStep(QWidget):
                 tr("Gathering the scatter"),
                 lambda _tell: _gather(project),
                 self._show,
-                self._fail,
+                self._say,
                 stopped=self._on_stopped,
             )
         )
@@ -93,9 +93,6 @@ class CurveStep(QWidget):
     def _say(self, sentence: str) -> None:
         self._said.setText(sentence)
         self._said.show()
-
-    def _fail(self, sentence: str) -> None:
-        self._say(sentence)
 
     def _on_stopped(self, sentence: str) -> None:
         self._made_of = None  # the next look gathers anew

@@ -28,7 +28,7 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
-from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.session import ONE_IMAGE_STAGES
 from gelpolight_core.translation import tr
@@ -234,8 +234,7 @@ class StepPanel(QWidget):
         if wanted > 1:
             text = tr("&Capture  ({n} of {m})").format(n=count, m=max(wanted, count))
         elif count:
-            folder = self._step and self._step.stage and FOLDERS[self._step.stage]
-            alone = folder in ONE_IMAGE_STAGES
+            alone = self._step is not None and self._step.folder in ONE_IMAGE_STAGES
             text = tr("&Capture again") if alone else tr("&Capture another")
         self.capture.setText(text)
 

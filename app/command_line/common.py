@@ -130,24 +130,6 @@ def points(given: Iterable[Iterable[float]], *, where: str) -> list[tuple[float,
     return list(zip(flat[::2], flat[1::2], strict=True))
 
 
-def one_place(given: Iterable[Iterable[float]], *, where: str) -> tuple[float, float]:
-    """Return the one place of an argument, as :func:`points` does.
-
-    Raises
-    ------
-    InputError
-        If it is not one.
-    """
-    places = points(given, where=where)
-    if len(places) != 1:
-        raise InputError(
-            tr("{n} places are given").format(n=len(places)),
-            where=where,
-            advice=tr("Give one: X and Y in mm"),
-        )
-    return places[0]
-
-
 def session_files(session: Session) -> tuple[Path, ...]:
     """Return what no result may take the place of: all that was captured, stated and decided."""
     stages = (*session.optional_stages, *STAGES)

@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         refuse_overwriting([options.json], filter(None, used))
         refuse_unwritable(options.json)
     tools = chosen_tools(options)
-    truth, seed = _truth(options), _seed(options)
+    truth = _truth(options)
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     frame = read_frame(options.image, reconstructor)
     heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
@@ -75,6 +75,7 @@ def run(options: argparse.Namespace) -> int:
         }
         lines = [line for result in results for line in tool_lines(result)]
     else:
+        seed = tuple(options.seed) if options.seed else None
         shape = options.shape if options.shape != AUTO else _proposed(heightmap, seed, options)
         measurement = measure_heightmap(heightmap, shape=shape, seed_mm=seed)
         comparison = None if truth is None else compare(measurement, truth)
@@ -106,19 +107,6 @@ def _truth(options: argparse.Namespace) -> Truth | None:
             advice=tr("Add the picture with its shape and true sizes"),
         )
     return rows[options.image.name]
-
-
-def _seed(options: argparse.Namespace) -> tuple[float, float] | None:
-    """Return the point on the object to measure, where one is named."""
-    if options.seed is None:
-        return None
-    if options.shape is None:
-        raise InputError(
-            tr("it does not go with a measuring tool"),
-            where="--seed",
-            advice=tr("Use it with --shape; a place for --tool is given by --at"),
-        )
-    return options.seed[0], options.seed[1]
 
 
 def _proposed(

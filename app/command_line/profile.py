@@ -10,11 +10,12 @@ from app.command_line.common import (
     add_model,
     load_reconstructor,
     numbers,
-    one_place,
+    points,
     read_frame,
     refuse_overwriting,
 )
 from app.command_line.terminal import say
+from gelpolight_core.errors import InputError
 from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.measurement.profile import take_profile
@@ -48,8 +49,7 @@ def run(options: argparse.Namespace) -> int:
     """Reconstruct the picture, cut through it and write the section."""
     refuse_overwriting([options.output], [options.calibration, options.image])
     refuse_unwritable(options.output)
-    start = one_place(options.start, where="--from")
-    end = one_place(options.end, where="--to")
+    start, end = _place(options.start, "--from"), _place(options.end, "--to")
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     frame = read_frame(options.image, reconstructor)
     heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
@@ -61,3 +61,14 @@ def run(options: argparse.Namespace) -> int:
         )
     )
     return 0
+
+
+def _place(given: list[list[float]], where: str) -> tuple[float, float]:
+    places = points(given, where=where)
+    if len(places) != 1:
+        raise InputError(
+            tr("{n} places are given").format(n=len(places)),
+            where=where,
+            advice=tr("Give one: X and Y in mm"),
+        )
+    return places[0]

@@ -73,7 +73,7 @@ def chosen_tools(options: argparse.Namespace) -> tuple[Tool, ...]:
         _refuse_rest(options, set(), "--tools")
         return tools_from_json(_read(options.tools))
     if options.tool is None:
-        _refuse_rest(options, set(), "--shape")
+        _refuse_rest(options, {"seed"}, "--shape")
         return ()
     return (tool_from_dict({"tool": options.tool, **_geometry(options)}),)
 
@@ -142,7 +142,7 @@ def _given(**values: Any) -> dict[str, Any]:
 
 def _refuse_rest(options: argparse.Namespace, taken: set[str], name: str) -> None:
     """Refuse an argument that would be ignored."""
-    for key in ("at", "width", "level", "range", "size", "yaw", "edge"):
+    for key in ("at", "width", "level", "range", "size", "yaw", "edge", "seed"):
         if getattr(options, key) not in (None, []) and key not in taken:
             raise InputError(
                 tr("it does not go with {name}").format(name=name),

@@ -90,7 +90,7 @@ class Details(QTabWidget):
         self._on_tab()
 
     def use(self, calibration: Calibration | None) -> None:
-        """Place tools in the camera's picture by this calibration."""
+        """Place tools in the camera's picture by this calibration; the depth before it goes."""
         self._calibration, self._places = calibration, None
         self._answer = None
         self.surface.show_surface(None)

@@ -293,13 +293,15 @@ def _refuse_twins(plan: BatchPlan) -> None:
     }
     for name in names:  # a picture may be called as a frame of the recording beside it
         stem, _, number = name.rpartition("_")
-        if stem in frames and number.isdecimal() and number == f"{int(number):0{DIGITS}d}":
-            if int(number) in plan.selection.of(frames[stem]):
-                raise InputError(
-                    tr("a picture has the name of a frame's result: {name}").format(name=name),
-                    where=tr("INPUT"),
-                    advice=tr("Name its folder and the recording in runs of their own"),
-                )
+        if stem not in frames or not number.isdecimal():
+            continue
+        index = int(number)
+        if number == f"{index:0{DIGITS}d}" and index in plan.selection.of(frames[stem]):
+            raise InputError(
+                tr("a picture has the name of a frame's result: {name}").format(name=name),
+                where=tr("INPUT"),
+                advice=tr("Name its folder and the recording in runs of their own"),
+            )
     if twins:
         raise InputError(
             tr("two inputs would have results named {name}").format(name=twins[0]),

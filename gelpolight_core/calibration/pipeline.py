@@ -25,6 +25,7 @@ from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reading import as_text
 from gelpolight_core.reflectance.membrane import MEMBRANES
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.response.stage import ResponseResult
@@ -266,7 +267,7 @@ def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
 
 def _provenance(session: Session) -> Provenance:
     sources = {
-        _as_text(f"{path.parent.name}/{path.name}"): file_hash(path)
+        as_text(f"{path.parent.name}/{path.name}"): file_hash(path)
         for path in source_files(session)
     }
     for name in ("session.toml", DECISIONS_FILE):
@@ -277,13 +278,8 @@ def _provenance(session: Session) -> Provenance:
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         operator=user_name(),
         program_version=__version__,
-        session=_as_text(session.folder.resolve().name),
+        session=as_text(session.folder.resolve().name),
         sources=sources,
         inputs=all_inputs(session),
         camera_settings={} if camera is None else camera.as_texts(),
     )
-
-
-def _as_text(name: str) -> str:
-    """Return a file's name so that a calibration file can hold it, in whatever bytes it is kept."""
-    return name.encode("utf-8", "backslashreplace").decode()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.reading import as_text
 from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
 from gelpolight_core.translation import tr
 
@@ -158,8 +159,7 @@ class _AppendedArrays:
 
     def add_text(self, name: str, text: str) -> str:
         """Append one text: its UTF-8 bytes and a closing NUL."""
-        # A file's name need not be text: bytes of it that are none stay readable as \udcXX.
-        codes = np.frombuffer(text.encode("utf-8", "backslashreplace") + b"\0", dtype=np.uint8)
+        codes = np.frombuffer(as_text(text).encode() + b"\0", dtype=np.uint8)
         return self.add(name, codes, "String", 'NumberOfTuples="1"')
 
 

@@ -24,6 +24,17 @@ class Waiting:
         self.job = job
 
 
+def _library_of_one(
+    context: AppContext, calibration: Calibration, qtbot: QtBot
+) -> tuple[Path, CalibrationChoice, Waiting, CalibrationBox]:
+    """Return where the only calibration is, and the choice of it with what it works by."""
+    path = context.workspace.calibration_path("virtual-1", "small")
+    write_calibration(calibration, path)
+    box, jobs = CalibrationBox(), Waiting()
+    qtbot.addWidget(box)
+    return path, CalibrationChoice(jobs, box, context=context), jobs, box  # type: ignore[arg-type]
+
+
 def test_a_reading_that_was_stopped_is_over(context: AppContext, qtbot: QtBot) -> None:
     """Otherwise the page would say for ever that it takes a moment."""
     box, jobs = CalibrationBox(), Waiting()
@@ -40,11 +51,7 @@ def test_one_whose_reading_was_stopped_is_read_when_it_is_asked_for_again(
     context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     """Otherwise only another calibration would help."""
-    path = context.workspace.calibration_path("virtual-1", "small")
-    write_calibration(small_calibration, path)
-    box, jobs = CalibrationBox(), Waiting()
-    qtbot.addWidget(box)
-    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    path, choice, jobs, box = _library_of_one(context, small_calibration, qtbot)
     choice.refresh()
     choice.use_what_fits("", None)
     first = jobs.job
@@ -66,11 +73,7 @@ def test_the_calibration_before_is_let_go_when_another_is_put_into_use(
     context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     """Otherwise it measures on under the other's name, where that is not read to its end."""
-    path = context.workspace.calibration_path("virtual-1", "small")
-    write_calibration(small_calibration, path)
-    box, jobs = CalibrationBox(), Waiting()
-    qtbot.addWidget(box)
-    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    path, choice, jobs, _ = _library_of_one(context, small_calibration, qtbot)
     told: list[tuple[object, object, bool]] = []
     choice.loaded.connect(lambda live, best: told.append((live, best, choice.is_reading)))
     choice.refresh()
@@ -87,11 +90,7 @@ def test_what_was_read_before_the_file_was_replaced_is_not_used(
     context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     """As by a second zero while the first is still being read."""
-    path = context.workspace.calibration_path("virtual-1", "small")
-    write_calibration(small_calibration, path)
-    box, jobs = CalibrationBox(), Waiting()
-    qtbot.addWidget(box)
-    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    path, choice, jobs, _ = _library_of_one(context, small_calibration, qtbot)
     choice.refresh()
     choice.use_what_fits("", None)
     choice.refresh()
