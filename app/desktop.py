@@ -12,31 +12,32 @@ from contextlib import contextmanager
 from ctypes.util import find_library
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QSocketNotifier, Qt, QTimer
+from PySide6.QtCore import QCoreApplication, QLibraryInfo, QSocketNotifier, Qt, QTimer, QTranslator
 from PySide6.QtGui import QGuiApplication, QSurfaceFormat
 from PySide6.QtWidgets import QApplication
 
-from app.cameras.desk import CameraDesk
-from app.shell import theme
-from app.shell.context import AppContext, Requests, SourceChoice
+from app.cameras.manager import CameraManager
+from app.context.context import AppContext, Requests, SourceChoice
+from app.services.log import Log
+from app.services.opengl import surface_format
+from app.services.settings import APPLICATION, Settings
+from app.services.status import StatusModel
+from app.services.toasts import Toasts
 from app.shell.faults import Faults
-from app.shell.icons import application_icon
-from app.shell.log import Log
 from app.shell.main_window import SOURCES, MainWindow
 from app.shell.memory import keep_little
-from app.shell.settings import APPLICATION, Settings
-from app.shell.status import StatusModel
-from app.shell.toasts import Toasts
 from app.sources.stopping import join_left_behind
+from app.theme import theme
+from app.theme.icons import application_icon
 from app.workspace.workspace import Workspace
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
-from gelpolight_core.translation import tr
+from gelpolight_core.translation import current_language, tr
 
-# The first page is drawn and answers before anything heavy is loaded beside it.
+# The first page is drawn and responds before slow modules are loaded in the background.
 FIRST_LOOK_MS = 300
-# Longer than any single call of a stage or a renderer takes.
+# Longer than any single call of a stage or a renderer.
 LAST_JOIN_S = 10.0
 
 
@@ -46,7 +47,7 @@ def run(arguments: Sequence[str] = ()) -> int:
     Parameters
     ----------
     arguments : sequence of str
-        ``--demo`` puts the virtual sensor in as the source; anything else is a file to open.
+        ``--demo`` selects the virtual sensor as the source. Anything else is a file to open.
 
     Returns
     -------
@@ -56,7 +57,7 @@ def run(arguments: Sequence[str] = ()) -> int:
     Raises
     ------
     InputError
-        If there is no screen to show a window on.
+        If no display is available.
     """
     with screen():
         application = make_application()
@@ -67,15 +68,15 @@ def run(arguments: Sequence[str] = ()) -> int:
     try:
         theme.apply(application, context.settings.theme)
         window = MainWindow(context=context)
-        window.show_page(context.settings.last_page)
+        window.show_page(context.settings.first_page)
         window.show()
         if "--demo" in arguments:
-            QTimer.singleShot(0, window.begin_demo)  # after the window is up
+            QTimer.singleShot(0, window.start_demo)  # after the window is visible
         elif arguments:
             open_files(window, [Path(argument) for argument in arguments])
         if crash:
             context.toasts.show(
-                tr("The program ended in a crash last time; the log says where."),
+                tr("The program crashed in its last run. See the log for details."),
                 "warn",
                 with_log=True,
             )
@@ -101,7 +102,7 @@ def run(arguments: Sequence[str] = ()) -> int:
 
 
 def open_files(window: MainWindow, files: Sequence[Path]) -> None:
-    """Open what a desktop hands over, as if it were dropped; a recording is played at once."""
+    """Open files from the desktop as if they were dropped. A recording is played at once."""
 
     def go_on() -> None:
         window.open_dropped(tuple(files))
@@ -113,15 +114,15 @@ def open_files(window: MainWindow, files: Sequence[Path]) -> None:
 
 @contextmanager
 def screen() -> Iterator[None]:
-    """Refuse in one sentence where Qt would abort: no display, or one that does not answer.
+    """Raise an InputError where Qt would abort: no display, or one that does not respond.
 
-    The display is held while Qt makes its own connection: a server without a desktop starts anew
-    when its last guest leaves, and takes nobody in meanwhile.
+    The connection to the display is held while Qt makes its own. An X server without a desktop
+    restarts when its last client disconnects, and accepts no connection meanwhile.
 
     Raises
     ------
     InputError
-        If there is no screen to show a window on.
+        If no display is available.
     """
     display = os.environ.get("DISPLAY", "")
     other = os.environ.get("QT_QPA_PLATFORM") or os.environ.get("WAYLAND_DISPLAY")
@@ -131,11 +132,11 @@ def screen() -> Iterator[None]:
     with _connection(display) as answers:
         if not answers:
             raise InputError(
-                tr("there is no screen to show a window on"),
+                tr("No display is available for a window"),
                 where=f"DISPLAY={display}",
                 advice=tr(
-                    "Start it on a desktop, use ssh -X, or use the commands, which need no screen "
-                    "(gelpolight --help)"
+                    "Start the program on a desktop, use ssh -X, or use the commands that "
+                    "need no display (gelpolight --help)"
                 ),
             )
         yield
@@ -143,7 +144,7 @@ def screen() -> Iterator[None]:
 
 @contextmanager
 def _connection(display: str) -> Iterator[bool]:
-    """Connect to an X server; whether it answers, True where that cannot be asked."""
+    """Connect to an X server and return whether it answers; True if this cannot be checked."""
     name = find_library("xcb")
     if not display or name is None:
         yield bool(display)
@@ -161,7 +162,7 @@ def _connection(display: str) -> Iterator[bool]:
 
 
 def make_application() -> QApplication:
-    """Return the application, made with what must be set before it exists."""
+    """Return the application, with the options that must be set before it is created."""
     before = QApplication.instance()
     if isinstance(before, QApplication):
         return before
@@ -170,19 +171,25 @@ def make_application() -> QApplication:
         Qt.HighDpiScaleFactorRoundingPolicy.PassThrough
     )
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
-    # The 3D view is loaded late; a format set then would make Qt build the window anew.
-    surface = QSurfaceFormat()
-    surface.setVersion(3, 2)
-    surface.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
-    surface.setDepthBufferSize(24)
-    QSurfaceFormat.setDefaultFormat(surface)
+    # The 3D view has a native window. Its neighbours need none.
+    QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontCreateNativeWidgetSiblings)
+    QSurfaceFormat.setDefaultFormat(surface_format())
     application = QApplication(sys.argv[:1])
     application.setApplicationName(APPLICATION)
     application.setApplicationDisplayName("GelPoLight Studio")
     application.setApplicationVersion(__version__)
     application.setDesktopFileName("gelpolight")
     application.setWindowIcon(application_icon())
+    _translate_dialogs(application)
     return application
+
+
+def _translate_dialogs(application: QApplication) -> None:
+    """Let Qt use the program's language for the buttons and dialogs that it brings."""
+    translator = QTranslator(application)
+    folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
+    if translator.load(f"qtbase_{current_language()}", folder):
+        application.installTranslator(translator)
 
 
 def make_context(
@@ -193,7 +200,7 @@ def make_context(
     Parameters
     ----------
     settings_file, log_folder : Path, optional
-        Elsewhere than in the user's own folders.
+        Used instead of the user's own folders.
     """
     settings = Settings(settings_file)
     status, toasts = StatusModel(), Toasts()
@@ -205,14 +212,14 @@ def make_context(
         source=SourceChoice(),
         requests=Requests(),
         log=Log(log_folder),
-        cameras=CameraDesk(settings=settings, status=status, toasts=toasts),
+        cameras=CameraManager(settings=settings, status=status, toasts=toasts),
     )
 
 
 def _close_on_signals(window: MainWindow) -> Callable[[], None]:
-    """Close the window on Ctrl-C and on the system's request to end; return how to undo that.
+    """Close the window on Ctrl-C and on the system's termination signal. Return an undo function.
 
-    Qt's loop runs no Python by itself: the signal writes into a socket on which Qt listens.
+    Qt's event loop runs no Python code by itself: the signal writes into a socket that Qt watches.
     """
     ours, theirs = socket.socketpair()
     theirs.setblocking(False)

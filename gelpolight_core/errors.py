@@ -1,19 +1,28 @@
-"""The one error a person can mend."""
+"""The error that a user can fix."""
 
 from __future__ import annotations
 
 
 class InputError(Exception):
-    """Input that a person can mend; shown as one sentence, never as a traceback.
+    """Input that the user can correct. It is shown as one sentence, never as a traceback.
 
     Parameters
     ----------
     found : str
-        What was found, as a clause without a full stop ("the picture is all black").
+        What is wrong, as a sentence without a full stop ("The image is black").
     where : str
-        The file, stage or key that it was found in.
+        The file, stage or key where it was found.
     advice : str
         What to do about it, as a sentence without a full stop ("Open the shutter").
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> try:
+    ...     gp.read_calibration("missing.gplcal")
+    ... except gp.InputError as error:
+    ...     print(error.where)
+    missing.gplcal
     """
 
     def __init__(self, found: str, *, where: str, advice: str) -> None:
@@ -23,9 +32,9 @@ class InputError(Exception):
         super().__init__(found, where, advice)
 
     def __str__(self) -> str:
-        """Return the one sentence that a person reads."""
-        said = f"{self.where}: {self.found}. {self.advice}."
-        if said.isprintable():
-            return said
-        # A name from elsewhere may hold what commands a terminal.
-        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in said)
+        """Return the message that the user reads: where, what, advice."""
+        message = f"{self.where}: {self.found}. {self.advice}."
+        if message.isprintable():
+            return message
+        # A file name from elsewhere may contain terminal control characters.
+        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in message)

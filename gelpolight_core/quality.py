@@ -1,8 +1,9 @@
-"""Quality figures: a measured value, its limits, a verdict, and what to do about it."""
+"""Quality figures: a measured value, its limits, a verdict, and advice."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -30,13 +31,13 @@ class Figure:
     key : str
         Name for scripts, such as ``reprojection_rms``.
     label : str
-        Name for people.
+        Name shown to users.
     value : float
         In `unit`.
     unit : str
-        Such as ``px``, ``mm``, ``deg``, ``%`` or an empty text for a count.
+        Such as ``px``, ``mm``, ``deg``, ``%``; empty for a count.
     warn_limit, fail_limit : float or None
-        Where the verdict turns; None where the figure is only reported.
+        Values at which the verdict changes; None if the figure is only reported.
     verdict : Verdict
         The judgement.
     advice : str
@@ -53,8 +54,13 @@ class Figure:
     advice: str
 
     @property
+    def text(self) -> str:
+        """Label, value and unit."""
+        return f"{self.label}: {self.value:.3g} {self.unit}".rstrip()
+
+    @property
     def higher_is_better(self) -> bool:
-        """Whether small values are the bad ones, by the order of the limits or by the verdict."""
+        """Whether small values are bad, from the order of the limits or from the verdict."""
         limits = [x for x in (self.warn_limit, self.fail_limit) if x is not None]
         if len(limits) == 2 and limits[0] != limits[1]:
             return limits[0] > limits[1]
@@ -64,7 +70,7 @@ class Figure:
 
 
 def verdict_word(verdict: Verdict) -> str:
-    """Return a verdict as a person reads it."""
+    """Return the label of a verdict."""
     return {
         Verdict.PASS: tr("Pass"),
         Verdict.WARN: tr("Warning"),
@@ -92,9 +98,9 @@ def judge(
     value : float
         The measured value.
     warn, fail : float, optional
-        The verdict turns to warn or fail beyond these (below them when `higher_is_better`).
+        Limits of the verdicts "warn" and "fail" (lower limits if `higher_is_better`).
     higher_is_better : bool, optional
-        Whether small values are the bad ones.
+        Whether small values are bad.
     """
     sign = -1.0 if higher_is_better else 1.0
 
@@ -110,7 +116,7 @@ def judge(
 
 @dataclass(frozen=True, slots=True)
 class QualityTable:
-    """The quality figures of one stage, in the order in which a person reads them."""
+    """The quality figures of one stage, in display order."""
 
     figures: tuple[Figure, ...] = ()
 
@@ -146,3 +152,29 @@ class QualityTable:
             }
             for f in self.figures
         ]
+
+
+def worst_verdict(quality: Mapping[str, QualityTable]) -> Verdict:
+    """Return the worst verdict of a calibration's stages."""
+    return QualityTable(tuple(f for table in quality.values() for f in table.figures)).verdict
+
+
+def failure(quality: Mapping[str, QualityTable]) -> str:
+    """Return which figures of a calibration failed, as a clause; empty where none did.
+
+    Parameters
+    ----------
+    quality : mapping of str to QualityTable
+        Of every stage.
+    """
+    failed = [
+        figure.text
+        for table in quality.values()
+        for figure in table.figures
+        if figure.verdict is Verdict.FAIL
+    ]
+    if not failed:
+        return ""
+    return tr("the calibration failed its quality check ({figures})").format(
+        figures=", ".join(failed)
+    )

@@ -1,12 +1,73 @@
-"""Every text that a person reads goes through :func:`tr`, so that it can be translated."""
+"""Texts in the user's language.
+
+The source contains English; ``locale/`` has a catalogue for each other language, which
+``packaging/translations.py`` updates from the source.
+"""
 
 from __future__ import annotations
 
 import gettext
+import os
+from pathlib import Path
 
-_catalogue: gettext.NullTranslations = gettext.translation("gelpolight", fallback=True)
+LANGUAGES = {"en": "English", "de": "Deutsch"}
+CATALOGUES = Path(__file__).parent / "locale"
+_DOMAIN = "gelpolight"
+# In the order in which the gettext tools ask them.
+_VARIABLES = ("LANGUAGE", "LC_ALL", "LC_MESSAGES", "LANG")
+
+
+def catalogue_path(language: str) -> Path:
+    """Return the editable catalogue of a language; its compiled form ends in ``.mo``."""
+    return CATALOGUES / language / "LC_MESSAGES" / f"{_DOMAIN}.po"
+
+
+def system_language() -> str:
+    """Return the first language of the environment that the program has, else English."""
+    wanted = next((os.environ[name] for name in _VARIABLES if os.environ.get(name)), "")
+    codes = (part.partition(".")[0].partition("_")[0].lower() for part in wanted.split(":"))
+    return next((code for code in codes if code in LANGUAGES), "en")
+
+
+def use_language(code: str) -> None:
+    """Translate all following texts into a language.
+
+    Modules keep the texts that they translated when they were imported, so call this first.
+
+    Parameters
+    ----------
+    code : str
+        A key of :data:`LANGUAGES`. Any other code gives the language of the environment.
+    """
+    global _catalogue, _language
+    _language = code if code in LANGUAGES else system_language()
+    _catalogue = (
+        gettext.NullTranslations()
+        if _language == "en"
+        else gettext.translation(_DOMAIN, CATALOGUES, [_language])
+    )
+
+
+def current_language() -> str:
+    """Return the language in use, a key of :data:`LANGUAGES`."""
+    return _language
 
 
 def tr(text: str) -> str:
     """Return `text` in the user's language; fill placeholders afterwards with ``str.format``."""
-    return _catalogue.gettext(text)
+    return translated(text)
+
+
+def marked(text: str) -> str:
+    """Return `text` unchanged: it is added to the catalogues; :func:`translated` shows it."""
+    return text
+
+
+def translated(text: str) -> str:
+    """Return a :func:`marked` text in the user's language."""
+    return _catalogue.gettext(text) if text else ""
+
+
+_catalogue: gettext.NullTranslations
+_language: str
+use_language("")

@@ -8,15 +8,20 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterable
+from fnmatch import fnmatch
+from importlib.util import find_spec
 from pathlib import Path, PurePath
+
+from gelpolight_core.translation import LANGUAGES
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("app", "gelpolight_core")
 # The picture of resources/ itself is the README's.
 RESOURCES = ("checkerboards", "designs", "icons")
 # What setuptools puts beside the modules: see package-data in pyproject.toml.
-PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.mo", "py.typed")
+PACKAGE_DATA = ("*.toml", "*.csv", "*.json", "*.jinja", "*.mo", "*.po", "py.typed")
 # Of the documentation: for search engines.
+GUIDE = ("*.md", "guide/*.md", "pictures/*")
 NOT_READ = ("sitemap.xml", "sitemap.xml.gz")
 # Whose version the program asks for.
 NAMED_VERSIONS = (
@@ -26,6 +31,8 @@ NAMED_VERSIONS = (
     "opencv-contrib-python-headless",
     "pyqtgraph",
     "PySide6-Essentials",
+    "pyvista",
+    "pyvistaqt",
     "scipy",
     "tifffile",
     "trimesh",
@@ -69,25 +76,60 @@ LEFT_OUT_MODULES = (
     "_gdbm",  # GPL
     "_tkinter",
     "curses",
+    "cyclopts",  # pyvista's own command line
     "dask",
     "dbm.gnu",
     "distributed",
+    "docutils",
+    "imageio",
     "lib2to3",
+    "meshio",
     "matplotlib.backends.backend_qtagg",
     "numba.cuda",
     "pyqtgraph.console",
     "pyqtgraph.examples",
     "pyqtgraph.opengl",
     "readline",  # GPL
+    "rich",
     "setuptools",
     "tkinter",
 )
+
+# pyvista names nearly all of VTK and loads what is used. Of its readers that is images; what
+# is for web pages, maps, molecules or accelerators is not used at all.
+LEFT_OUT_VTK = (
+    "vtkmodules.vtkAccelerators*",
+    "vtkmodules.vtkDomains*",
+    "vtkmodules.vtkGeovis*",
+    "vtkmodules.vtkIO[!CI]*",
+    "vtkmodules.vtkIOC[!o]*",
+    "vtkmodules.vtkIOCON*",
+    "vtkmodules.vtkIOI[!m]*",
+    "vtkmodules.vtkIOImport",
+    "vtkmodules.vtkRenderingGL2PS*",
+    "vtkmodules.vtkRenderingVR*",
+    "vtkmodules.vtkTesting*",
+    "vtkmodules.vtkWeb*",
+)
+
+
+def left_out_modules() -> list[str]:
+    """Return the modules that are left out, those of VTK by their names on this machine."""
+    folder = Path(find_spec("vtkmodules").submodule_search_locations[0])
+    vtk = {f"vtkmodules.{path.name.split('.')[0]}" for path in folder.glob("vtk*.so")}
+    vtk |= {f"vtkmodules.{path.name.split('.')[0]}" for path in folder.glob("vtk*.pyd")}
+    return [
+        *LEFT_OUT_MODULES,
+        *sorted(name for name in vtk if any(fnmatch(name, kind) for kind in LEFT_OUT_VTK)),
+    ]
+
 
 # Plugins of Qt that this program uses; Windows and macOS have others of their own.
 QT_PLUGINS = (
     "iconengines/*qsvgicon*",
     "imageformats/*qsvg.*",
     "imageformats/*qjpeg*",
+    "imageformats/*qwebp*",
     "platforminputcontexts/*compose*",
     "platforminputcontexts/*ibus*",
     "platforms/*qcocoa*",
@@ -99,9 +141,9 @@ QT_PLUGINS = (
     "wayland-*/*",
     "xcbglintegrations/*",
 )
+# Texts of Qt's own buttons and dialogs, in the languages of the program.
+QT_TRANSLATIONS = tuple(f"qtbase_{language}.qm" for language in LANGUAGES)
 LEFT_OUT_FILES = (
-    "PySide6/Qt/translations/*",
-    "PySide6/translations/*",
     "PySide6/opengl32sw.dll",
     "matplotlib/mpl-data/images/*",
     "matplotlib/mpl-data/sample_data/*",
@@ -144,6 +186,9 @@ def documentation() -> list[tuple[str, str]]:
     if not (site / "index.html").is_file():
         raise FileNotFoundError(f"no documentation in {site}: make it with packaging/docs.sh")
     found = [path for path in site.rglob("*") if path.is_file() and path.name not in NOT_READ]
+    # The pages that the program itself shows.
+    docs = ROOT / "docs"
+    found += [path for pattern in GUIDE for path in docs.glob(pattern)]
     return [(str(path), str(path.parent.relative_to(ROOT))) for path in found]
 
 
@@ -155,6 +200,8 @@ def is_wanted(entry: Entry) -> bool:
     if re.match(rf"(lib)?Qt6({'|'.join(LEFT_OUT_LIBRARIES)})\b", place.name):
         return False
     parts = place.parts
+    if "translations" in parts and "PySide6" in parts:
+        return place.name in QT_TRANSLATIONS
     if "plugins" in parts and "PySide6" in parts:
         return any(place.match(f"plugins/{pattern}") for pattern in QT_PLUGINS)
     if source.startswith(SYSTEM_FOLDERS) and re.search(r"\.so(\.|$)", place.name):

@@ -4,6 +4,8 @@
 #
 #     sh packaging/oldest.sh         all of the core, and a choice of the windows
 #     sh packaging/oldest.sh thin    from pictures to measured sizes by the commands, and all files; no windows
+#     sh packaging/oldest.sh install, and then
+#     sh packaging/oldest.sh test    the two halves of thin
 #
 # Needs what "sh packaging/setup.sh test" installs from the system. PYTHON=/path/to/python chooses another Python.
 set -eu
@@ -13,19 +15,19 @@ how=${1:-whole}
 # These also spoil, and write, what only the windows have.
 needs_windows="tests/strangers/test_any_spoilt_file.py tests/strangers/test_clock_set_back.py
     tests/strangers/test_forgeries.py tests/strangers/test_real_disks.py tests/strangers/test_two_programs.py"
-core="tests/command_line/test_without_window_libraries.py tests/export tests/records tests/session tests/test_house.py"
+core="tests/command_line/test_without_window_libraries.py tests/export tests/io tests/records tests/session tests/test_house.py"
 windows=
 case $how in
-thin) ;;
+thin | install | test) ;;
 whole)
     # A package is built from the locked versions, never from these.
     core="tests --ignore tests/app --ignore tests/packaging"
     for file in $needs_windows; do core="$core --ignore $file"; done
-    windows="$needs_windows tests/app/test_desktop.py tests/app/shell/test_settings.py
+    windows="$needs_windows tests/app/test_desktop.py tests/app/services/test_settings.py
         tests/app/calibrate/test_wizard.py tests/app/inspect/test_inspect_page.py tests/export/test_heightmap_files.py"
     ;;
 *)
-    echo "packaging/oldest.sh: unknown argument \"$how\"; use thin, or nothing." >&2
+    echo "packaging/oldest.sh: unknown argument \"$how\"; use thin, install, test, or nothing." >&2
     exit 2
     ;;
 esac
@@ -49,12 +51,17 @@ run_tests() { # PYTEST-ARGUMENT...
         -p no:cacheprovider --numprocesses 2 --dist loadfile "$@"
 }
 
-echo "Making $venv with the oldest libraries, without those of windows."
-rm -rf "$venv"
-"${PYTHON:-.venv/bin/python}" -m venv "$venv"
-entries "\$0 !~ /$window_libraries/" | install
-"$venv/bin/python" -m pip --disable-pip-version-check --no-input install --quiet --no-deps --no-build-isolation \
-    --no-index --editable .
+make_environment() {
+    echo "Making $venv with the oldest libraries, without those of windows."
+    rm -rf "$venv"
+    "${PYTHON:-.venv/bin/python}" -m venv "$venv"
+    entries "\$0 !~ /$window_libraries/" | install
+    "$venv/bin/python" -m pip --disable-pip-version-check --no-input install --quiet --no-deps --no-build-isolation \
+        --no-index --editable .
+}
+
+[ "$how" = test ] || make_environment
+[ "$how" != install ] || exit 0
 # shellcheck disable=SC2086 # no path of a test holds a space
 run_tests --no-xvfb $core
 

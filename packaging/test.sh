@@ -4,7 +4,9 @@ set -eu
 cd "$(dirname "$0")/.."
 sh packaging/setup.sh test
 
-failed=
+results=$(mktemp -d)
+trap 'rm -rf "$results"' EXIT
+
 check() { # NAME COMMAND...
     name=$1
     shift
@@ -13,24 +15,31 @@ check() { # NAME COMMAND...
     started=$(date +%s)
     if "$@"; then verdict=passed; else
         verdict=FAILED
-        failed="$failed, $name"
+        echo "$name" >>"$results/failed"
     fi
     echo "== $name $verdict in $(($(date +%s) - started)) s"
 }
 
+# These use one core each, so two of them run at a time.
+check "types of the core" .venv/bin/python -m mypy --strict >"$results/types" 2>&1 &
+types=$!
 check "code style" .venv/bin/python -m ruff check .
 check "formatting" .venv/bin/python -m ruff format --check .
-check "types of the core" .venv/bin/python -m mypy --strict
 check "import contracts" .venv/bin/lint-imports
-# Two processes share the cores, so that neither needs threads of its own for small matrices.
-# Files stay whole, so that what their tests share is made once.
-check "tests" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile "$@"
 # Not where only some tests are asked for.
-[ $# -gt 0 ] || check "oldest libraries, and the core without Qt" sh packaging/oldest.sh thin
+[ $# -gt 0 ] || check "installation of the oldest libraries" sh packaging/oldest.sh install
+wait "$types"
+cat "$results/types"
+
+# Two processes share the cores, so that neither needs threads of its own for small matrices.
+# Files stay whole, so that what their tests share is made once; tests/conftest.py sets their order.
+check "tests" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile \
+    --no-loadscope-reorder "$@"
+[ $# -gt 0 ] || check "oldest libraries, and the core without Qt" sh packaging/oldest.sh test
 
 echo
-if [ -n "$failed" ]; then
-    echo "Failed: ${failed#, }" >&2
+if [ -e "$results/failed" ]; then
+    echo "Failed: $(paste -s -d , "$results/failed")" >&2
     exit 1
 fi
 echo "All checks and tests passed."

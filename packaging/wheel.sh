@@ -27,12 +27,17 @@ venv/bin/gelpolight --version
 from pathlib import Path
 
 import app
-from app.shell import icons, main_window
+from app.shell import main_window
+from app.shell.documentation import find_documentation
+from app.theme import icons
 
 assert "site-packages" in app.__file__, app.__file__
 assert (icons.FOLDER / "gelpolight.svg").is_file()
 assert len(list(main_window.BOARDS.glob("*.pdf"))) == 2
-print("Its resources are there.")
+guide = find_documentation()
+assert guide is not None and (guide / "guide" / "calibrate.md").is_file()
+assert "site-packages" not in str(guide) and "share" in guide.parts, guide
+print("Its resources and its guide are there.")
 END_OF_CHECK
 cd ../..
 cp "$wheel" dist/

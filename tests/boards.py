@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import BoardSpec
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.board import BoardSpec
 
 Array = NDArray[np.float64]
 

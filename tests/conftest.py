@@ -12,12 +12,16 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis import settings
 
+# The tests read the English texts, whatever the language of the desktop.
+os.environ["LANGUAGE"] = "en"
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from gelpolight_core.calibration.calibration import Calibration
     from gelpolight_core.calibration.pipeline import CalibrationRun
     from gelpolight_core.calibration.project import CalibrationProject
+    from gelpolight_core.calibration.results import StageResults
+    from gelpolight_core.sensor_calibration import Calibration
 
     MadeOnce = Callable[[str, Callable[[Path], Any]], Any]
 
@@ -30,6 +34,25 @@ settings.load_profile("repeatable")
 # What pyproject.toml sets for the window's tests means nothing where Qt is not installed.
 SETTINGS_OF_PYTEST_QT = ("qt_api", "qt_log_level_fail")
 
+# Files that take longest begin first, so that no process is left alone with one at the end; what
+# the first of them have made, and compiled, is there when the others need it.
+LONGEST_FIRST = (
+    "test_accuracy_on_rendered_sensors.py",
+    "app/calibrate/test_wizard.py",
+    "reconstruction/test_efforts.py",
+    "experiments/test_ablation.py",
+    "app/calibrate/test_wizard_killed.py",
+    "measurement/test_measure.py",
+    "command_line/test_without_window_libraries.py",
+    "response/test_bent_sessions.py",
+    "image/test_camera_response.py",
+    "reconstruction/test_uncertainty.py",
+    "reconstruction/test_best.py",
+    "command_line/test_commands.py",
+    "app/live/test_first_calibration.py",
+    "optics/test_pose.py",
+)
+
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -38,6 +61,15 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
     if not pluginmanager.has_plugin("pytest-qt"):
         for name in SETTINGS_OF_PYTEST_QT:
             parser.addini(name, "of pytest-qt, which is not here")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files that take longest first, and keep the order of the others."""
+    here = Path(__file__).parent
+    order = {here / name: place for place, name in enumerate(LONGEST_FIRST)}
+    if missing := [path.name for path in order if not path.is_file()]:
+        raise pytest.UsageError(f"LONGEST_FIRST names files that are not there: {missing}")
+    items.sort(key=lambda item: order.get(item.path, len(order)))
 
 
 @pytest.fixture(scope="session")
@@ -91,14 +123,29 @@ def virtual_session(made_once: MadeOnce) -> Path:
 
 
 @pytest.fixture(scope="session")
-def virtual_run(virtual_session: Path, made_once: MadeOnce) -> CalibrationRun:
-    """Return the full model's run on the virtual session; not to be changed."""
-    from gelpolight_core.calibration.pipeline import calibrate_session
+def virtual_results(virtual_session: Path, made_once: MadeOnce) -> StageResults:
+    """Return the results of every stage on the virtual session; not to be changed."""
+    from gelpolight_core.calibration.pipeline import stages_of
+    from gelpolight_core.calibration.results import StageResults
+    from gelpolight_core.calibration.stages import run_stage
     from gelpolight_core.session.session import read_session
 
-    return made_once(
-        "virtual-run", lambda _: calibrate_session(read_session(virtual_session), model="full")
-    )
+    def make(_folder: Path) -> StageResults:
+        session, results = read_session(virtual_session), StageResults()
+        for stage in stages_of("full"):
+            results = run_stage(stage, session, results)
+        return results
+
+    return made_once("virtual-results", make)
+
+
+@pytest.fixture(scope="session")
+def virtual_run(virtual_session: Path, virtual_results: StageResults) -> CalibrationRun:
+    """Return the full model's run on the virtual session; not to be changed."""
+    from gelpolight_core.calibration.pipeline import assemble
+    from gelpolight_core.session.session import read_session
+
+    return assemble(read_session(virtual_session), virtual_results)
 
 
 @pytest.fixture(scope="session")

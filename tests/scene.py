@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from gelpolight_core.calibration.calibration import Calibration, Provenance, sensor_stack
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.reflectance.table import cosine_table
+from gelpolight_core.sensor_calibration import Calibration, Provenance, sensor_stack
 from gelpolight_core.session.session import SensorData
 
 CAMERA = Camera(320, 240, 345.0, 345.0, 161.3, 118.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))

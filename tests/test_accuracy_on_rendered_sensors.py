@@ -17,9 +17,10 @@ import pytest
 
 from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session
 from gelpolight_core.measurement.measure import measure_object
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import read_session
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,9 @@ def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor, mod
         rows = list(csv.DictReader(stream))
     for row in rows:
         picture = read_picture(sensor.folder / "presses" / row["file"])
-        heightmap = reconstruct.depth(picture.rgb, name=picture.name)
+        health = reconstruct.health(picture.rgb)
+        assert not health.findings, row["file"]
+        heightmap = reconstruct.depth(picture.rgb, name=picture.name, health=health)
         height_mm = float(row["height_mm"])
         truth = sensor.folder / "truth" / f"{Path(row['file']).stem}.npz"
         measured = measure_object(

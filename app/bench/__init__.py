@@ -1,1 +1,1 @@
-"""The virtual bench: what lies on the virtual sensor, chosen by hand."""
+"""The virtual bench: the user chooses the object on the virtual sensor."""

@@ -1,4 +1,4 @@
-"""A narrow panel to choose what lies on the virtual sensor and how its picture is taken."""
+"""A narrow panel to choose the object on the virtual sensor and the camera settings."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.sources.bench import CONDITION_RANGES, FAULTS, FLAT, PRESSED, Bench, Scene
+from app.widgets.inputs import ComboBox, DoubleSpinBox, Slider, SpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -29,7 +30,7 @@ _SLIDER_STEPS_PER_MM = 100
 
 
 def item_names() -> dict[str, str]:
-    """Return what people call each thing that can lie on the sensor."""
+    """Return the label of each object that can be on the sensor."""
     return {
         "checkerboard": tr("Checkerboard, hand-held"),
         "board_on_top": tr("Checkerboard on the top surface"),
@@ -52,15 +53,18 @@ def _size_name(item: str) -> str:
 
 def _fault_names() -> dict[str, tuple[str, str]]:
     return {
-        "camera_stops": (tr("Camera stops"), tr("No more pictures come, as with a pulled cable")),
+        "camera_stops": (
+            tr("Camera failure"),
+            tr("No more images arrive, as with an unplugged cable"),
+        ),
         "room_light": (tr("Room light on"), tr("Light from outside falls into the sensor")),
-        "membrane_on": (tr("Membrane left on"), tr("Hides the mirror")),
-        "too_bright": (tr("Too bright"), tr("Three times too much light")),
+        "membrane_on": (tr("Membrane mounted"), tr("The membrane hides the mirror")),
+        "too_bright": (tr("Overexposed"), tr("Three times too much light")),
     }
 
 
 class BenchPanel(QWidget):
-    """Shows and changes a bench; follows what others change on it.
+    """Shows and changes a bench; follows changes made elsewhere.
 
     Parameters
     ----------
@@ -86,25 +90,25 @@ class BenchPanel(QWidget):
         layout.addWidget(self._item)
         layout.addLayout(self._form)
         layout.addWidget(self._hint)
-        layout.addWidget(self._picture_group())
+        layout.addWidget(self._image_group())
         layout.addWidget(self._fault_group())
         layout.addStretch(1)
         self.setMinimumWidth(260)
         self._bench_changed.connect(self._show_bench)
-        # Named here, so that nothing keeps the panel alive once Qt has deleted it.
+        # Methods, not lambdas, so that nothing keeps the panel alive once Qt has deleted it.
         forget = bench.watch(self._bench_changed.emit)
         self.destroyed.connect(lambda: forget())
         self._show_bench()
 
     def drag_to(self, u: float, v: float) -> None:
-        """Move what lies there to a point of the picture (pixels)."""
+        """Move the object to a point of the image (pixels)."""
         self._bench.drag_to(u, v)
 
     def _fill_scene(self) -> None:
-        self._item = named(QComboBox(), "bench.item", tr("What lies on the sensor"))
+        self._item = named(ComboBox(), "bench.item", tr("Object on the sensor"))
         for item, name in item_names().items():
             self._item.addItem(name, item)
-        # The list shows long names in full; the box may be narrower than they are.
+        # The list shows long names in full; the box may be narrower.
         self._item.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
@@ -117,10 +121,10 @@ class BenchPanel(QWidget):
         self._form.addRow(self._size_label, self._size)
         self._depth = self._number("depth_mm", tr("Depth"), tr("mm"), 0.01)
         self._depth_slider = named(
-            QSlider(Qt.Orientation.Horizontal),
+            Slider(Qt.Orientation.Horizontal),
             "bench.depth_slider",
             tr("Depth"),
-            tr("How deep the foremost point goes into the membrane"),
+            tr("Depth of the object's foremost point in the membrane"),
         )
         self._depth_slider.valueChanged.connect(
             lambda steps: self._bench.arrange(depth_mm=steps / _SLIDER_STEPS_PER_MM)
@@ -128,17 +132,20 @@ class BenchPanel(QWidget):
         self._depth_row = _row([self._depth_slider, self._depth])
         self._depth.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self._form.addRow(tr("Depth"), self._depth_row)
-        self._x = self._number("x_mm", tr("Place to the right"), tr("mm"), 0.1)
-        self._y = self._number("y_mm", tr("Place downwards"), tr("mm"), 0.1)
+        self._x = self._number("x_mm", tr("Position to the right"), tr("mm"), 0.1)
+        self._y = self._number("y_mm", tr("Position downwards"), tr("mm"), 0.1)
         self._form.addRow(tr("x, right"), self._x)
         self._form.addRow(tr("y, down"), self._y)
-        self._yaw = self._number("yaw_deg", tr("Turned by"), "°", 1.0)
+        self._yaw = self._number("yaw_deg", tr("Rotation"), "°", 1.0)
         self._yaw.setRange(-180.0, 180.0)
         self._yaw.setWrapping(True)
-        self._form.addRow(tr("Turned by"), self._yaw)
+        self._form.addRow(tr("Rotation"), self._yaw)
         self._hint = named(
             PlainLabel(
-                tr("Drag it on the picture to move it; the middle button moves the picture.")
+                tr(
+                    "Drag the object in the image to move it. The middle mouse button moves the "
+                    "image."
+                )
             ),
             "bench.hint",
             tr("Hint"),
@@ -146,7 +153,7 @@ class BenchPanel(QWidget):
         self._hint.setWordWrap(True)
 
     def _make_pose_row(self) -> QWidget:
-        self._pose = named(QSpinBox(), "bench.pose", tr("Pose of the checkerboard"))
+        self._pose = named(SpinBox(), "bench.pose", tr("Pose of the checkerboard"))
         self._pose.valueChanged.connect(lambda number: self._show_pose(number - 1))
         back, on = QToolButton(), QToolButton()
         back.setText(tr("Back"))
@@ -158,11 +165,11 @@ class BenchPanel(QWidget):
         return _row([self._pose, back, on])
 
     def _number(self, key: str, accessible: str, unit: str, step: float) -> QDoubleSpinBox:
-        box = named(QDoubleSpinBox(), f"bench.{key}", accessible)
+        box = named(DoubleSpinBox(), f"bench.{key}", accessible)
         box.setDecimals(2 if step < 1.0 else 1)
         box.setSingleStep(step)
         box.setSuffix(f" {unit}")
-        # A number that is being typed is not yet meant.
+        # Ignore a number while it is being typed.
         box.setKeyboardTracking(False)
         if key in CONDITION_RANGES:
             box.setRange(*CONDITION_RANGES[key])
@@ -171,14 +178,14 @@ class BenchPanel(QWidget):
             box.valueChanged.connect(lambda value: self._bench.arrange(**{key: value}))
         return box
 
-    def _picture_group(self) -> QWidget:
+    def _image_group(self) -> QWidget:
         self._conditions = {
             "exposure_ms": self._number("exposure_ms", tr("Exposure"), tr("ms"), 0.5),
             "gain_db": self._number("gain_db", tr("Gain"), tr("dB"), 1.0),
             "noise": self._number("noise", tr("Noise"), tr("times"), 0.1),
         }
-        self._conditions["noise"].setToolTip(tr("0 is no noise, 1 the noise of the design"))
-        group = QGroupBox(tr("Picture"))
+        self._conditions["noise"].setToolTip(tr("0 is no noise, 1 is the noise of the design"))
+        group = QGroupBox(tr("Image"))
         form = QFormLayout(group)
         form.addRow(tr("Exposure"), self._conditions["exposure_ms"])
         form.addRow(tr("Gain"), self._conditions["gain_db"])
@@ -186,7 +193,7 @@ class BenchPanel(QWidget):
         return group
 
     def _fault_group(self) -> QWidget:
-        group = QGroupBox(tr("Let something go wrong"))
+        group = QGroupBox(tr("Simulate a fault"))
         layout = QVBoxLayout(group)
         self._faults: dict[str, QCheckBox] = {}
         for fault in FAULTS:
@@ -240,7 +247,7 @@ class BenchPanel(QWidget):
             self._form.setRowVisible(field, scene.item in PRESSED)
         for field in (self._x, self._y):
             self._form.setRowVisible(field, movable)
-        # A turn of what is round is not seen.
+        # The rotation of a round object is not visible.
         self._form.setRowVisible(self._yaw, movable and scene.item not in ("ball", "cylinder"))
         self._hint.setVisible(movable)
 
@@ -257,7 +264,7 @@ def _row(widgets: Sequence[QWidget]) -> QWidget:
 def _set_range(
     box: QSpinBox | QDoubleSpinBox | QSlider, low: float, high: float, value: float
 ) -> None:
-    """Show a value in its range, without telling that a person has changed it."""
+    """Show a value in its range without emitting a signal."""
     with QSignalBlocker(box):
         box.setRange(low, high)  # type: ignore[arg-type]
         box.setValue(value)  # type: ignore[arg-type]

@@ -1,1 +1,1 @@
-"""The calibration pages and what they show of each picture."""
+"""The Calibrate page and the detections that run on its live image."""

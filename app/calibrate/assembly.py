@@ -1,4 +1,4 @@
-"""How the sensor is put together in each step: a drawn cross-section."""
+"""A drawn cross-section that shows how the sensor is assembled in each step."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.shell import theme
+from app.theme import theme
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-# Drawn in a box of 300 x 150; the top surface lies at y = 44.
+# Drawn in a box of 300 x 150; the top surface is at y = 44.
 BOX = QSize(300, 150)
 TOP = 44.0
 LEFT, RIGHT = 62.0, 238.0
@@ -30,12 +30,14 @@ PARTS: dict[str, tuple[str, ...]] = {
 
 
 def assembly_words(name: str) -> str:
-    """Return what a drawing shows, for a screen reader."""
+    """Return a description of a drawing, for a screen reader."""
     return {
-        "camera": tr("The camera alone, a checkerboard held before it"),
-        "board": tr("Housing without elastomer, checkerboard on the top opening, pattern down"),
+        "camera": tr("The camera alone, with a checkerboard held in front of it"),
+        "board": tr(
+            "Housing without elastomer, checkerboard on the top opening, pattern facing down"
+        ),
         "mirror": tr("Housing without elastomer, LEDs on, mirror on the top opening"),
-        "whiteboard": tr("Elastomer without membrane, white board pressed on it"),
+        "whiteboard": tr("Elastomer without membrane, white board pressed onto it"),
         "membrane": tr("Elastomer with membrane, nothing touching it"),
         "ball": tr("A ball pressed into the membrane"),
         "indenter": tr("An indenter of known size pressed into the membrane"),
@@ -43,7 +45,7 @@ def assembly_words(name: str) -> str:
     }[name]
 
 
-class AssemblyPicture(QWidget):
+class AssemblyDrawing(QWidget):
     """Shows one cross-section."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -61,11 +63,11 @@ class AssemblyPicture(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Return the size that shows all of it."""
+        """Return the size that shows the whole drawing."""
         return QSize(240, BOX.height())
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the parts, those behind first."""
+        """Draw the parts from back to front."""
         del event
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

@@ -1,11 +1,12 @@
-"""The virtual bench beside the wizard, where the virtual sensor is the camera."""
+"""The virtual bench next to the wizard, shown when the virtual sensor is the camera."""
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QDockWidget, QScrollArea, QWidget
+from PySide6.QtWidgets import QDockWidget, QWidget
 
-from app.calibrate.steps import Step
-from app.shell.context import SourceChoice
+from app.bench.bench_area import BenchArea
+from app.calibrate.step_data import Step
+from app.context.context import SourceChoice
 from app.sources.bench import Scene
 from app.widgets.naming import named
 from gelpolight_core.session.session import Session
@@ -13,20 +14,22 @@ from gelpolight_core.translation import tr
 
 
 class BenchDock(QDockWidget):
-    """Holds the bench's panel, and lays on the bench what a step asks for.
+    """Holds the bench panel and places on the bench the object that a step needs.
 
     Parameters
     ----------
     source : SourceChoice
-        The choice that all pages share, with its bench.
+        The source selection shared by all pages, with its bench.
     parent : QWidget
-        The window.
+        Parent window.
     """
 
     def __init__(self, source: SourceChoice, parent: QWidget) -> None:
         super().__init__(tr("Virtual bench"), parent)
         named(self, "calibrate.bench", tr("Virtual bench"))
         self._source = source
+        self._area = BenchArea(source)
+        self.setWidget(self._area)
         self._tried = 0
         self._held: tuple[float, float] | None = None
         self.hide()
@@ -38,21 +41,14 @@ class BenchDock(QDockWidget):
         return info is not None and info.kind == "virtual" and self._source.bench is not None
 
     def follow(self) -> None:
-        """Be there only where the virtual sensor is the camera."""
-        self.toggleViewAction().setVisible(self.in_use)
-        if not self.in_use:
+        """Show the dock's action only if the virtual sensor is the camera."""
+        in_use = self._area.follow()
+        self.toggleViewAction().setVisible(in_use)
+        if not in_use:
             self.hide()
-        elif self.widget() is None:
-            from app.bench.bench_panel import BenchPanel  # only the demo needs it
-
-            assert self._source.bench is not None
-            scroll = QScrollArea()
-            scroll.setWidgetResizable(True)
-            scroll.setWidget(BenchPanel(bench=self._source.bench))
-            self.setWidget(scroll)
 
     def lay(self, step: Step, session: Session) -> Scene | None:
-        """Lay down what a step asks for, each time the next view or press."""
+        """Place the object that a step needs; each call gives the next view or press."""
         bench = self._source.bench
         if bench is None:
             return None
@@ -64,28 +60,28 @@ class BenchDock(QDockWidget):
         return bench.show(folder, count % bench.steps(folder))
 
     def drag_to(self, u: float, v: float) -> None:
-        """Move what lies there to where the person clicked in the live picture."""
+        """Move the object on the bench to the clicked point of the live image."""
         if self._source.bench is not None and self.isVisible():
             self._source.bench.drag_to(u, v)
 
     def drag(self, phase: str, u: float, v: float) -> None:
-        """Move what lies there as the person drags it, held where it was taken hold of.
+        """Move the object on the bench with a drag, keeping the grabbed point under the pointer.
 
         Parameters
         ----------
         phase : str
             "begin", "move" or "end".
         u, v : float
-            Where the pointer is, in the picture.
+            Position of the pointer, image pixels.
         """
         bench = self._source.bench
-        place = None if bench is None else bench.place_mm(u, v)
-        if bench is None or place is None:
+        position = None if bench is None else bench.position_mm(u, v)
+        if bench is None or position is None:
             return
         if phase == "begin":
             scene = bench.scene
-            self._held = scene.x_mm - place[0], scene.y_mm - place[1]
+            self._held = scene.x_mm - position[0], scene.y_mm - position[1]
         elif self._held is not None:
-            bench.arrange(x_mm=place[0] + self._held[0], y_mm=place[1] + self._held[1])
+            bench.arrange(x_mm=position[0] + self._held[0], y_mm=position[1] + self._held[1])
             if phase == "end":
                 self._held = None

@@ -1,4 +1,4 @@
-"""What can be undone: a person's captures and corrections in a session."""
+"""Undo commands: captures and corrections of a session."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from gelpolight_core.errors import InputError
 
 
 class Correction(QUndoCommand):
-    """One correction and how to take it back; neither touches what it is not about.
+    """One correction and its reverse; each changes only the data that it is about.
 
-    One that cannot be written to disk does not stand, and leaves the history.
+    A command that cannot be written to disk has no effect and leaves the history.
 
     Parameters
     ----------
     text : str
-        What the history list says.
-    act, take_back : callable
-        On disk before they return, or an InputError.
+        Text in the history list.
+    act, revert : callable
+        Written to disk before they return; raise InputError on failure.
     done : callable
-        Called after either.
+        Called after either of them.
     refused : callable
-        Told why it could not be done.
+        Called with the reason when the command failed.
     is_done : bool, optional
-        Whether it stands already as it comes into the history, as a capture does.
+        Whether the change is already done when the command enters the history, as for a capture.
     """
 
     def __init__(
         self,
         text: str,
         act: Callable[[], None],
-        take_back: Callable[[], None],
+        revert: Callable[[], None],
         *,
         done: Callable[[], None],
         refused: Callable[[str], object],
@@ -40,19 +40,19 @@ class Correction(QUndoCommand):
     ) -> None:
         super().__init__(text)
         self._is_done = is_done
-        self._act, self._take_back = act, take_back
+        self._act, self._revert = act, revert
         self._done, self._refused = done, refused
 
     def redo(self) -> None:
-        """Correct."""
+        """Apply the correction."""
         if self._is_done:
             self._is_done = False
             return
         self._run(self._act)
 
     def undo(self) -> None:
-        """Take it back."""
-        self._run(self._take_back)
+        """Undo the correction."""
+        self._run(self._revert)
 
     def _run(self, change: Callable[[], None]) -> None:
         try:

@@ -1,4 +1,4 @@
-"""The captures of a step as a strip of small pictures, each with how it fared."""
+"""The captures of a step as a strip of thumbnails, each with its state."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from PySide6.QtGui import QIcon, QImage, QKeyEvent, QPainter, QPaintEvent, QPixm
 from PySide6.QtWidgets import QListView, QListWidget, QListWidgetItem, QMenu, QWidget
 
 from app.calibrate.states import state_icon, state_word
-from app.shell import theme
+from app.theme import theme
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.wholeness import decode_picture
+from gelpolight_core.image.file import decode_picture
 from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
@@ -25,19 +25,19 @@ HEIGHT = 136
 
 
 @dataclass(frozen=True, slots=True)
-class Take:
+class Capture:
     """One capture.
 
     Attributes
     ----------
     path : Path
-        Its file.
+        Its image file.
     state : str
-        As a stage's state, or ``excluded``.
+        A stage state, or ``excluded``.
     sentence : str
-        What to say of it.
+        Message about the capture.
     note : str
-        A short word under its name, such as ``3.00 mm``.
+        Short text below the name, such as ``3.00 mm``.
     """
 
     path: Path
@@ -52,9 +52,9 @@ class FilmStrip(QListWidget):
     Signals
     -------
     chosen(str)
-        Name of the picture to look at.
+        Name of the image to show.
     excluded(str, bool)
-        Leave the picture out, or take it in again.
+        Exclude the image, or include it again.
     """
 
     chosen = Signal(str)
@@ -75,101 +75,103 @@ class FilmStrip(QListWidget):
         self.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.customContextMenuRequested.connect(self._on_menu)
-        self.itemClicked.connect(lambda item: self.chosen.emit(_take(item).path.name))
-        self.itemActivated.connect(lambda item: self.chosen.emit(_take(item).path.name))
+        self.itemClicked.connect(lambda item: self.chosen.emit(_capture_of(item).path.name))
+        self.itemActivated.connect(lambda item: self.chosen.emit(_capture_of(item).path.name))
         self._thumbs: dict[tuple[Path, int], QPixmap] = {}
 
-    def show_takes(self, takes: Sequence[Take]) -> None:
-        """Show these captures; the chosen one stays chosen."""
+    def show_captures(self, captures: Sequence[Capture]) -> None:
+        """Show these captures; keep the selection."""
         keep = self.current_name
         self.blockSignals(True)
         self.clear()
-        for take in takes:
-            word = tr("left out") if take.state == "excluded" else state_word(take.state)
-            item = QListWidgetItem(self._icon(take), f"{take.path.stem}\n{take.note or word}")
-            item.setData(Qt.ItemDataRole.UserRole, take)
-            item.setToolTip(plain_tip(f"{take.path.name}: {word}. {take.sentence}".strip()))
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{take.path.stem}, {word}")
+        for capture in captures:
+            word = tr("excluded") if capture.state == "excluded" else state_word(capture.state)
+            item = QListWidgetItem(
+                self._icon(capture), f"{capture.path.stem}\n{capture.note or word}"
+            )
+            item.setData(Qt.ItemDataRole.UserRole, capture)
+            item.setToolTip(plain_tip(f"{capture.path.name}: {word}. {capture.sentence}".strip()))
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{capture.path.stem}, {word}")
             self.addItem(item)
-            if take.path.name == keep:
+            if capture.path.name == keep:
                 self.setCurrentItem(item)
         self.blockSignals(False)
 
     @property
     def current_name(self) -> str:
-        """Name of the chosen picture; empty where none is."""
+        """Name of the selected image; empty if none is selected."""
         item = self.currentItem()
-        return _take(item).path.name if item is not None and item.isSelected() else ""
+        return _capture_of(item).path.name if item is not None and item.isSelected() else ""
 
     def show_newest(self) -> None:
-        """Bring the newest picture into sight."""
+        """Scroll to the newest image."""
         if self.count():
             self.scrollToItem(self.item(self.count() - 1))
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Say so where there is nothing."""
+        """Show a hint while the strip is empty."""
         super().paintEvent(event)
         if not self.count():
             painter = QPainter(self.viewport())
             painter.setPen(theme.colour("muted"))
             area = self.viewport().rect()
-            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, tr("Captures come here"))
+            painter.drawText(area, Qt.AlignmentFlag.AlignCenter, tr("Captured images appear here"))
             painter.end()
 
     def choose(self, name: str) -> None:
-        """Choose a picture by its name; none by an empty one."""
+        """Select an image by its name; an empty name clears the selection."""
         if not name:
             self.clearSelection()
             self.setCurrentRow(-1)
         for row in range(self.count()):
-            if _take(self.item(row)).path.name == name:
+            if _capture_of(self.item(row)).path.name == name:
                 self.setCurrentRow(row)
                 self.scrollToItem(self.item(row))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Delete leaves the chosen picture out, or takes it in again."""
+        """Delete excludes the selected image, or includes it again."""
         item = self.currentItem()
         if event.key() == Qt.Key.Key_Delete and item is not None:
-            self._toggle(_take(item))
+            self._toggle(_capture_of(item))
             return
         super().keyPressEvent(event)
         if item is not self.currentItem() and self.currentItem() is not None:
             self.chosen.emit(self.current_name)
 
-    def _toggle(self, take: Take) -> None:
-        self.excluded.emit(take.path.name, take.state != "excluded")
+    def _toggle(self, capture: Capture) -> None:
+        self.excluded.emit(capture.path.name, capture.state != "excluded")
 
-    def _on_menu(self, place: QPoint) -> None:
-        item = self.itemAt(place)
+    def _on_menu(self, position: QPoint) -> None:
+        item = self.itemAt(position)
         if item is None:
             return
-        take = _take(item)
+        capture = _capture_of(item)
         menu = QMenu(self)
-        text = tr("Take in again") if take.state == "excluded" else tr("Leave out")
-        menu.addAction(text, lambda: self._toggle(take))
-        menu.exec(self.mapToGlobal(place))
+        text = tr("Include") if capture.state == "excluded" else tr("Exclude")
+        menu.addAction(text, lambda: self._toggle(capture))
+        menu.exec(self.mapToGlobal(position))
         menu.deleteLater()
 
-    def _icon(self, take: Take) -> QIcon:
-        picture = QPixmap(self._thumb(take.path))
-        painter = QPainter(picture)
-        if take.state == "excluded":
-            painter.fillRect(picture.rect(), Qt.GlobalColor.black)
+    def _icon(self, capture: Capture) -> QIcon:
+        pixmap = QPixmap(self._thumb(capture.path))
+        painter = QPainter(pixmap)
+        if capture.state == "excluded":
+            painter.fillRect(pixmap.rect(), Qt.GlobalColor.black)
             painter.setOpacity(0.35)
-            painter.drawPixmap(0, 0, self._thumb(take.path))
+            painter.drawPixmap(0, 0, self._thumb(capture.path))
             painter.setOpacity(1.0)
-        sign = "empty" if take.state == "excluded" else take.state
+        sign = "empty" if capture.state == "excluded" else capture.state
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(self.palette().base())
         painter.drawEllipse(2, 2, 20, 20)
         state_icon(sign).paint(painter, 3, 3, 18, 18)
         painter.end()
-        return QIcon(picture)
+        return QIcon(pixmap)
 
     def _thumb(self, path: Path) -> QPixmap:
         try:
             key = path, path.stat().st_mtime_ns
-        except OSError:  # removed by hand meanwhile: an empty place tells it
+        except OSError:  # the file was deleted meanwhile: show an empty thumbnail
             key = path, 0
         if key not in self._thumbs:
             self._thumbs[key] = thumbnail(path)
@@ -177,10 +179,10 @@ class FilmStrip(QListWidget):
 
 
 def thumbnail(path: Path) -> QPixmap:
-    """Return a small picture of a file; an empty one where it cannot be read."""
+    """Return a thumbnail of an image file; an empty one if the file cannot be read."""
     try:
         raw = decode_picture(path, cv2.IMREAD_REDUCED_COLOR_8)
-    except InputError:  # told where the picture is used
+    except InputError:  # reported where the image is used
         raw = None
     if raw is None:
         empty = QPixmap(THUMB)
@@ -202,6 +204,6 @@ def thumbnail(path: Path) -> QPixmap:
     )
 
 
-def _take(item: QListWidgetItem) -> Take:
-    take: Take = item.data(Qt.ItemDataRole.UserRole)
-    return take
+def _capture_of(item: QListWidgetItem) -> Capture:
+    capture: Capture = item.data(Qt.ItemDataRole.UserRole)
+    return capture

@@ -1,18 +1,19 @@
-"""From the core's results to marks on the picture."""
+"""Overlay marks on the image, made from the core's results."""
 
 from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from app.live.overlay import Circle, Line, Marker, Mask, Role
-from gelpolight_core.lights.mirror import CHANNEL_NAMES, MirrorSpots, Spot
+from gelpolight_core.channels import channel_name
+from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.raw_positions import rim_px, seen_at
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.translation import tr
@@ -34,25 +35,25 @@ def board_outline(view: BoardView, role: Role) -> Line:
 
 
 def board_corners(view: BoardView) -> tuple[Marker, ...]:
-    """Return a mark on every corner; the first is ringed, so that a turned board shows."""
+    """Return a mark on every corner; the first has a ring, so that a rotated board is visible."""
     crosses = tuple(Marker(float(u), float(v), "plus", "good") for u, v in view.corners_px)
     u, v = view.corners_px[0]
     return (*crosses, Marker(float(u), float(v), "ring", "info", text="1"))
 
 
 def foot_point(camera: Camera, plane: TopPlane) -> Marker:
-    """Return where the sensor frame's origin is seen, in air."""
+    """Return where the origin of the sensor frame is seen, in air."""
     u, v = camera.project(plane.origin_camera_mm)
     return Marker(float(u), float(v), "ring", "info", text=tr("origin"))
 
 
-def mirror_places(camera: Camera, plane: TopPlane, led_positions_mm: Array) -> Array:
+def mirror_positions_px(camera: Camera, plane: TopPlane, led_positions_mm: Array) -> Array:
     """Return the pixels (3, 2) at which a mirror on the top surface would show the LEDs.
 
     Parameters
     ----------
     camera, plane
-        Lens and top surface.
+        Lens and pose of the top surface.
     led_positions_mm : (3, 3)
         Sensor frame, from a design or an earlier calibration.
     """
@@ -61,13 +62,13 @@ def mirror_places(camera: Camera, plane: TopPlane, led_positions_mm: Array) -> A
 
 
 def spot_markers(spots: MirrorSpots, *, editable: bool = False) -> tuple[Marker, ...]:
-    """Return the three centroids, and what was rejected; `editable` ones are called mirror.0-2."""
+    """Return the three centroids and the rejected spots; with `editable`, handles mirror.0 to 2."""
     found = tuple(
         Marker(
             *spot.centre_px,
             kind="plus",
             role=LED_ROLES[k],
-            text=tr(CHANNEL_NAMES[k]),
+            text=channel_name(k),
             handle=f"mirror.{k}" if editable else "",
         )
         for k, spot in enumerate(spots.spots)
@@ -80,7 +81,7 @@ def spot_markers(spots: MirrorSpots, *, editable: bool = False) -> tuple[Marker,
 
 
 def spot_mask(rgb: NDArray[np.generic], spot: Spot, role: Role) -> Mask:
-    """Return the pixels above half of a spot's peak, which are its stated area."""
+    """Return the pixels above half of a spot's peak, which form its area."""
     reach = 2 + math.ceil(2.0 * spot.elongation * math.sqrt(spot.area_px / math.pi))
     u, v = (round(c) for c in spot.centre_px)
     box = np.s_[max(v - reach, 0) : v + reach + 1, max(u - reach, 0) : u + reach + 1]
@@ -90,43 +91,13 @@ def spot_mask(rgb: NDArray[np.generic], spot: Spot, role: Role) -> Mask:
     return Mask(area, role)
 
 
-def seen_at(table: ResamplingTable, nodes: Array) -> Array:
-    """Return the raw pixels (M, 2) at which fractional nodes (N, 2) (column, row) are seen.
-
-    Nodes that the camera does not see are left out.
-    """
-    if len(nodes) == 0:
-        return np.zeros((0, 2))
-    at = np.asarray(nodes, np.float32).reshape(-1, 1, 2)
-    seen = (table.u_px >= 0.0).astype(np.float32)
-    u, v, whole = (
-        cv2.remap(plane, at[..., 0], at[..., 1], cv2.INTER_LINEAR)[:, 0]
-        for plane in (table.u_px, table.v_px, seen)
-    )
-    # Beside a node that is not seen, -1 would be mixed in.
-    return np.stack([u, v], axis=-1).astype(np.float64)[whole > 0.999]
-
-
 def working_rim(table: ResamplingTable) -> Line:
-    """Return the border of the working area, in the raw picture."""
-    borders, _ = cv2.findContours(
-        table.valid.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
-    )
-    longest = max(borders, key=len)[::4, 0] if borders else np.zeros((0, 2))
-    return Line(seen_at(table, np.asarray(longest, np.float64)), "info", closed=True)
-
-
-def working_area(table: ResamplingTable, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Return the working area as a mask (rows, columns) of the raw picture."""
-    area = np.zeros(shape, np.uint8)
-    rim = working_rim(table).points
-    if len(rim) > 2:
-        cv2.fillPoly(area, [np.round(rim).astype(np.int32)], (1.0,))
-    return area > 0
+    """Return the border of the working area, in the raw image."""
+    return Line(rim_px(table), "info", closed=True)
 
 
 def ball_contour(press: BallPress, table: ResamplingTable) -> tuple[Line, ...]:
-    """Return the contact's edge as it was seen, and the circle fitted to it."""
+    """Return the detected edge of the contact, and the circle fitted to it."""
     found = press.indentation
     angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE_POINTS, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -138,7 +109,7 @@ def ball_contour(press: BallPress, table: ResamplingTable) -> tuple[Line, ...]:
 
 
 def ball_handle(press: BallPress, table: ResamplingTable) -> Circle | None:
-    """Return the contact as a circle that can be put right by hand; None where it is not seen."""
+    """Return the contact as a circle that the user can move; None if it is not visible."""
     found = press.indentation
     centre = np.asarray(found.centre)
     across = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])

@@ -1,4 +1,4 @@
-"""The Calibrate page: where to begin, or the wizard of the session that is open."""
+"""The Calibrate page: the start view, or the wizard of the open session."""
 
 from __future__ import annotations
 
@@ -8,28 +8,36 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
+from app.calibrate.closed_offer import closed_offer, copy_images
+from app.calibrate.closed_setup.form import ClosedForm, new_closed_session
+from app.calibrate.question_view import QuestionView
 from app.calibrate.session_camera import SetupCamera
-from app.calibrate.setup_form import SetupForm, new_session
+from app.calibrate.setup.form import SetupForm, new_session
+from app.calibrate.setup.form_page import FormPage
 from app.calibrate.start_view import StartView
 from app.calibrate.wizard import Wizard
-from app.shell.context import AppContext
+from app.context.context import AppContext
+from app.context.source_button import SourceButton
 from app.widgets.naming import named
-from app.widgets.source_button import SourceButton
+from app.widgets.question import ask
+from app.workspace.sessions import unfinished
 from app.workspace.workspace import folder_name
+from gelpolight_core.calibration.closed_project import ClosedProject, open_project
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 
 class CalibratePage(QWidget):
-    """Shows the start view, the form of a new session, or the wizard.
+    """Shows the start view, the form for a new session, or the wizard.
 
     Parameters
     ----------
     context : AppContext
-        The program's.
+        Context of the application.
     """
 
     def __init__(self, *, context: AppContext) -> None:
@@ -43,102 +51,154 @@ class CalibratePage(QWidget):
         self._stack = QStackedWidget()
         column.addWidget(self._stack)
         self.start = StartView()
-        self.form = SetupForm()
-        none = tr("No camera: import pictures")
-        self.form.offer_cameras(SourceButton(context=context, page="setup", none=none))
-        self._stack.addWidget(self.start)
-        self._stack.addWidget(self.form)
+        self.question = QuestionView()
+        self.form, self.closed_form = SetupForm(), ClosedForm()
+        for view in (self.start, self.question, self.form, self.closed_form):
+            self._stack.addWidget(view)
+        self.setup_cameras = [self._prepare(form) for form in (self.form, self.closed_form)]
         self.start.new_wanted.connect(self.begin)
         self.start.open_wanted.connect(self.choose_folder)
         self.start.demo_wanted.connect(self.begin_demo)
         self.start.recent_wanted.connect(lambda folder: self.open_path(Path(folder)))
-        self.form.accepted.connect(self._create)
+        self._offer: ClosedSession | None = None
+        self.start.closed_wanted.connect(self._begin_closed)
+        self.question.answered.connect(self._on_answer)
+        self.question.back_wanted.connect(self._leave_session)
         context.source.changed.connect(self._on_source)
-        self.setup_camera = SetupCamera(self.form, context=context)
         self.start.show_recent(context.settings.recent_sessions)
 
-    # What the window asks of a page
+    def _prepare(self, form: FormPage) -> SetupCamera:
+        none = tr("No camera: import images")
+        form.offer_cameras(SourceButton(context=self.context, page="setup", none=none))
+        form.accepted.connect(self._begin)
+        return SetupCamera(form, context=self.context)
+
+    # Called by the main window
 
     def enter(self) -> None:
-        """Show what is new, and look at the camera."""
+        """Update the page and open the camera."""
         self._shown = True
         self.start.show_recent(self.context.settings.recent_sessions)
         if self.wizard is not None:
             self.wizard.enter()
 
     def leave(self) -> None:
-        """Let the camera go."""
+        """Release the camera."""
         self._shown = False
         if self.wizard is not None:
             self.wizard.leave()
 
     def may_close(self) -> bool:
-        """Everything is on disk; work that runs is stopped."""
+        """Return True: all data is on disk; running work is stopped."""
         self._close_wizard()
         return True
 
     def open_path(self, path: Path) -> None:
-        """Open a session folder; where it is none, say why on the start view."""
+        """Open a session folder; if this fails, show the reason on the start view."""
         folder = path.parent if path.name == "session.toml" else path
         try:
-            project = CalibrationProject(folder)
+            project = open_project(folder)
         except InputError as error:
             self._leave_session()
-            self.start.show_problem(str(error))
+            self._offer = closed_offer(folder)
+            if self._offer is None:
+                self.start.show_problem(str(error))
+            else:
+                self.start.show_problem(f"{error.where}: {error.found}.", closed=True)
             return
         self._show_wizard(project)
 
-    # Ways to begin
+    # Starting a session
 
     def begin(self) -> None:
-        """Ask what is known of a new sensor; what was typed of it already stays."""
+        """Ask the first question about a new sensor."""
         self._close_wizard()
-        if self._stack.currentWidget() is not self.form or not self.form.edited:
-            self.form.show_session(self._proposal(), new=True)
-        self._stack.setCurrentWidget(self.form)
-        self.form.serial.setFocus()
+        self._stack.setCurrentWidget(self.question)
+        self.question.can.setFocus()
+
+    def _begin_closed(self) -> None:
+        """Show the form of a closed sensor for the folder that could not be opened."""
+        if self._offer is not None:
+            self.closed_form.show_session(self._offer, new=True)
+            self._stack.setCurrentWidget(self.closed_form)
+            self.closed_form.serial.setFocus()
 
     def begin_demo(self) -> None:
-        """Begin on the virtual sensor."""
+        """Start with the virtual sensor."""
         self.context.requests.demo.emit()
         self.begin()
-        self.form.show_session(self._proposal(), new=True)
+
+    def _on_answer(self, opens: bool) -> None:
+        """Show the form for the sensor; text typed before is kept."""
+        form: FormPage = self.form if opens else self.closed_form
+        if not form.edited or self._is_virtual:
+            form.show_session(self._proposal(form), new=True)
+        self._stack.setCurrentWidget(form)
+        form.serial.setFocus()
 
     def choose_folder(self) -> None:
-        """Let the person choose a session folder."""
+        """Let the user choose a session folder."""
         chosen = QFileDialog.getExistingDirectory(
-            self, tr("Open a session folder"), str(self.context.settings.last_folder)
+            self, tr("Open a session folder"), str(self.context.settings.folder("session"))
         )
         if chosen:
-            self.context.settings.last_folder = Path(chosen).parent
+            self.context.settings.keep_folder("session", Path(chosen).parent)
             self.open_path(Path(chosen))
 
-    def _proposal(self) -> Session:
-        """Return what a new session states: of the virtual sensor it is known."""
-        from app.bench.stated import stated_session
-
+    @property
+    def _is_virtual(self) -> bool:
         info = self.context.source.info
-        return stated_session() if info is not None and info.kind == "virtual" else new_session()
+        return info is not None and info.kind == "virtual"
+
+    def _proposal(self, form: FormPage) -> Session | ClosedSession:
+        """Return the default values of a new session; for the virtual sensor they are known."""
+        from app.bench.virtual_session import virtual_closed_session, virtual_session
+
+        if form is self.form:
+            return virtual_session() if self._is_virtual else new_session()
+        return virtual_closed_session() if self._is_virtual else new_closed_session()
 
     def _on_source(self) -> None:
-        """State what is known of the virtual sensor, where it is chosen in the form."""
-        info = self.context.source.info
-        in_form = self._stack.currentWidget() is self.form
-        if in_form and info is not None and info.kind == "virtual":
-            self.form.show_session(self._proposal(), new=True)
+        """Fill in the known values of the virtual sensor when it is selected in a form."""
+        form = self._stack.currentWidget()
+        if isinstance(form, FormPage) and self._is_virtual:
+            form.show_session(self._proposal(form), new=True)
 
-    def _create(self, stated: Session) -> None:
-        name = datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
-        folder = self.context.workspace.sessions_folder(stated.sensor.serial) / folder_name(name)
-        try:
-            create_session(replace(stated, folder=folder))
-            project = CalibrationProject(folder)
-        except InputError as error:
-            self.form.show_problem(str(error))
+    def _begin(self, stated: Session | ClosedSession) -> None:
+        """Make a new session. Ask first if another one of this sensor is not finished."""
+        workspace = self.context.workspace
+        sessions = unfinished(workspace.sessions(), workspace.entries())
+        other = next((s for s in sessions if s.serial == stated.serial and s.images), None)
+        if other is None:
+            self._create(stated)
             return
-        self._show_wizard(project, step="lens")
+        text = tr(
+            "Sensor {serial} has a session that is not finished: {name}, {n} images. A new session "
+            "starts without these images."
+        )
+        ask(
+            self,
+            tr("Unfinished session"),
+            text.format(serial=other.serial, name=other.folder.name, n=other.images),
+            (tr("Continue it"), lambda: self.open_path(other.folder)),
+            (tr("Make a new session"), lambda: self._create(stated)),
+        )
 
-    def _show_wizard(self, project: CalibrationProject, *, step: str = "") -> None:
+    def _create(self, stated: Session | ClosedSession) -> None:
+        name = datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
+        folder = self.context.workspace.sessions_folder(stated.serial) / folder_name(name)
+        try:
+            create_session(replace(stated, folder=folder, ball_radii_mm={}))
+            project = open_project(folder)
+            if isinstance(stated, ClosedSession) and stated.folder != Path():
+                copy_images(stated, project)
+        except InputError as error:
+            for form in (self.form, self.closed_form):
+                form.show_problem(str(error))
+            return
+        self._show_wizard(project)
+
+    def _show_wizard(self, project: CalibrationProject | ClosedProject, *, step: str = "") -> None:
         self._close_wizard()
         self.start.show_problem("")
         self.wizard = Wizard(project, context=self.context)
@@ -146,7 +206,7 @@ class CalibratePage(QWidget):
         self._stack.addWidget(self.wizard)
         self._stack.setCurrentWidget(self.wizard)
         self.context.settings.add_recent_session(project.session.folder)
-        self.wizard.go_to(step or self.wizard.standing.first_open_step())
+        self.wizard.go_to(step or self.wizard.first_open_step())
         if self._shown:
             self.wizard.enter()
 

@@ -1,38 +1,38 @@
-"""The camera in the set-up step; with a session, how it is set is kept and held to."""
+"""The camera in the set-up step; a session stores its settings and keeps the camera at them."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QObject
 
-from app.calibrate.controller import CalibrationController
-from app.calibrate.setup_form import SetupForm
-from app.shell.context import AppContext
+from app.calibrate.model import WizardModel
+from app.calibrate.setup.form_page import FormPage
+from app.context.context import AppContext
+from app.context.source_button import show_settings_of_source
 from app.sources.camera.applying import is_locked
-from app.widgets.source_button import show_settings_of_source
 from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
 LIT = (Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
-"""Stages whose brightnesses are compared: the camera must not change between them.
+"""Stages whose brightness values are compared: the camera must not change between them.
 
-The mirror's spots are compared with nothing, and need a shorter exposure than all else.
+The mirror spots are not compared with other stages and need a shorter exposure.
 """
 
 
 class SetupCamera(QObject):
-    """Says in the form of the set-up step how the camera is set, and lets it be set.
+    """Shows in the set-up form how the camera is set, and opens its settings.
 
     Parameters
     ----------
-    setup : SetupForm
+    setup : FormPage
         The form.
     context : AppContext
-        With the cameras and the choice of the source.
+        Context with the cameras and the selected source.
     """
 
-    def __init__(self, setup: SetupForm, *, context: AppContext) -> None:
+    def __init__(self, setup: FormPage, *, context: AppContext) -> None:
         super().__init__(setup)
         self._setup, self._context = setup, context
         setup.camera_wanted.connect(self._set)
@@ -41,7 +41,7 @@ class SetupCamera(QObject):
         self.show()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Disconnect from the camera's signals."""
         self._context.source.changed.disconnect(self.show)
         self._context.cameras.changed.disconnect(self.show)
 
@@ -49,56 +49,77 @@ class SetupCamera(QObject):
         show_settings_of_source(self._context, self._setup)
 
     def show(self) -> None:
-        """Say in the set-up step how the camera is set."""
+        """Show in the set-up form how the camera is set."""
         info = self._context.source.info
         camera = self._context.cameras.of(info)
         if camera is None:
-            name = tr("No camera is chosen.") if info is None else info.name
-            more = tr("Choose one, or import pictures.") if info is None else ""
+            name = tr("No camera is selected.") if info is None else info.name
+            more = tr("Select one, or import images.") if info is None else ""
             self._setup.show_camera(f"{name} {more}".rstrip(), "", settable=False)
             return
-        state, what = camera.state, camera.device.name
+        state, name = camera.state, camera.device.name
         _, clauses = self._context.cameras.differs(camera)
         if clauses:
-            text, role = tr("{name} is not set as it was: {how}."), "warn"
-            text = text.format(name=what, how="; ".join(clauses))
+            text, role = tr("{name} is not set as before: {how}."), "warn"
+            text = text.format(name=name, how="; ".join(clauses))
         elif state.format is None:
-            text, role = tr("{name}: set and lock it before the first picture."), "text"
-            text = text.format(name=what)
+            text, role = tr("{name}: set and lock the camera before the first image."), "text"
+            text = text.format(name=name)
         else:
             held = is_locked(state.controls) and bool(state.controls)
             role = "text" if held else "warn"
-            text = f"{what}: {state.format}; " + (tr("locked.") if held else tr("not locked."))
+            text = tr("{name}: {format}, locked.") if held else tr("{name}: {format}, not locked.")
+            text = text.format(name=name, format=state.format)
         self._setup.show_camera(text, role, settable=True)
 
 
 class SessionCamera(QObject):
-    """Notes the camera's settings with what is captured, and holds the camera to them.
+    """Stores the camera settings with the session and keeps the camera at them.
 
     Parameters
     ----------
-    controller : CalibrationController
-        With the session.
+    model : WizardModel
+        Model of the wizard.
     context : AppContext
-        With the cameras and the choice of the source.
+        Context with the cameras and the selected source.
     """
 
-    def __init__(self, controller: CalibrationController, *, context: AppContext) -> None:
-        super().__init__(controller)
-        self._controller, self._context = controller, context
-        controller.photographed.connect(self._on_photographed)
+    def __init__(self, model: WizardModel, *, context: AppContext) -> None:
+        super().__init__(model)
+        self._model, self._context = model, context
+        model.photographed.connect(self._on_photographed)
+        model.camera_fault = self.fault
+
+    def fault(self) -> str:
+        """Return why the present camera cannot be used: the session belongs to another camera."""
+        camera = self._context.cameras.of(self._context.source.info)
+        session = self._model.project.session
+        stored = session.camera_settings
+        if camera is None or stored is None or stored.identity == camera.device.identity:
+            return ""
+        if not any(session.found(folder) for folder in FOLDERS.values()):
+            return ""
+        return tr(
+            "This session was captured with the camera {one} ({one_id}), but {other} ({other_id}) "
+            "is connected. Connect the first camera, or start a new session for the other sensor."
+        ).format(
+            one=stored.name,
+            one_id=stored.identity,
+            other=camera.device.name,
+            other_id=camera.device.identity,
+        )
 
     def refer(self) -> None:
-        """Hold the camera to the settings of the session."""
-        stored = self._controller.project.session.camera_settings
-        self._context.cameras.refer(tr("the pictures of this session"), stored)
+        """Make the settings of the session the reference of the camera."""
+        stored = self._model.project.session.camera_settings
+        self._context.cameras.refer(tr("the images of this session"), stored)
 
     def _on_photographed(self, stage: str) -> None:
-        """Note how the camera is set, as long as nothing rests on how it was set before."""
+        """Store the camera settings, as long as no capture depends on the stored ones."""
         camera = self._context.cameras.of(self._context.source.info)
         if camera is None or camera.state.phase != "live":
             return
-        session = self._controller.project.session
+        session = self._model.project.session
         lit = sum(len(session.found(FOLDERS[s])) for s in LIT)
         first = lit == 0 or (lit == 1 and stage in {s.value for s in LIT})
         if session.camera_settings is None or first:
@@ -106,8 +127,8 @@ class SessionCamera(QObject):
 
     def _note(self, settings: CameraSettings) -> None:
         try:
-            self._controller.project.set_camera(settings)
+            self._model.project.set_camera(settings)
         except InputError as error:
-            self._controller.refused.emit(str(error))
+            self._model.refused.emit(str(error))
             return
         self.refer()

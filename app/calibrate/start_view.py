@@ -1,4 +1,4 @@
-"""Where a calibration begins: a new sensor, a session folder, or one of the last ones."""
+"""The start of a calibration: a new sensor, a session folder, or a recent session."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ MOST_RECENT = 6
 
 
 class StartView(QWidget):
-    """Offers the ways to begin.
+    """Offers the buttons to start or continue a calibration.
 
     Signals
     -------
-    new_wanted(), open_wanted(), demo_wanted()
+    new_wanted(), open_wanted(), demo_wanted(), closed_wanted()
         The buttons.
     recent_wanted(str)
         Folder of a recent session.
@@ -30,30 +30,31 @@ class StartView(QWidget):
     new_wanted = Signal()
     open_wanted = Signal()
     demo_wanted = Signal()
+    closed_wanted = Signal()
     recent_wanted = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        named(self, "start", tr("Begin a calibration"))
+        named(self, "start", tr("Start a calibration"))
         column = QVBoxLayout(self)
         column.setAlignment(Qt.AlignmentFlag.AlignCenter)
         column.setSpacing(10)
         title = PlainLabel(tr("Calibrate a sensor"))
         make_bold(title, size=1.6)
-        said = PlainLabel(
+        intro = PlainLabel(
             tr(
-                "The program leads you through the lens, the top surface, the lights and the"
-                " membrane, and judges every stage while you can still repeat it."
+                "The program guides you step by step, and checks every image while you can "
+                "still repeat it."
             )
         )
-        said.setWordWrap(True)
-        said.setFixedWidth(460)
+        intro.setWordWrap(True)
+        intro.setFixedWidth(460)
         column.addWidget(title)
-        column.addWidget(said)
+        column.addWidget(intro)
         for name, text, signal in (
             ("new", tr("&New calibration"), self.new_wanted),
             ("open", tr("&Open a session folder…"), self.open_wanted),
-            ("demo", tr("&Try it on the virtual sensor"), self.demo_wanted),
+            ("demo", tr("&Try the virtual sensor"), self.demo_wanted),
         ):
             button = named(QPushButton(text), f"start.{name}", text.replace("&", ""))
             button.setMinimumHeight(40)
@@ -66,27 +67,47 @@ class StartView(QWidget):
         self.problem.setFixedWidth(460)
         self.problem.hide()
         column.addWidget(self.problem)
+        text = tr("Calibrate it as a &closed sensor")
+        self.closed = named(
+            QPushButton(text),
+            "start.closed",
+            text.replace("&", ""),
+            tr("Start a new session with the background and the ball presses of this folder"),
+        )
+        self.closed.setFixedWidth(460)
+        self.closed.clicked.connect(self.closed_wanted)
+        self.closed.hide()
+        column.addWidget(self.closed)
         self._recent = QVBoxLayout()
         column.addSpacing(12)
         column.addLayout(self._recent)
 
-    def show_problem(self, sentence: str) -> None:
-        """Say why a session was not opened; an empty text: it was."""
+    def show_problem(self, sentence: str, *, closed: bool = False) -> None:
+        """Show why a session was not opened; hide the message if the text is empty.
+
+        With `closed`, offer to use the folder for a closed sensor.
+        """
+        self.closed.setVisible(closed)
+        if closed:
+            sentence += " " + tr(
+                "If the sensor cannot be opened, calibrate it from its background and ball "
+                "presses alone."
+            )
         self.problem.setText(sentence)
         self.problem.setVisible(bool(sentence))
 
     def show_recent(self, folders: Sequence[Path]) -> None:
-        """Offer these sessions."""
+        """Show buttons for these sessions."""
         while self._recent.count():
             old = self._recent.takeAt(0).widget()
             if old is not None:
                 old.deleteLater()
         if folders:
-            self._recent.addWidget(PlainLabel(tr("Go on with a recent session")))
+            self._recent.addWidget(PlainLabel(tr("Continue a recent session")))
         for number, folder in enumerate(folders[:MOST_RECENT]):
             text = f"{folder.parent.parent.name} / {folder.name}"
             button = named(
-                QPushButton(text), f"start.recent.{number}", tr("Go on with {s}").format(s=text)
+                QPushButton(text), f"start.recent.{number}", tr("Continue {s}").format(s=text)
             )
             button.setToolTip(plain_tip(str(folder)))
             button.setFlat(True)

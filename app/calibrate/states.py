@@ -1,4 +1,4 @@
-"""How a step or a picture stands: word, colour and sign, the same everywhere in the wizard."""
+"""The state of a step or an image: text, colour and icon, the same everywhere in the wizard."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from collections.abc import Mapping
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
 
-from app.calibrate.steps import Step
-from app.shell import theme
+from app.calibrate.step_data import Step
+from app.theme import theme
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.status import StageState, StageStatus
 from gelpolight_core.translation import tr
+
+StepState = tuple[str, str]
+"""State of a step, and the message about it."""
 
 RUNNING = "running"
 BEGUN = "begun"
@@ -20,12 +23,12 @@ _ORDER = ("pass", "warn", "stale", "waiting", "empty", "fail")
 
 
 def state_word(state: str) -> str:
-    """Return the word for a state."""
+    """Return the text for a state."""
     return {
         "empty": tr("empty"),
         "waiting": tr("not computed"),
-        BEGUN: tr("begun"),
-        "stale": tr("stale"),
+        BEGUN: tr("incomplete"),
+        "stale": tr("outdated"),
         "running": tr("running"),
         "pass": tr("pass"),
         "warn": tr("warning"),
@@ -34,37 +37,37 @@ def state_word(state: str) -> str:
 
 
 def state_meaning(state: str) -> str:
-    """Return the meaning for a state, by which the theme colours it."""
+    """Return the meaning of a state, from which the theme derives the colour."""
     names = {"empty": "muted", BEGUN: "muted", "waiting": "stale", "running": "accent"}
     return names.get(state, state)
 
 
 def state_colour(state: str) -> QColor:
-    """Return the colour for a state, in the theme of now."""
+    """Return the colour of a state in the present theme."""
     return theme.colour(state_meaning(state))
 
 
 def state_icon(state: str) -> QIcon:
-    """Return a sign for a state: its shape tells it without the colour."""
+    """Return an icon for a state; its shape shows the state without the colour."""
     sign = QIcon()
     back = theme.colour("base")
-    sign.addPixmap(_picture(state, state_colour(state), back), QIcon.Mode.Normal)
+    sign.addPixmap(_draw(state, state_colour(state), back), QIcon.Mode.Normal)
     # On the highlighted row of a list.
     chosen, behind = theme.colour("highlighted"), theme.colour("highlight")
-    sign.addPixmap(_picture(state, chosen, behind), QIcon.Mode.Selected)
+    sign.addPixmap(_draw(state, chosen, behind), QIcon.Mode.Selected)
     return sign
 
 
-def _picture(state: str, colour: QColor, back: QColor) -> QPixmap:
+def _draw(state: str, colour: QColor, back: QColor) -> QPixmap:
     ratio = 2
-    picture = QPixmap(SIZE * ratio, SIZE * ratio)
-    picture.setDevicePixelRatio(ratio)
-    picture.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(picture)
+    pixmap = QPixmap(SIZE * ratio, SIZE * ratio)
+    pixmap.setDevicePixelRatio(ratio)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     _paint(painter, state, colour, back)
     painter.end()
-    return picture
+    return pixmap
 
 
 def _paint(painter: QPainter, state: str, colour: QColor, back: QColor) -> None:
@@ -105,11 +108,11 @@ def _paint(painter: QPainter, state: str, colour: QColor, back: QColor) -> None:
 
 
 def step_state(
-    step: Step, statuses: Mapping[Stage, StageStatus], running: Stage | None, *, taken: int
-) -> tuple[str, str]:
-    """Return the state of a step and what to say of it: those of its worst stage.
+    step: Step, statuses: Mapping[Stage, StageStatus], running: Stage | None, *, count: int
+) -> StepState:
+    """Return state and message of a step: those of its worst stage.
 
-    One with too few pictures, `taken`, has not failed: the person is still at it.
+    A step with too few images, `count`, has not failed: it is still incomplete.
     """
     if not step.stages:
         return "empty", ""
@@ -117,12 +120,12 @@ def step_state(
         return RUNNING, tr("Computing")
     found = [statuses[stage] for stage in step.stages]
     worst = max(found, key=lambda status: _ORDER.index(status.state.value))
-    if worst.state is StageState.FAIL and 0 < taken < step.least:
-        said = tr("{n} taken; at least {m} are needed, {w} are better")
-        return BEGUN, said.format(n=taken, m=step.least, w=step.wanted)
+    if worst.state is StageState.FAIL and 0 < count < step.least:
+        text = tr("{n} captured. At least {m} are needed, {w} are recommended.")
+        return BEGUN, text.format(n=count, m=step.least, w=step.wanted)
     return worst.state.value, worst.sentence
 
 
 def is_done(state: str) -> bool:
-    """Whether a step in this state needs nothing more."""
+    """Return whether a step in this state is complete."""
     return state in (StageState.PASS.value, StageState.WARN.value)

@@ -1,4 +1,4 @@
-"""The list of steps at the side: where one is, how each stands, a click goes there."""
+"""The list of steps at the side: the open step, the state of each; a click opens a step."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from app.calibrate.states import state_icon, state_word
-from app.calibrate.steps import Step
+from app.calibrate.step_data import Step
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -22,7 +22,7 @@ class StepList(QListWidget):
     Signals
     -------
     chosen(int)
-        The step that the person goes to.
+        Index of the step that the user opens.
     """
 
     chosen = Signal(int)
@@ -42,7 +42,7 @@ class StepList(QListWidget):
         self.currentRowChanged.connect(self._on_row)
 
     def show_states(self, states: Mapping[str, tuple[str, str]]) -> None:
-        """Show how each step stands: (state, sentence) by the step's key."""
+        """Show the state of each step: (state, message) by step key."""
         for row, step in enumerate(self._steps):
             state, sentence = states.get(step.key, ("empty", ""))
             self._show_state(row, step, state, sentence)
@@ -50,11 +50,12 @@ class StepList(QListWidget):
     def _show_state(self, row: int, step: Step, state: str, sentence: str) -> None:
         item = self.item(row)
         item.setIcon(state_icon(state))
+        item.setData(Qt.ItemDataRole.UserRole, state)
         item.setToolTip(plain_tip(f"{step.title}: {state_word(state)}. {sentence}".strip()))
         item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
 
     def go_to(self, row: int) -> None:
-        """Show a step as the one that is open."""
+        """Mark a step as the open one."""
         if row != self.currentRow():
             self.setCurrentRow(row)
 

@@ -1,4 +1,4 @@
-"""What to do in a step, how it stands, and the buttons for it."""
+"""The side panel of a step: its task, its state, and its buttons."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPaintEvent
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QFrame,
     QHBoxLayout,
     QProgressBar,
@@ -16,51 +15,53 @@ from PySide6.QtWidgets import (
     QScrollArea,
     QScrollBar,
     QSizePolicy,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
-from app.calibrate.assembly import AssemblyPicture
+from app.calibrate.assembly import AssemblyDrawing
 from app.calibrate.states import RUNNING, state_icon, state_meaning, state_word
-from app.calibrate.steps import Step
+from app.calibrate.step_data import Step
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
-from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.session import ONE_IMAGE_STAGES
 from gelpolight_core.translation import tr
 
 WIDTH = 372
-# Room that is always there, so that nothing below moves when a sentence changes.
+# This space is always reserved, so that nothing below moves when a message changes.
 LIVE_LINES = 4
 NOTICE_LINES = 2
 
 
 class StepPanel(QWidget):
-    """The side panel of a step with pictures; its foot is always in sight.
+    """The side panel of a step with images; its lower part is always visible.
 
     Attributes
     ----------
     finished : bool
-        Whether the step needs nothing more.
+        Whether the step is complete.
 
     Signals
     -------
     lay_wanted()
-        Put on the virtual bench what this step asks for.
+        Place the object for this step on the virtual bench.
     capture_wanted()
-        Take a picture now.
+        Capture an image now.
     import_wanted()
-        Choose picture files.
+        Choose image files.
     next_wanted()
         Go to the next step.
     cancel_wanted()
-        Stop the work that runs.
+        Stop the running work.
     recompute_wanted()
-        Compute what is stale.
+        Compute the outdated stages.
+    help_wanted()
+        The user wants to read about this step.
     """
 
     lay_wanted = Signal()
@@ -69,6 +70,7 @@ class StepPanel(QWidget):
     next_wanted = Signal()
     cancel_wanted = Signal()
     recompute_wanted = Signal()
+    help_wanted = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -93,47 +95,38 @@ class StepPanel(QWidget):
     def _build_head(self) -> None:
         self.title = named(PlainLabel(), "calibrate.title", tr("Step"))
         make_bold(self.title, size=1.35)
-        self.task = named(_wrapped(), "calibrate.task", tr("What to do"))
-        self.assembly = AssemblyPicture()
-        for widget in (self.title, self.assembly, self.task):
+        self.task = named(_wrapped(), "calibrate.task", tr("Task"))
+        self.assembly = AssemblyDrawing()
+        self.help = help_button("calibrate.help")
+        self.help.clicked.connect(self.help_wanted)
+        head = QHBoxLayout()
+        head.addWidget(self.title, 1)
+        head.addWidget(self.help)
+        self._column.addLayout(head)
+        for widget in (self.assembly, self.task):
             self._column.addWidget(widget)
 
     def _build_capture(self) -> None:
         self.live = named(
-            _wrapped(lines=LIVE_LINES), "calibrate.live", tr("What the live picture shows")
+            _wrapped(lines=LIVE_LINES), "calibrate.live", tr("Content of the live image")
         )
         self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.radius_row = QWidget()
-        row = QHBoxLayout(self.radius_row)
-        row.setContentsMargins(0, 0, 0, 0)
-        self.radius = named(
-            QDoubleSpinBox(),
-            "calibrate.radius",
-            tr("Radius of the ball in mm"),
-            tr("Of the next press, or of the one that is looked at"),
-        )
-        self.radius.setRange(0.05, 500.0)
-        self.radius.setDecimals(3)
-        self.radius.setSuffix(tr(" mm"))
-        self.radius.setKeyboardTracking(False)
-        row.addWidget(PlainLabel(tr("Ball radius")))
-        row.addWidget(self.radius, 1)
         self.capture = named(
             QPushButton(tr("&Capture")),
             "calibrate.capture",
             tr("Capture"),
-            tr("Take this picture (C)"),
+            tr("Capture this image (C)"),
         )
         self.capture.setMinimumHeight(38)
         self.capture.clicked.connect(self.capture_wanted)
         self.automatic = named(
-            QCheckBox(tr("When still and &good")),
+            QCheckBox(tr("&Automatic when still")),
             "calibrate.automatic",
-            tr("Capture by itself when the picture is still and good"),
-            tr("Hands free: after each capture it waits until you have moved something"),
+            tr("Capture automatically when the image is still and good"),
+            tr("Hands-free: after each capture it waits until you have moved something"),
         )
         self.import_files = named(
-            QPushButton(tr("&Import…")), "calibrate.import", tr("Import picture files")
+            QPushButton(tr("&Import…")), "calibrate.import", tr("Import image files")
         )
         self.import_files.clicked.connect(self.import_wanted)
         buttons = QHBoxLayout()
@@ -146,11 +139,12 @@ class StepPanel(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.lay)
         column.addWidget(self.live)
-        column.addWidget(self.radius_row)
+        self._extra = QVBoxLayout()
+        column.addLayout(self._extra)
         column.addLayout(buttons)
         column.addWidget(self.automatic)
         self.notice = named(
-            _wrapped(lines=NOTICE_LINES), "calibrate.notice", tr("What became of it")
+            _wrapped(lines=NOTICE_LINES), "calibrate.notice", tr("Result of the last action")
         )
         self.notice.setAlignment(Qt.AlignmentFlag.AlignTop)
         column.addWidget(self.notice)
@@ -165,13 +159,13 @@ class StepPanel(QWidget):
             QPushButton(tr("&Recompute")),
             "calibrate.recompute",
             tr("Recompute"),
-            tr("Compute this step again from the captures that are stored"),
+            tr("Compute this step again from the stored captures"),
         )
         self.recompute.clicked.connect(self.recompute_wanted)
         row.addWidget(self._sign)
         row.addWidget(self._word, 1)
         row.addWidget(self.recompute)
-        self.sentence = named(_wrapped(), "calibrate.sentence", tr("What to say of the step"))
+        self.sentence = named(_wrapped(), "calibrate.sentence", tr("Message about the step"))
         self.quality = QualityTableWidget(
             "calibrate.quality", tr("Quality figures of this step"), narrow=True
         )
@@ -205,30 +199,30 @@ class StepPanel(QWidget):
         self.show_work("", 0.0)
         return foot
 
-    @property
-    def types_radius(self) -> bool:
-        """Whether a radius is being typed: the field's value is still the one before."""
-        return self.radius.valueFromText(self.radius.text()) != self.radius.value()
+    def add_extra(self, widget: QWidget, focus: QWidget) -> None:
+        """Add a step's own input above the buttons; the step shows and hides it."""
+        self._extra.addWidget(widget)
+        QWidget.setTabOrder(self.lay, focus)
+        widget.hide()
 
     def show_step(self, step: Step, *, following: str) -> None:
-        """Show another step's task; `following`: the title of the step after it, if any."""
+        """Show the task of another step; `following`: title of the next step, if any."""
         if step is not self._step:
-            # What is said of the step before is not of this one, not even while it is computed.
+            # The message belongs to the previous step; remove it, even during a computation.
             self._show_figures(())
         self._step = step
         self._show_finished(False)
         self.title.setText(step.title)
         self.task.setText(step.task)
         self.assembly.show_assembly(step.assembly)
-        self.capturing.setVisible(step.stage is not None and step.key != "refraction")
-        self.radius_row.setVisible(step.stage is Stage.BALLS)
+        self.capturing.setVisible(step.captures)
         self.show_notice("", "pass")
         self.next.setVisible(bool(following))
         self.next.setText(tr("&Next: {title}").format(title=following))
         self._scroll.verticalScrollBar().setValue(0)
 
     def show_count(self, count: int) -> None:
-        """Say on the button how many captures there are, and how many make a good stage."""
+        """Show on the Capture button how many images there are, and how many are recommended."""
         wanted = 1 if self._step is None else self._step.wanted
         text = tr("&Capture")
         if wanted > 1:
@@ -239,12 +233,12 @@ class StepPanel(QWidget):
         self.capture.setText(text)
 
     def show_notice(self, sentence: str, role: str) -> None:
-        """Say what became of the last capture, import or correction."""
+        """Show the result of the last capture, import or correction."""
         self.notice.setText(sentence)
         show_meaning(self.notice, role)
 
     def show_running(self) -> None:
-        """Say that the step is being computed; its figures stay until there are others."""
+        """Show that the step is being computed; its figures stay until new ones arrive."""
         self._show_sign(RUNNING)
         self.sentence.setText(tr("Computing from the captures."))
         self.recompute.hide()
@@ -255,7 +249,7 @@ class StepPanel(QWidget):
         show_meaning(self._word, state_meaning(state))
 
     def show_live(self, sentence: str, *, ready: bool) -> None:
-        """Say what the live picture shows."""
+        """Show the detection message of the live image."""
         self.live.setText(sentence)
         show_meaning(self.live, "pass" if ready else "warn")
 
@@ -268,22 +262,22 @@ class StepPanel(QWidget):
         recompute: bool,
         finished: bool,
     ) -> None:
-        """Show how the step stands.
+        """Show the state of the step.
 
         Parameters
         ----------
         state, sentence : str
-            Its state, and what to say of it.
+            State of the step, and the message about it.
         tables : sequence of QualityTable
-            Of its stages.
+            Quality tables of its stages.
         recompute : bool
-            Whether to offer to compute it.
+            Whether to offer Recompute.
         finished : bool
-            Whether it needs nothing more, so that the next step comes next.
+            Whether the step is complete, so that Next becomes the main button.
         """
         self._show_sign(state)
         if recompute:
-            sentence = tr("{sentence}. Press Recompute.").format(sentence=sentence.rstrip("."))
+            sentence = tr("{sentence}. Click Recompute.").format(sentence=sentence.rstrip("."))
         self.sentence.setText(sentence)
         self._show_figures(tables)
         self.recompute.setVisible(recompute)
@@ -299,7 +293,7 @@ class StepPanel(QWidget):
         self.next.setStyleSheet("font-weight: bold;" if finished else "")
 
     def show_work(self, title: str, share: float) -> None:
-        """Show the work that runs; an empty title when there is none."""
+        """Show the running work; an empty title means none."""
         self.progress.setVisible(bool(title))
         self.cancel.setVisible(bool(title))
         self.progress.setFormat(f"{title}  %p %" if title else "")
@@ -308,19 +302,19 @@ class StepPanel(QWidget):
 
 
 class _QuietBar(QScrollBar):
-    """A scroll bar that is not seen where there is nothing to scroll, but keeps its room.
+    """A scroll bar that is invisible if there is nothing to scroll, but keeps its space.
 
-    Nothing beside it jumps when there is.
+    The widgets next to it do not move when it appears.
     """
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Paint the bar, or nothing."""
+        """Paint the bar, or nothing if there is nothing to scroll."""
         if self.maximum() > self.minimum():
             super().paintEvent(event)
 
 
 def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
-    """Return an area for a side panel that scrolls up and down only, and the widget in it."""
+    """Return a vertical scroll area for a side panel, and the widget in it."""
     scroll = named(QScrollArea(), name, accessible)
     scroll.setWidgetResizable(True)
     scroll.setFrameShape(QFrame.Shape.NoFrame)
@@ -334,12 +328,12 @@ def side_scroll(name: str, accessible: str) -> tuple[QScrollArea, QWidget]:
 
 
 def lay_button(name: str) -> QPushButton:
-    """Return the button of the virtual bench; hidden where the camera is a real one."""
+    """Return the button of the virtual bench; hidden with a real camera."""
     button = named(
-        QPushButton(tr("Put it on the virtual &bench")),
+        QPushButton(tr("Place it on the virtual &bench")),
         name,
-        tr("Put on the virtual bench what this step asks for"),
-        tr("Each time the next view or press, as a technician would arrange it"),
+        tr("Place the object for this step on the virtual bench"),
+        tr("Each click gives the next view or press, as a technician would arrange it"),
     )
     button.hide()
     return button
@@ -353,3 +347,11 @@ def _wrapped(*, lines: int = 0) -> PlainLabel:
     if lines:
         label.setMinimumHeight(lines * label.fontMetrics().lineSpacing() + 4)
     return label
+
+
+def help_button(name: str) -> QToolButton:
+    """Return the button that opens the guide at a step."""
+    button = named(QToolButton(), name, tr("Help on this step"), tr("Read about this step"))
+    button.setText("?")
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    return button

@@ -1,277 +1,344 @@
-"""The wizard of one session: steps at the side, picture in the middle, what to do at the right."""
+"""The wizard of one session: steps on the left, image in the middle, task on the right."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QTimer
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
-from app.calibrate.looking import Looking
-from app.calibrate.maps import Panel
-from app.calibrate.pictures import PICTURE, RESULT
-from app.calibrate.saving import Saving
-from app.calibrate.session_camera import SessionCamera, SetupCamera
-from app.calibrate.standing import Standing
-from app.calibrate.taking import Taking
-from app.calibrate.trial import KnownObject
-from app.calibrate.validating import Validating
-from app.calibrate.wizard_frame import WizardFrame
-from app.shell.actions import make_action
-from app.shell.context import AppContext
-from gelpolight_core.calibration.inputs import Stage
+from app.calibrate.bench_dock import BenchDock
+from app.calibrate.image_area import ImageArea
+from app.calibrate.model import WizardModel
+from app.calibrate.outside_changes import OutsideBar
+from app.calibrate.session_bar import SessionBar, history_dock
+from app.calibrate.session_camera import SessionCamera
+from app.calibrate.states import BEGUN, StepState
+from app.calibrate.step import Parts, StepPresenter
+from app.calibrate.step_list import StepList
+from app.calibrate.step_panel import StepPanel
+from app.calibrate.steps import route_of, steps_of
+from app.context.context import AppContext
+from app.widgets.actions import make_action
+from app.widgets.naming import named
+from gelpolight_core.calibration.closed_project import ClosedProject
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
+OPEN = (StageState.EMPTY.value, BEGUN, StageState.FAIL.value)
 
-class Wizard(WizardFrame):
-    """One session, from set-up to validation.
+
+class Wizard(QMainWindow):
+    """Holds the steps of a session and passes on what concerns the open one.
 
     Parameters
     ----------
-    project : CalibrationProject
+    project : CalibrationProject or ClosedProject
         The session.
     context : AppContext
-        The program's.
+        Context of the application.
+
+    Signals
+    -------
+    left()
+        The user wants to leave this session.
     """
 
-    def __init__(self, project: CalibrationProject, *, context: AppContext) -> None:
-        super().__init__(project, context=context)
-        self.looking = Looking(self.controller, self.pictures, self.panel, self.step)
-        self.saving = Saving(self.controller, self.result, context=context)
-        self.validating = Validating(self.controller, self.validation, context=context)
-        self.taking = Taking(self, self.looking)
-        self.standing = Standing(self, self.looking, self.validating)
+    left = Signal()
+
+    def __init__(self, project: CalibrationProject | ClosedProject, *, context: AppContext) -> None:
+        super().__init__()
+        self.setWindowFlags(Qt.WindowType.Widget)
+        named(self, "wizard", tr("Calibration wizard"))
+        self.context = context
+        self.model = WizardModel(project, context=context, parent=self)
+        self.live = self.model.live
+        self.outside = OutsideBar(self.model)
+        self.area, self.panel = ImageArea(), StepPanel()
+        route = route_of(project)
+        self.step_list = StepList(steps_of(route))
+        self._lay_out()
+        parts = Parts(self.model, context, self.area, self.panel, steps_of(route))
+        self.presenters: tuple[StepPresenter, ...] = tuple(make(parts) for make in route)
+        self.open = self.presenters[0]
+        for presenter in self.presenters:
+            _add(self.side, presenter.side)
+            if not presenter.opens_slowly:
+                _add(self.centre, presenter.centre)
+        self._running: object = None
+        self._build_docks()
         self._build_keys()
-        self.session_camera = SessionCamera(self.controller, context=context)
-        self.setup_camera = SetupCamera(self.setup, context=context)
+        self.session_camera = SessionCamera(self.model, context=context)
         self._connect()
-        self.standing.refresh()
-        self.controller.look_for_boards()
-        self.controller.compute()
+        self.refresh()
+        for presenter in self.presenters:
+            presenter.start()
+        self.model.compute()
+
+    def _lay_out(self) -> None:
+        middle = QWidget()
+        column = QVBoxLayout(middle)
+        row = QHBoxLayout()
+        for layout in (column, row):
+            layout.setContentsMargins(0, 0, 0, 0)
+            layout.setSpacing(0)
+        column.addWidget(self.outside)
+        column.addLayout(row, 1)
+        self.centre, self.side = QStackedWidget(), QStackedWidget()
+        self.centre.addWidget(self.area)
+        self.side.addWidget(self.panel)
+        for widget, stretch in ((self.step_list, 0), (self.centre, 1), (self.side, 0)):
+            row.addWidget(widget, stretch)
+        self.setCentralWidget(middle)
+
+    def _build_docks(self) -> None:
+        self.bench_dock = BenchDock(self.context.source, self)
+        docks = (history_dock(self.model, self), self.bench_dock)
+        for dock in docks:
+            self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
+            dock.hide()
+        bar = SessionBar(self, model=self.model, context=self.context, docks=docks)
+        bar.leave.triggered.connect(self.left)
+        self.addToolBar(bar)
 
     def _build_keys(self) -> None:
         self._capture_key = make_action(
-            self, "calibrate.capture_now", tr("Capture"), self.taking.capture, keys=("C", "F5")
-        )
+            self, "calibrate.capture_now", tr("Capture"), lambda: self.open.capture(),
+            keys=("C", "F5"),
+        )  # fmt: skip
         self._live_key = make_action(
-            self, "calibrate.live_again", tr("Back to the live picture"),
-            lambda: self.looking.live(), keys=("Escape",),
+            self, "calibrate.live_again", tr("Back to the live image"), lambda: self.open.live(),
+            keys=("Escape",),
         )  # fmt: skip
         steps: tuple[tuple[str, str, int, str], ...] = (
             ("next_step", tr("Next step"), 1, "Alt+Right"),
             ("previous_step", tr("Previous step"), -1, "Alt+Left"),
         )
-        for name, text, way, keys in steps:
+        for name, text, by, keys in steps:
             make_action(
-                self, f"calibrate.{name}", text, lambda way=way: self._go_by(way), keys=(keys,)
+                self, f"calibrate.{name}", text, lambda by=by: self._go_by(by), keys=(keys,)
             )
 
     def _connect(self) -> None:
-        self.step_list.chosen.connect(lambda row: self.go_to(self.steps[row].key))
-        panel, pictures, controller = self.panel, self.pictures, self.controller
+        self.step_list.chosen.connect(lambda row: self.go_to(self.presenters[row].step.key))
+        self._connect_open_step()
+        panel, area, model = self.panel, self.area, self.model
         panel.next_wanted.connect(lambda: self._go_by(1))
-        panel.cancel_wanted.connect(controller.jobs.cancel)
+        panel.cancel_wanted.connect(model.jobs.cancel)
+        guide = self.context.requests.guide
+        panel.help_wanted.connect(lambda: guide.emit("guide/calibrate", self.open.step.title))
         panel.recompute_wanted.connect(self._recompute)
-        panel.lay_wanted.connect(self._lay_on_bench)
-        self.validation.lay_wanted.connect(self._lay_on_bench)
-        pictures.strip.chosen.connect(self.look_at)
-        pictures.live_wanted.connect(self.looking.live)
-        pictures.reconnect_wanted.connect(self.camera.open)
-        pictures.view.clicked.connect(self._on_clicked)
-        pictures.view.dragged.connect(self.bench_dock.drag)
-        self.bench_dock.visibilityChanged.connect(self._follow_bench)
-        pictures.view.refused.connect(self._refuse)
-        pictures.view.saved.connect(
-            lambda path: self.panel.show_notice(tr("Saved {p}").format(p=path), "pass")
+        area.reconnect_wanted.connect(self.live.open)
+        area.view.clicked.connect(self._on_clicked)
+        area.view.dragged.connect(self.bench_dock.drag)
+        area.view.refused.connect(self._refuse)
+        area.view.saved.connect(
+            lambda path: panel.show_notice(tr("Saved as {p}").format(p=path), "pass")
         )
-        self.looking.looked.connect(self._on_looked)
-        self.setup.accepted.connect(self._on_stated)
-        self.result.step_wanted.connect(self.go_to)
-        controller.changed.connect(self.standing.refresh)
-        controller.progressed.connect(self.standing.show_progress)
-        controller.refused.connect(self._refuse)
-        # Not beside the step: whoever took the camera away has left it.
-        controller.watching.given_up.connect(lambda text: self.context.toasts.show(text, "fail"))
-        controller.changed.connect(self.outside.look)
-        self.saving.saved.connect(self.validating.take)
-        self.validating.show_pictures_in(self._show_trial)
-        self.camera.switched.connect(self._on_camera)
-        self.camera.lost.connect(pictures.show_lost)
-        self.context.source.changed.connect(self.camera.open)
+        self.bench_dock.visibilityChanged.connect(self._follow_bench)
+        for presenter in self.presenters:
+            presenter.step_wanted.connect(self.go_to)
+            presenter.lay_wanted.connect(self._lay_on_bench)
+        model.shown_changed.connect(self._on_shown)
+        model.changed.connect(self.refresh)
+        model.changed.connect(self.outside.check)
+        model.progressed.connect(self._show_progress)
+        model.refused.connect(self._refuse)
+        model.captured.connect(self._on_captured)
+        # A toast, not the panel: the user has already left the step.
+        model.capture_aborted.connect(lambda text: self.context.toasts.show(text, "fail"))
+        self.live.switched.connect(self._on_camera)
+        self.live.lost.connect(area.show_lost)
 
-    # The page around
+    def _connect_open_step(self) -> None:
+        """Pass on to the open step what the user does with the shared widgets."""
+        panel, area = self.panel, self.area
+        panel.capture_wanted.connect(lambda: self.open.capture())
+        panel.import_wanted.connect(lambda: self.open.choose_files())
+        panel.lay_wanted.connect(self._lay_on_bench)
+        area.live_wanted.connect(lambda: self.open.live())
+        area.strip.chosen.connect(self.show_capture)
+        area.strip.excluded.connect(lambda name, out: self.open.exclude(name, out))
+        area.view.moved.connect(lambda *at: self.open.moved(*at))
+        self.live.processed.connect(lambda item: self.open.detected(item))
+
+    # Called by the page
 
     def changeEvent(self, event: QEvent) -> None:
-        """Draw the signs anew in another theme."""
+        """Redraw the icons in another theme."""
         super().changeEvent(event)
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "standing"):
-            # Not at once: Qt walks over all widgets, and none may be made or lost meanwhile. A
-            # timer of no time at all would wait until nothing else is left to be painted.
-            QTimer.singleShot(1, self, self.standing.refresh)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "presenters"):
+            # Not at once: Qt is iterating over all widgets, and none may be created or deleted
+            # meanwhile. A zero timer would wait until there is nothing else to paint.
+            QTimer.singleShot(1, self, self.refresh)
 
     def enter(self) -> None:
-        """Look at the camera, as the wizard is shown."""
+        """Open the camera when the wizard is shown."""
         self.session_camera.refer()
-        self.camera.enter(True)
+        self.live.enter(True)
         self.outside.watch(True)
         self._focus_on_what_comes_next()
 
     def leave(self) -> None:
-        """Let the camera go, as the wizard is hidden."""
-        self.camera.enter(False)
+        """Release the camera when the wizard is hidden."""
+        self.live.enter(False)
         self.outside.watch(False)
 
     def close_session(self) -> None:
-        """End all work; everything captured and decided is on disk."""
-        self.panel.radius.interpretText()  # while it can still be kept
-        self.context.source.changed.disconnect(self.camera.open)
-        self.setup_camera.close()
+        """Stop all work; all captures and decisions are on disk."""
+        for presenter in self.presenters:
+            presenter.close()
         self.leave()
-        self.validating.close()
-        if self.curves is not None:
-            self.curves.close_editor()
-        # What could not be saved is told where it is seen when this page has gone.
-        self.controller.refused.disconnect(self._refuse)
+        # Later errors appear as toasts, because this page is gone.
+        self.model.refused.disconnect(self._refuse)
         toasts = self.context.toasts
-        self.controller.refused.connect(lambda text: toasts.show(text, "fail"))
-        if self.setup.edited:
-            toasts.show(tr("What was changed in the set-up was not taken."), "warn")
-        self.controller.close()
+        self.model.refused.connect(lambda text: toasts.show(text, "fail"))
+        self.model.close()
 
-    def _on_camera(self) -> None:
-        self.bench_dock.follow()
-        for panel in (self.panel, self.validation):
-            panel.lay.setVisible(self.bench_dock.in_use)
-        self.validating.refresh()
-        self.looking.camera_changed()
+    # Steps
 
-    def _lay_on_bench(self) -> None:
-        scene = self.bench_dock.lay(self.step, self.project.session)
-        if scene is None:
-            return
-        if self.step.stage is Stage.BALLS:
-            self.looking.set_next_radius(0.5 * scene.size_mm)
-        elif not self.step.folder:
-            self.validation.show_known(KnownObject(scene.item, scene.size_mm, scene.depth_mm))
-        self.looking.live()
+    @property
+    def project(self) -> CalibrationProject | ClosedProject:
+        """The session's project."""
+        return self.model.project
 
-    def _follow_bench(self) -> None:
-        """Let drags move what lies on the bench, where it is shown beside the live picture."""
-        live = not self.looking.name and self.bench_dock.in_use
-        self.pictures.view.hand_drags_on(live and not self.bench_dock.isHidden())
+    def at(self, key: str) -> StepPresenter:
+        """Return a step by its key."""
+        return next(one for one in self.presenters if one.step.key == key)
 
-    def _on_clicked(self, u: float, v: float) -> None:
-        if not self.looking.name:
-            self.bench_dock.drag_to(u, v)
+    def go_to(self, key: str) -> None:
+        """Show a step."""
+        left, self.open = self.open, self.at(key)
+        if left is not self.open:
+            left.leave()
+        row = self.presenters.index(self.open)
+        self.step_list.go_to(row)
+        following = self.presenters[row + 1 : row + 2]
+        self.panel.show_step(self.open.step, following=following[0].step.title if following else "")
+        self._capture_key.setEnabled(self.open.step.captures)
+        self.open.enter()
+        self.live.use(self.open.uses_camera)
+        self._compute_what_never_was()
+        self.refresh()
+        _add(self.centre, self.open.centre)
+        self.centre.setCurrentWidget(self.open.centre)
+        self.side.setCurrentWidget(self.open.side)
+        self._focus_on_what_comes_next()
+
+    def _go_by(self, steps: int) -> None:
+        row = self.presenters.index(self.open) + steps
+        if 0 <= row < len(self.presenters):
+            self.go_to(self.presenters[row].step.key)
+
+    def first_open_step(self) -> str:
+        """Return the first step that is not complete."""
+        states = self.model.states
+        for presenter in self.presenters:
+            step = presenter.step
+            if step.stage is not None and states[step.key][0] in OPEN:
+                return step.key
+        last = [one.step.key for one in self.presenters if one.step.key in ("result", "validation")]
+        tried = states[last[-1]][0] != StageState.EMPTY.value
+        return last[-1] if self.model.saved and not tried else last[0]
+
+    def _compute_what_never_was(self) -> None:
+        """Compute a step's first result automatically; an outdated one waits for Recompute."""
+        stages = self.open.step.stages
+        if stages:
+            ready = self.project.stale(upto=stages[-1])
+            statuses = self.project.statuses()
+            if not any(statuses[stage].state is StageState.STALE for stage in ready):
+                self.model.compute(stages[-1])
+
+    def _focus_on_what_comes_next(self) -> None:
+        if self.isVisible():
+            self.open.focus().setFocus()
+
+    def _recompute(self) -> None:
+        stages = self.open.step.stages
+        self.model.compute(stages[-1] if stages else None)
+
+    # State
+
+    def refresh(self) -> None:
+        """Show the present state of everything."""
+        self.model.update()
+        self.model.states = self._states()
+        self.step_list.show_states(self.model.states)
+        self.open.refresh()
+
+    def _states(self) -> dict[str, StepState]:
+        """Return state and message of every step; a waiting step names the one it waits for."""
+        states: dict[str, StepState] = {}
+        first_open = ""
+        for number, presenter in enumerate(self.presenters, start=1):
+            step, (state, text) = presenter.step, presenter.state()
+            empty = state == StageState.EMPTY.value and step.stage is None and bool(step.stages)
+            if first_open and (empty or state == StageState.WAITING.value):
+                text = tr("Waiting for {step}. Complete that step first.").format(step=first_open)
+            if not first_open and step.stage is not None and state in OPEN:
+                first_open = tr("step {n}, {title}").format(n=number, title=step.title)
+            states[step.key] = state, text
+        return states
+
+    def _show_progress(self, title: str, share: float) -> None:
+        self.panel.show_work(title, share)
+        running = self.model.running
+        if not title or running is not self._running:
+            self._running = running
+            self.refresh()
 
     def _refuse(self, sentence: str) -> None:
-        """Say on the page why something came to nothing."""
-        self.outside.look()
+        """Show an error message on the page."""
+        self.outside.check()
         if self.isVisible() and self.side.currentWidget() is self.panel:
             self.panel.show_notice(sentence, "fail")
         else:
             self.context.toasts.show(sentence, "fail")
 
-    # Steps
+    # Images
 
-    def go_to(self, key: str) -> None:
-        """Show a step."""
-        left = self.step
-        self.step = next(step for step in self.steps if step.key == key)
-        row = self.steps.index(self.step)
-        self.step_list.go_to(row)
-        following = self.steps[row + 1].title if row + 1 < len(self.steps) else ""
-        self.panel.show_step(self.step, following=following)
-        self.side.setCurrentWidget(self.validation if key == "validation" else self.panel)
-        if key == "setup" and not self.setup.edited:
-            self.setup.show_session(self.project.session, new=False)
-        self.pictures.strip.setVisible(self.step.stage is not None)
-        self.pictures.show_tab(PICTURE, key != "refraction")
-        self.pictures.show_tab(RESULT, False)
-        self.pictures.tabs.setCurrentIndex(RESULT if key == "refraction" else PICTURE)
-        self._capture_key.setEnabled(self.step.stage is not None and key != "refraction")
-        self.looking.take_step(self.step)
-        self.camera.use(self.looking.has_pictures or key == "validation")
-        if left.key == "setup" and left is not self.step and self.setup.edited:
-            text = tr("What was changed in the set-up is not taken yet: go back to it for that.")
-            self.context.toasts.show(text, "warn")
-        self._compute_what_never_was()
-        self.standing.refresh()
-        centre: dict[str, QWidget] = {"setup": self.setup, "result": self.result}
-        self.centre.setCurrentWidget(centre.get(key, self.pictures))
-        if key == "reflectance":
-            self._show_curves()
-        self._focus_on_what_comes_next()
-
-    def _go_by(self, way: int) -> None:
-        row = self.steps.index(self.step) + way
-        if 0 <= row < len(self.steps):
-            self.go_to(self.steps[row].key)
-
-    def _compute_what_never_was(self) -> None:
-        """Compute a step's first result unasked; a stale one waits for Recompute."""
-        if not self.step.stages:
-            return
-        last = self.step.stages[-1]
-        ready = self.project.stale(upto=last)
-        statuses = self.controller.statuses()
-        if not any(statuses[stage].state is StageState.STALE for stage in ready):
-            self.controller.compute(last)
-
-    def _focus_on_what_comes_next(self) -> None:
-        if not self.isVisible():
-            return
-        first: dict[str, QWidget] = {
-            "setup": self.setup.led_height,
-            "result": self.result.save,
-            "validation": self.validation.measure,
-        }
-        if self.looking.has_pictures and not self.panel.finished:
-            panel = self.panel
-            (panel.capture if panel.capture.isEnabled() else panel.import_files).setFocus()
-        else:
-            first.get(self.step.key, self.panel.next).setFocus()
-
-    def _show_curves(self) -> None:
-        from app.calibrate.curve_step import CurveStep  # heavy
-
-        if self.curves is None:
-            self.curves = CurveStep(self.controller)
-            self.centre.addWidget(self.curves)
-        self.curves.take_results()
-        self.centre.setCurrentWidget(self.curves)
-
-    # Pictures
-
-    def look_at(self, name: str) -> None:
-        """Show a capture with what was found in it."""
+    def show_capture(self, name: str) -> None:
+        """Show a capture with its detection."""
         try:
-            self.looking.at(name)
+            self.open.show_capture(name)
         except InputError as error:
             self._refuse(str(error))
 
-    def _on_looked(self) -> None:
-        self._live_key.setEnabled(bool(self.looking.name))
+    def _on_shown(self) -> None:
+        self._live_key.setEnabled(bool(self.model.shown))
         self._follow_bench()
-        if self.step.key == "refraction":
-            self.standing.show_refraction()
 
-    def _on_stated(self, stated: Session) -> None:
-        before = self.project.session
-        self.controller.describe(stated)
-        if self.project.session is before:
-            return  # why is said already
-        self.setup.show_session(self.project.session, new=False)
-        self.panel.show_notice(tr("Taken. What rests on it is computed again."), "pass")
+    def _on_captured(self, stage: str, name: str) -> None:
+        if self.open.step.stage == stage:
+            self.panel.show_notice(tr("Captured {name}.").format(name=name), "pass")
+            self.area.strip.show_newest()
 
-    def _recompute(self) -> None:
-        self.controller.compute(self.step.stages[-1] if self.step.stages else None)
+    def _on_camera(self) -> None:
+        self.bench_dock.follow()
+        for presenter in self.presenters:
+            presenter.show_bench(self.bench_dock.in_use)
+        self.open.camera_changed()
 
-    def _show_trial(self, panel: Panel) -> None:
-        """Show the depth of a validation's press."""
-        if self.step.key == "validation":
-            self.pictures.maps.show_panels((panel,))
-            self.pictures.show_tab(RESULT, True)
-            self.pictures.tabs.setCurrentIndex(RESULT)
+    # The virtual bench
+
+    def _lay_on_bench(self) -> None:
+        scene = self.bench_dock.lay(self.open.step, self.project.session)
+        if scene is not None:
+            self.open.on_bench(scene)
+            self.open.live()
+
+    def _follow_bench(self) -> None:
+        """Let drags move the object on the bench, if it is visible next to the live image."""
+        live = not self.model.shown and self.bench_dock.in_use
+        self.area.view.hand_drags_on(live and not self.bench_dock.isHidden())
+
+    def _on_clicked(self, u: float, v: float) -> None:
+        if not self.model.shown:
+            self.bench_dock.drag_to(u, v)
+
+
+def _add(stack: QStackedWidget, widget: QWidget) -> None:
+    """Add a widget that may be there already, because several steps use it."""
+    if stack.indexOf(widget) < 0:
+        stack.addWidget(widget)

@@ -1,1 +1,1 @@
-"""Real cameras in the window: which there are, how they are set, and what is said of them."""
+"""Real cameras in the application: which are connected, how they are set, and their warnings."""

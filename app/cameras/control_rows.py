@@ -1,4 +1,4 @@
-"""One row for each setting of a camera: whether the camera sets it by itself, and its value."""
+"""One row for each setting of a camera: the automatic switch and the value."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 
 from app.sources.camera.controls import CONTROLS
 from app.sources.source import Setting
+from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -24,26 +25,26 @@ MAINS_HZ = (0.0, 50.0, 60.0)
 
 
 class ControlRows(QWidget):
-    """The settings that a camera has, in the order in which they are applied.
+    """The settings of a camera, in the order in which they are applied.
 
     Signals
     -------
     changed(str, float)
-        A person chose a value for a setting.
+        The user chose a value for a setting.
     """
 
     changed = Signal(str, float)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        named(self, "camera.controls", tr("Settings of the camera"))
+        named(self, "camera.controls", tr("Camera settings"))
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
         self._keys: tuple[str, ...] = ()
         self._show: dict[str, Callable[[Setting], None]] = {}
 
     def show_controls(self, controls: Sequence[Setting]) -> None:
-        """Show what a camera tells of itself; a field in which a person types is left alone."""
+        """Show the settings that a camera reports; a field in use by the user is not changed."""
         keys = tuple(control.key for control in controls)
         if keys != self._keys:
             self._keys = keys
@@ -87,7 +88,7 @@ class ControlRows(QWidget):
         return box
 
     def _mains(self, control: Setting) -> QComboBox:
-        box = named(QComboBox(), "camera.power_line_hz", control.label)
+        box = named(ComboBox(), "camera.power_line_hz", control.label)
         for hz in MAINS_HZ:
             box.addItem(tr("{hz:g} Hz").format(hz=hz) if hz else tr("Off"), hz)
         box.activated.connect(lambda _: self.changed.emit("power_line_hz", box.currentData()))
@@ -97,7 +98,7 @@ class ControlRows(QWidget):
         return box
 
     def _number(self, control: Setting) -> QDoubleSpinBox:
-        box = named(QDoubleSpinBox(), f"camera.{control.key}", control.label)
+        box = named(DoubleSpinBox(), f"camera.{control.key}", control.label)
         step = control.step or 0.1
         box.setDecimals(0 if step == round(step) else 1)
         box.setSingleStep(step)

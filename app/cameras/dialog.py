@@ -1,4 +1,4 @@
-"""The window in which a camera is set, beside the page that shows its picture."""
+"""The window with a camera's settings, next to the page that shows its image."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
 
-from app.cameras.desk import CameraDesk
+from app.cameras.manager import CameraManager
 from app.cameras.panel import CameraPanel
 from app.sources.camera.camera import Camera
 from app.widgets.naming import named
@@ -20,18 +20,20 @@ class CameraDialog(QDialog):
 
     Parameters
     ----------
-    desk : CameraDesk
-        Sets cameras and remembers it.
+    manager : CameraManager
+        Manages the cameras and their settings.
     camera : Camera
-        The one that is shown.
+        The camera to show.
     """
 
-    def __init__(self, desk: CameraDesk, camera: Camera, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, manager: CameraManager, camera: Camera, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
         named(self, "camera", tr("Camera settings"))
         self.setWindowTitle(tr("Camera settings: {name}").format(name=camera.device.name))
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.panel = CameraPanel(desk, camera)
+        self.panel = CameraPanel(manager, camera)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         close = buttons.button(QDialogButtonBox.StandardButton.Close)
         named(close, "camera.close", tr("Close the camera settings"))
@@ -47,18 +49,18 @@ class CameraDialog(QDialog):
         self.panel.watch(True)
 
     def hideEvent(self, event: QHideEvent) -> None:
-        """Let the camera go."""
+        """Release the camera."""
         self.panel.watch(False)
         super().hideEvent(event)
 
 
-def show_camera_dialog(desk: CameraDesk, camera: Camera, parent: QWidget) -> CameraDialog:
-    """Show the window of a camera beside the work, not in its way; return it."""
+def show_camera_dialog(manager: CameraManager, camera: Camera, parent: QWidget) -> CameraDialog:
+    """Show the window of a camera as a non-modal window; return it."""
     for other in parent.window().findChildren(CameraDialog):
         if other.panel.camera is camera and other.isVisible():
             other.raise_()
             other.activateWindow()
             return other
-    dialog = CameraDialog(desk, camera, parent.window())
+    dialog = CameraDialog(manager, camera, parent.window())
     dialog.show()
     return dialog

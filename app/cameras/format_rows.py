@@ -1,4 +1,4 @@
-"""The choice of a camera's format, size and rate, of those that it lists."""
+"""The choice of a camera's format, size and frame rate from those that it lists."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QFormLayout, QWidget
 
 from app.sources.camera.driver import Format, compression_warning
+from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -13,25 +14,25 @@ from gelpolight_core.translation import tr
 
 
 class FormatRows(QWidget):
-    """Three choices, each of what the ones before leave.
+    """Three choices; each offers what the previous ones allow.
 
     Signals
     -------
     chosen(object)
-        A person chose a Format.
+        The user chose a Format.
     """
 
     chosen = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        named(self, "camera.formats", tr("Format of the pictures"))
+        named(self, "camera.formats", tr("Image format"))
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         self._offered: tuple[Format, ...] = ()
-        self._code = named(QComboBox(), "camera.format", tr("Format"))
-        self._size = named(QComboBox(), "camera.size", tr("Size of the pictures"))
-        self._rate = named(QComboBox(), "camera.rate", tr("Pictures per second"))
+        self._code = named(ComboBox(), "camera.format", tr("Format"))
+        self._size = named(ComboBox(), "camera.size", tr("Image size"))
+        self._rate = named(ComboBox(), "camera.rate", tr("Images per second"))
         for label, box in (
             (tr("Format"), self._code),
             (tr("Size"), self._size),
@@ -39,23 +40,21 @@ class FormatRows(QWidget):
         ):
             form.addRow(label, box)
             box.activated.connect(lambda _, box=box: self._on_chosen(box))
-        self.warning = named(
-            PlainLabel(), "camera.compressed", tr("What speaks against the format")
-        )
+        self.warning = named(PlainLabel(), "camera.compressed", tr("Drawback of the format"))
         self.warning.setWordWrap(True)
         show_meaning(self.warning, "warn")
         form.addRow(self.warning)
         self.show_format(None, ())
 
     def show_format(self, got: Format | None, offered: tuple[Format, ...]) -> None:
-        """Show the format in use among those that the camera lists."""
+        """Show the present format among those that the camera lists."""
         self._offered = offered or (() if got is None else (got,))
         self.setEnabled(got is not None)
         if got is not None:
             self._fill(got)
         warning = "" if got is None else compression_warning(got, offered)
         if got is not None and not offered:
-            warning = tr("The system does not tell which formats this camera has. {more}").format(
+            warning = tr("The system does not report the formats of this camera. {more}").format(
                 more=warning
             )
         self.warning.setText(warning.strip())
@@ -75,13 +74,13 @@ class FormatRows(QWidget):
             {tr("{w} x {h} pixels").format(w=w, h=h): (w, h) for w, h in sizes},
             (got.width, got.height),
         )
-        _fill(self._rate, {tr("{hz:g} per second").format(hz=hz): hz for hz in rates}, got.rate_hz)
+        _fill(self._rate, {tr("{hz:g} images/s").format(hz=hz): hz for hz in rates}, got.rate_hz)
 
     def _of(self, code: str, width: int = 0) -> list[Format]:
         return [f for f in self._offered if f.code == code and width in (0, f.width)]
 
     def _on_chosen(self, box: QComboBox) -> None:
-        """Choose the format nearest to what the three say; the one changed last is kept."""
+        """Choose the format nearest to the three selections; the one changed last is kept."""
         code, (width, height), rate = (
             b.currentData() for b in (self._code, self._size, self._rate)
         )
@@ -95,7 +94,7 @@ class FormatRows(QWidget):
 
 
 def _fill(box: QComboBox, items: dict[str, object], chosen: object) -> None:
-    """Offer items and show the one in use, which is no choice of the person's."""
+    """Offer items and select the one in use, without emitting a signal."""
     if [box.itemText(row) for row in range(box.count())] != list(items):
         box.clear()
         for text, value in items.items():

@@ -1,4 +1,4 @@
-"""``gelpolight ablation``: what each term of the full model is worth, and what it costs."""
+"""``gelpolight ablation``: the benefit and the cost of each term of the full model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.ablation import VARIANTS, Variant, ablate
 from gelpolight_core.experiments.ablation_report import ablation_table, write_ablation
-from gelpolight_core.export.atomic import make_folder, refuse_unwritable
+from gelpolight_core.io.atomic import make_folder, refuse_unwritable
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
@@ -22,23 +22,22 @@ from gelpolight_core.translation import tr
 VIRTUAL = "virtual-sensor"
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "ablation", help=tr("show what each term of the full model is worth and costs")
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument(
         "sessions",
         type=Path,
         nargs="*",
         metavar="SESSION",
-        help=tr("folders with presses and their truth; by default the virtual sensor's"),
+        help=tr(
+            "folders with presses and their true values (default: those of the virtual sensor)"
+        ),
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
     parser.add_argument(
         "--terms",
         metavar="NAMES",
-        help=tr("only these, separated by commas: {names}").format(
+        help=tr("only these terms, separated by commas: {names}").format(
             names=", ".join(variant.name for variant in VARIANTS)
         ),
     )
@@ -67,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
         ablations.append(ablation)
         say(ablation_table(ablation), end="\n\n", flush=True)
     written = write_ablation(ablations, options.output)
-    say(tr("Written: {files}").format(files=", ".join(str(path) for path in written)))
+    say(tr("Saved: {files}").format(files=", ".join(str(path) for path in written)))
     return 0
 
 
@@ -83,15 +82,15 @@ def _chosen(names: str | None) -> tuple[Variant, ...]:
     for name in asked:
         if name not in known:
             raise InputError(
-                tr("there is no term {name!r}").format(name=name),
+                tr("The term {name!r} does not exist").format(name=name),
                 where="--terms",
-                advice=tr("Use some of {names}").format(names=", ".join(known)),
+                advice=tr("Choose from {names}").format(names=", ".join(known)),
             )
     return tuple(known[name] for name in asked)
 
 
 def _virtual_session(folder: Path) -> Path:
-    """Simulate the virtual sensor, unless it was done for an earlier ablation."""
+    """Simulate the virtual sensor, unless an earlier ablation did it."""
     if not (folder / "session.toml").is_file():
         with StageProgress() as tell:
             simulate_session(SensorDesign(), folder, progress=tell)

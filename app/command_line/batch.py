@@ -1,4 +1,4 @@
-"""``gelpolight batch``: recordings and folders of any size become depth maps."""
+"""``gelpolight batch``: turns recordings and folders of any size into depth maps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from app.command_line.common import add_effort, add_model, load_reconstructor
+from app.command_line.reconstructing import add_effort, add_model, load_reconstructor
 from app.command_line.terminal import say
 from gelpolight_core.batch.cluster import ClusterRunner
 from gelpolight_core.batch.plan import Selection, plan_batch
@@ -28,21 +28,18 @@ from gelpolight_core.measurement.measure import SHAPES
 from gelpolight_core.translation import tr
 
 SHOWN_FAULTS = 20
-"""Bad frames that are named while the work goes on; all of them are in the summary."""
+"""Bad frames that are printed during the work. The summary contains all of them."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "batch", help=tr("turn recordings and folders of any size into depth maps, on many cores")
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument(
         "inputs",
         type=Path,
         nargs="+",
         metavar="INPUT",
-        help=tr("recordings, pictures, and folders of them"),
+        help=tr("recordings, images, and folders of them"),
     )
     parser.add_argument(
         "-o",
@@ -50,7 +47,7 @@ def add_parser(commands: Any) -> None:
         type=Path,
         required=True,
         metavar="OUT",
-        help=tr("folder of the run; one that was left is gone on with"),
+        help=tr("folder of the run; an unfinished run is continued"),
     )
     parser.add_argument(
         "--formats",
@@ -63,30 +60,35 @@ def add_parser(commands: Any) -> None:
         "--frames",
         default="",
         metavar="A:B",
-        help=tr("of each recording and folder, those from A, from 0, up to but not with B"),
+        help=tr(
+            "for each recording and folder: frames from A, counted from 0, up to but not "
+            "including B"
+        ),
     )
     parser.add_argument(
-        "--every", type=int, default=1, metavar="N", help=tr("of these, every N-th only")
+        "--every", type=int, default=1, metavar="N", help=tr("only every N-th of these frames")
     )
     parser.add_argument(
         "--measure",
         choices=SHAPES,
         metavar="SHAPE",
-        help=tr("also measure what is pressed: {shapes}; takes several times as long").format(
+        help=tr("also measure the pressed object: {shapes}; takes several times as long").format(
             shapes=", ".join(SHAPES)
         ),
     )
-    who = parser.add_mutually_exclusive_group()
-    who.add_argument(
+    runners = parser.add_mutually_exclusive_group()
+    runners.add_argument(
         "--workers",
         type=int,
         choices=range(1, 257),
         default=1,
         metavar="N",
-        help=tr("processes of this machine, each with a core of its own (1)"),
+        help=tr("number of worker processes on this machine, each on its own core (default: 1)"),
     )
-    who.add_argument(
-        "--scheduler", metavar="ADDRESS", help=tr("of a Dask cluster that does the work instead")
+    runners.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help=tr("address of a Dask cluster that does the work instead"),
     )
     add_effort(parser)
     add_model(parser)
@@ -97,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
     """Reconstruct every frame that has no result yet, and write the summary."""
     formats = _formats(options.formats)
     selection = _selection(options.frames, options.every)
-    # Also refuses here what each worker would refuse: a calibration that nothing can be made with.
+    # Reports problems of the calibration here, before every worker would.
     reconstructor = load_reconstructor(
         options.calibration, model=options.model, effort=options.effort
     )
@@ -125,13 +127,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 class _Progress:
-    """A bar on stderr, with a line for each frame that could not be used."""
+    """A progress bar on stderr, with a line for each frame that could not be used."""
 
     def __init__(self) -> None:
         self._bar: tqdm[Any] | None = None
 
     def __enter__(self) -> Callable[[BatchProgress], None]:
-        """Return the function to be told."""
+        """Return the function that receives the progress."""
         return self._tell
 
     def __exit__(self, *details: object) -> None:
@@ -157,27 +159,27 @@ def _bad_line(progress: BatchProgress) -> str:
     where = row.input
     if row.frame is not None:
         where = tr("{path}, frame {n}").format(path=where, n=row.frame)
-    said = last_line(row.error)
+    reason = last_line(row.error)
     for known in (row.input, Path(row.input).name):
-        said = said.removeprefix(f"{known}: ")
+        reason = reason.removeprefix(f"{known}: ")
     if progress.bad == SHOWN_FAULTS:
-        said += tr(" (further ones are in the summary only)")
-    return f"{where}: {said}"
+        reason += tr(" (the summary lists further frames)")
+    return f"{where}: {reason}"
 
 
 def _report(progress: BatchProgress, out: Path) -> int:
-    """Say what was done; return the exit status, or raise what tells it."""
+    """Print a summary. Return the exit status, or raise an error."""
     done = progress.before + progress.done
     if progress.left:
         tqdm.write(
-            tr("{n} of {total} frames are done; the same command goes on from here").format(
+            tr("{n} of {total} frames are done. Run the same command again to continue").format(
                 n=done, total=progress.total
             ),
             file=sys.stderr,
         )
         raise KeyboardInterrupt
     say(
-        tr("{n} depth maps in {folder}, {before} of them from before").format(
+        tr("{n} depth maps in {folder}, {before} of them from earlier runs").format(
             n=done, folder=out, before=progress.before
         )
     )
@@ -189,14 +191,16 @@ def _report(progress: BatchProgress, out: Path) -> int:
                 n=progress.bad, total=progress.total
             ),
             where=str(out / SUMMARY),
-            advice=tr("Its last column says why; mended ones are done by the same command"),
+            advice=tr(
+                "The last column gives the reason. Correct the files and run the same command again"
+            ),
         )
     return 0
 
 
 @contextmanager
 def _stopped_by_ctrl_c() -> Iterator[Callable[[], bool]]:
-    """Let a first Ctrl-C end the work with the frames at hand, and only a second one break in."""
+    """Let the first Ctrl-C finish the current frames, and only a second one interrupt them."""
     asked = False
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -204,7 +208,7 @@ def _stopped_by_ctrl_c() -> Iterator[Callable[[], bool]]:
         if asked:
             raise KeyboardInterrupt
         asked = True
-        tqdm.write(tr("stopping: the frames at hand are brought to their end"), file=sys.stderr)
+        tqdm.write(tr("Stopping after the current frames."), file=sys.stderr)
 
     before = signal.signal(signal.SIGINT, note)
     try:
@@ -218,7 +222,7 @@ def _formats(text: str) -> tuple[str, ...]:
     unknown = sorted(set(formats) - set(FORMATS))
     if unknown or not formats:
         raise InputError(
-            tr("unknown format {name}").format(name=", ".join(unknown) or '""'),
+            tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
             where="--formats",
             advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
         )
@@ -235,7 +239,7 @@ def _selection(frames: str, every: int) -> Selection:
         selection = Selection(-1)
     if selection.first < 0 or every < 1 or (selection.end or 1) <= 0:
         raise InputError(
-            tr("{text} names no frames").format(text=frames if every >= 1 else every),
+            tr("{text} selects no frames").format(text=frames if every >= 1 else every),
             where="--frames" if every >= 1 else "--every",
             advice=tr("Give whole numbers, as in --frames 0:1000 --every 10"),
         )

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from app.command_line.terminal import say
 from gelpolight_core.export.board_page import caption, write_board
-from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     usual = BoardSpec()
-    parser = commands.add_parser("board", help=tr("write a checkerboard to print, A4 at true size"))
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE.pdf")
     parser.add_argument(
         "--corners",
@@ -23,7 +21,7 @@ def add_parser(commands: Any) -> None:
         nargs=2,
         default=usual.inner_corners,
         metavar=("ACROSS", "DOWN"),
-        help=tr("where four squares meet ({w} {h} unless stated)").format(
+        help=tr("inner corners, where four squares meet (default: {w} {h})").format(
             w=usual.inner_corners[0], h=usual.inner_corners[1]
         ),
     )
@@ -32,15 +30,15 @@ def add_parser(commands: Any) -> None:
         type=float,
         default=usual.square_mm,
         metavar="MM",
-        help=tr("side of a square ({s:g} unless stated)").format(s=usual.square_mm),
+        help=tr("side of a square in mm (default: {s:g})").format(s=usual.square_mm),
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the page and say what it is."""
+    """Write the page and print its description."""
     across, down = options.corners
     board = BoardSpec((across, down), options.square)
     write_board(board, options.output)
-    say(tr("{what}: written to {path}").format(what=caption(board), path=options.output))
+    say(tr("{what}: saved to {path}").format(what=caption(board), path=options.output))
     return 0

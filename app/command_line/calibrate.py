@@ -1,4 +1,4 @@
-"""``gelpolight calibrate``: a session folder becomes a calibration file."""
+"""``gelpolight calibrate``: turns a session folder into a calibration file."""
 
 from __future__ import annotations
 
@@ -8,55 +8,108 @@ from typing import Any
 
 import numpy as np
 
-from app.command_line.common import (
-    StageProgress,
-    add_model,
-    quality_lines,
-    refuse_overwriting,
-    session_files,
-    write_json,
-)
+from app.command_line.common import StageProgress, quality_lines, refuse_overwriting, write_json
+from app.command_line.reconstructing import add_model
+from app.command_line.sessions import session_files
 from app.command_line.terminal import say
-from gelpolight_core.calibration.calibration import MODELS
+from gelpolight_core.calibration.any_session import calibrate_any
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_session
-from gelpolight_core.export.atomic import refuse_unwritable
-from gelpolight_core.session.session import read_session
+from gelpolight_core.calibration.in_place_session import InPlaceRun
+from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN
+from gelpolight_core.session.closed import read_any_session
 from gelpolight_core.translation import tr
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser("calibrate", help=tr("make a calibration from a session folder"))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("session", type=Path, metavar="SESSION")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="CALIBRATION")
-    parser.add_argument("--json", type=Path, metavar="FILE", help=tr("results of every stage"))
-    add_model(parser, default=MODELS[-1])
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help=tr("write the results of every stage as JSON")
+    )
+    add_model(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Calibrate, write the file and print the quality table."""
-    session = read_session(options.session)
+    session = read_any_session(options.session)
     outputs = [path for path in (options.output, options.json) if path is not None]
     refuse_overwriting(outputs, session_files(session))
     for path in outputs:
         refuse_unwritable(path)
     with StageProgress() as tell:
-        result = calibrate_session(session, model=options.model, progress=tell)
+        result = calibrate_any(session, model=options.model, progress=tell)
     write_calibration(result.calibration, options.output)
+    if isinstance(result, InPlaceRun):
+        content, lines = in_place_as_json(result), in_place_lines(result)
+    else:
+        content = run_as_json(result)
+        lines = [tr("camera response: {what}").format(what=result.response.summary)]
     if options.json:
-        write_json(run_as_json(result), options.json)
-    say(tr("camera response: {what}").format(what=result.response.summary))
-    say("\n".join(quality_lines(result.calibration.quality)))
+        write_json(content, options.json)
+    say("\n".join([*lines, *quality_lines(result.calibration.quality)]))
     say(
-        tr("Calibration {id} written to {path}: {verdict}").format(
+        tr("Calibration {id} saved to {path}: {verdict}").format(
             id=result.calibration.identity,
             path=options.output,
             verdict=result.calibration.verdict.value,
         )
     )
     return 0
+
+
+def in_place_lines(result: InPlaceRun) -> list[str]:
+    """Return which model was chosen, what it cannot know, and the presses that were left out."""
+    lines = [
+        tr("model: in-place (closed sensor: background and balls only)"),
+        tr("not known: {what}").format(what=", ".join(UNKNOWN)),
+        tr("balls: {n} used, {m} left out; slopes seen up to {deg:.0f} deg").format(
+            n=len(result.result.presses),
+            m=len(result.result.refused),
+            deg=np.degrees(np.arctan(result.result.model.steepest)),
+        ),
+    ]
+    lines += [tr("left out: {fault}").format(fault=e) for e in result.result.refused.values()]
+    x, y = result.result.next_place_mm
+    lines.append(tr("another ball helps most at ({x:.1f}, {y:.1f}) mm").format(x=x, y=y))
+    return lines
+
+
+def in_place_as_json(result: InPlaceRun) -> dict[str, Any]:
+    """Return a closed sensor's results as plain values, lengths in mm."""
+    c, found = result.calibration, result.result
+    return {
+        "id": c.identity,
+        "model": c.model,
+        "verdict": c.verdict.value,
+        "mm_per_px": c.in_place.grid.mm_per_px,
+        "unknown": list(UNKNOWN),
+        "steepest_slope": found.model.steepest,
+        "balls": [
+            {
+                "file": name,
+                "centre_mm": [x, y],
+                "contact_radius_mm": contact,
+                "radius_mm": radius,
+                "held_out_normal_deg": press.held_out.normal_deg,
+                "held_out_cap_ratio": finite(press.held_out.cap_ratio),
+                "held_out_diameter_ratio": finite(press.held_out.diameter_ratio),
+            }
+            for (name, x, y, contact, radius), press in zip(c.balls, found.presses, strict=True)
+        ],
+        "left_out": {name: str(fault) for name, fault in found.refused.items()},
+        "error_by_balls": [list(point) for point in found.learning],
+        "next_ball_mm": list(found.next_place_mm),
+        "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
+    }
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None where there is none."""
+    return value if np.isfinite(value) else None
 
 
 def run_as_json(result: CalibrationRun) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""``gelpolight cameras``: which cameras are plugged in, and what they offer."""
+"""``gelpolight cameras``: lists the connected cameras, their formats and settings."""
 
 from __future__ import annotations
 
@@ -15,24 +15,21 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "cameras", help=tr("list the cameras that are plugged in, their formats and settings")
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("--json", type=Path, metavar="FILE")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """List what is plugged in."""
-    from app.sources.camera.opencv import OpenCvDriver  # heavy
+    """List the connected cameras."""
+    from app.sources.camera.opencv import OpenCvDriver  # slow import
 
     return report(OpenCvDriver(), options.json)
 
 
 def report(driver: CameraDriver, json: Path | None) -> int:
-    """Print every camera of a driver, and write the same as JSON where that is asked for."""
+    """Print every camera of a driver, and write the same as JSON if requested."""
     found = []
     for device in driver.devices():
         formats, controls, trouble = _ask(driver, device)
@@ -41,8 +38,9 @@ def report(driver: CameraDriver, json: Path | None) -> int:
     if not found:
         say(
             tr(
-                "No camera is plugged in, or this user may not see it. Plug one in; on Linux, look"
-                " for /dev/video0 and add the user to the group video."
+                "No camera was found, or this user has no access to it. Connect a camera. "
+                "On Linux, check that /dev/video0 exists and add the user to the group "
+                "video."
             )
         )
     if json is not None:
@@ -53,7 +51,7 @@ def report(driver: CameraDriver, json: Path | None) -> int:
 def _ask(
     driver: CameraDriver, device: Device
 ) -> tuple[tuple[Format, ...], tuple[Setting, ...], str]:
-    """Return formats and settings of a camera, and why they are not known."""
+    """Return formats and settings of a camera, or why they are unknown."""
     try:
         formats = driver.formats(device)
         camera = driver.open(device, None)
@@ -75,7 +73,8 @@ def _lines(
         return [*lines, f"  {trouble}"]
     best = best_format(formats)
     for f in formats:
-        lines.append(f"  {'*' if f == best else ' '} {f}{tr(', compressed') * f.compressed}")
+        note = tr(", compressed") if f.compressed else ""
+        lines.append(f"  {'*' if f == best else ' '} {f}{note}")
     if best is not None and (warning := compression_warning(best, formats)):
         lines.append(f"  {warning}")
     for c in controls:
@@ -84,9 +83,14 @@ def _lines(
         value = f"{c.value:g} {c.unit}".rstrip()
         lines.append(f"    {c.key:<22}{c.label:<30}{value:>10}  {extent}{held}".rstrip())
     if not controls:
-        lines.append(tr("    The system lets no program set this camera."))
+        lines.append(
+            tr(
+                "    The operating system does not allow programs to change the settings of this "
+                "camera."
+            )
+        )
     elif not is_locked(controls):
-        lines.append(tr("    Not locked: the camera still sets some things by itself."))
+        lines.append(tr("    Not locked: the camera still adjusts some settings automatically."))
     return lines
 
 

@@ -1,32 +1,23 @@
-"""``gelpolight drift``: how far an untouched sensor has moved from its calibration."""
+"""``gelpolight drift``: how far the background of an untouched sensor has changed."""
 
 from __future__ import annotations
 
 import argparse
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
-from app.command_line.common import (
-    load_reconstructor,
-    quality_lines,
-    read_frame,
-    refuse_overwriting,
-    write_json,
-)
+from app.command_line.common import quality_lines, refuse_overwriting, write_json
+from app.command_line.reconstructing import load_reconstructor, read_frame
 from app.command_line.terminal import say
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.export.atomic import refuse_unwritable
-from gelpolight_core.reconstruction.drift import background_drift, zeroed
+from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.io.user import user_name
+from gelpolight_core.reconstruction.background_shift import background_drift, zeroed
 from gelpolight_core.translation import tr
-from gelpolight_core.who import user_name
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "drift", help=tr("compare a picture of the untouched sensor with the calibration's")
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("image", type=Path, metavar="IMAGE")
     parser.add_argument("--json", type=Path, metavar="FILE")
@@ -34,13 +25,13 @@ def add_parser(commands: Any) -> None:
         "--zero",
         type=Path,
         metavar="FILE",
-        help=tr("write the calibration with this picture as its background"),
+        help=tr("write the calibration with this image as its new background"),
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare, print the figures, and write the calibration that is set to zero."""
+    """Compare, print the figures, and write the calibration with the new background."""
     outputs = [path for path in (options.json, options.zero) if path is not None]
     refuse_overwriting(outputs, [options.calibration, options.image])
     for path in outputs:
@@ -63,5 +54,5 @@ def run(options: argparse.Namespace) -> int:
         made = datetime.now(UTC).isoformat(timespec="seconds")
         new = zeroed(reconstructor.calibration, [frame], operator=user_name(), made=made)
         write_calibration(new, options.zero)
-        say(tr("{name} written to {path}").format(name=new.identity, path=options.zero))
+        say(tr("{name} saved to {path}").format(name=new.identity, path=options.zero))
     return 0

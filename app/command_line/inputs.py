@@ -1,4 +1,4 @@
-"""What the commands reconstruct: pictures, and the frames of recordings."""
+"""Inputs of the reconstructing commands: images and frames of recordings."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from pathlib import Path
 from tqdm import tqdm
 
 from app.command_line.terminal import say
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture, linear_image
+from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
-from gelpolight_core.response.curve import CameraResponse
-from gelpolight_core.session.picture import Picture, linear_picture
-from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import read_picture, require_colour
 from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """One picture that is to be read.
+    """One input image.
 
     Attributes
     ----------
     name : str
-        Its name in the result; without its ending, that of the result's files.
+        Its name in the result. Without extension, the name of the result's files.
     stem : str
-        The name without its ending.
+        The name without its extension.
     where : str
-        What a message names.
+        Its name in messages.
     read : callable
         Returns it as linear light.
     """
@@ -46,20 +46,20 @@ class Input:
 
 
 class Inputs:
-    """Pictures and recordings that were named on the command line; a context manager.
+    """Images and recordings named on the command line. A context manager.
 
     Parameters
     ----------
     paths : sequence of Path
-        Of both kinds.
+        Images and recordings.
     frames : str
-        Which frames of the recordings, as "a:b"; empty for all.
+        Frames of the recordings, as "a:b". Empty for all.
 
     Raises
     ------
     InputError
-        If a recording cannot be read, the range of frames is none or empty, or two inputs would
-        have results of one name.
+        If a recording cannot be read, the range of frames is invalid or empty, or two inputs would
+        have results of the same name.
     """
 
     def __init__(self, paths: Sequence[Path], frames: str = "") -> None:
@@ -74,9 +74,9 @@ class Inputs:
                     self.items.append(_of_file(path))
             if frames and not self.recordings:
                 raise InputError(
-                    tr("none of the inputs is a recording"),
+                    tr("None of the inputs is a recording"),
                     where="--frames",
-                    advice=tr("Leave it out, or name a recording"),
+                    advice=tr("Remove the option, or name a recording"),
                 )
             self._refuse_twins()
         except BaseException:
@@ -92,11 +92,11 @@ class Inputs:
         self._open.close()
 
     def __iter__(self) -> Iterator[Input]:
-        """Return the inputs one by one, with a bar of progress."""
-        return iter(tqdm(self.items, file=sys.stderr, unit=tr("picture")))
+        """Return the inputs one by one, with a progress bar."""
+        return iter(tqdm(self.items, file=sys.stderr, unit=tr("image")))
 
     def require_match(self, calibration: Calibration) -> None:
-        """Refuse recordings of another sensor or size, and say what is missing of the others."""
+        """Refuse recordings of another sensor or image size, and report missing information."""
         for recording in self.recordings:
             require_match(recording, calibration)
             for note in recording_notes(recording):
@@ -112,11 +112,12 @@ class Inputs:
             self.items.append(Input(f"{stem}{path.suffix}", stem, where, read))
 
     def _refuse_twins(self) -> None:
-        names = Counter(item.stem.casefold() for item in self.items)  # some disks ignore the case
+        # Some file systems ignore case.
+        names = Counter(item.stem.casefold() for item in self.items)
         twins = [item.stem for item in self.items if names[item.stem.casefold()] > 1]
         if twins:
             raise InputError(
-                tr("two pictures are named {name}").format(name=twins[0]),
+                tr("Two images have the name {name}").format(name=twins[0]),
                 where=tr("IMAGE"),
                 advice=tr(
                     "Reconstruct them into different folders, so that neither is overwritten"
@@ -125,16 +126,16 @@ class Inputs:
 
 
 def frame_range(text: str, count: int, *, where: str) -> range:
-    """Return the frames that "a:b" means: from a, counted from 0, up to but not with b.
+    """Return the frames of "a:b": from a, counted from 0, up to but not including b.
 
     Raises
     ------
     InputError
-        If it is no range, or no frame is in it.
+        If it is not a range or contains no frame.
     """
     if not count:
         raise InputError(
-            tr("the recording holds no frames"), where=where, advice=tr("Choose another one")
+            tr("The recording contains no frames"), where=where, advice=tr("Choose another one")
         )
     first, colon, last = text.partition(":")
     try:
@@ -143,10 +144,10 @@ def frame_range(text: str, count: int, *, where: str) -> range:
         begin, end = 0, -1
     if not 0 <= begin < min(end, count):
         raise InputError(
-            tr("{text} names no frame of the {count}").format(text=text, count=count),
+            tr("{text} selects none of the {count} frames").format(text=text, count=count),
             where="--frames",
             advice=tr(
-                "Give the first frame, from 0, and the one behind the last, as in 0:{n}"
+                "Give the first frame, counted from 0, and the last frame plus one, as in 0:{n}"
             ).format(n=count),
         )
     return range(begin, min(end, count))
@@ -165,4 +166,4 @@ def _read_file(path: Path, response: CameraResponse | None) -> Picture:
 def _read_frame(
     recording: Recording, index: int, name: str, response: CameraResponse | None
 ) -> Picture:
-    return linear_picture(recording.frame(index).rgb, name, response=response)
+    return linear_image(recording.frame(index).rgb, name, response=response)

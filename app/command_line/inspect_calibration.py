@@ -1,39 +1,38 @@
-"""``gelpolight inspect``: what a calibration file or a recording holds."""
+"""``gelpolight inspect``: the content of a calibration file or a recording."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from app.command_line.common import quality_lines
 from app.command_line.terminal import harmless, say
 from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.reconstruction.in_place.calibration import UNKNOWN, InPlaceCalibration
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording, is_recording
-from gelpolight_core.response.curve import CameraResponse
+from gelpolight_core.report.labels import label
 from gelpolight_core.translation import tr
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser("inspect", help=tr("show what a calibration or a recording holds"))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.set_defaults(run=run)
 
 
 def response_text(response: CameraResponse | None) -> str:
-    """Return in words what is undone before a picture is used."""
+    """Return a description of the camera response that is corrected in every image."""
     if response is None:
         return tr("linear")
-    return tr("departs from linear by up to {x:.1f} % of the scale").format(
-        x=100.0 * response.departure
-    )
+    return tr("up to {x:.1f} % of full scale from linear").format(x=100.0 * response.departure)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what the file holds."""
+    """Print the content of the file."""
     if is_recording(options.file):
         with Recording.open(options.file) as recording:
             _print_recording(recording)
@@ -46,12 +45,12 @@ def _print_recording(recording: Recording) -> None:
     header = recording.header
     rows = [
         (tr("recording"), recording.path.name),
-        (tr("sensor"), header.serial or tr("not stated")),
+        (tr("sensor"), header.serial or tr("not given")),
         (tr("calibration"), header.calibration_id or tr("none")),
-        (tr("source"), f"{header.source} ({header.kind})" if header.source else tr("not stated")),
-        (tr("made"), header.started),
+        (tr("source"), f"{header.source} ({header.kind})" if header.source else tr("not given")),
+        (tr("created"), header.started),
         (tr("program"), header.program),
-        (tr("picture"), tr("{w}x{h} px, {bits} bit").format(
+        (tr("image"), tr("{w}x{h} px, {bits} bit").format(
             w=recording.size[0], h=recording.size[1], bits=recording.bits)),
         (tr("frames"), tr("{n} in {s:.2f} s").format(n=len(recording), s=recording.duration_s)),
         (tr("frames lost"), str(recording.lost)),
@@ -64,23 +63,51 @@ def _print_recording(recording: Recording) -> None:
 
 
 def _table(rows: list[tuple[str, str]]) -> str:
-    """Return what a file says, a line each."""
+    """Return the description of a file, one line per item."""
     return "\n".join(f"{harmless(label):<18} {harmless(value)}" for label, value in rows)
+
+
+def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
+    """Return what a closed sensor's calibration holds."""
+    grid, model = c.in_place.grid, c.in_place
+    return [
+        (tr("calibration"), c.identity),
+        (tr("sensor"), c.sensor.serial),
+        (tr("model"), tr("{model} (closed sensor)").format(model=c.model)),
+        (tr("verdict"), c.verdict.value),
+        (tr("made"), f"{c.provenance.created} {c.provenance.operator}".strip()),
+        (tr("program"), c.provenance.program_version),
+        (tr("session"), f"{c.provenance.session} ({len(c.provenance.sources)} files)"),
+        (tr("picture"), f"{c.camera.width}x{c.camera.height} px"),
+        (tr("camera response"), response_text(c.response)),
+        (tr("scale"), tr("{s:.5f} mm per px, sd {sd:.2g} %").format(
+            s=grid.mm_per_px, sd=100.0 * model.scale_sd)),
+        (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
+        (tr("balls"), tr("{n}, slopes up to {deg:.1f} deg").format(
+            n=len(c.balls), deg=np.degrees(np.arctan(model.steepest)))),
+        (tr("not known"), ", ".join(UNKNOWN)),
+        *((tr("edited by hand"), f"{label(e.part)} {e.made} {e.operator}".strip())
+          for e in c.provenance.edits),
+    ]  # fmt: skip
 
 
 def _print_calibration(path: Path) -> None:
     """Print provenance, geometry and quality table."""
     c = read_calibration(path)
+    if isinstance(c, InPlaceCalibration):
+        say(_table(_in_place_rows(c)))
+        say("\n".join(quality_lines(c.quality)))
+        return
     grid = c.table.grid
     rows = [
         (tr("calibration"), c.identity),
         (tr("sensor"), c.sensor.serial),
         (tr("model"), c.model),
         (tr("verdict"), c.verdict.value),
-        (tr("made"), f"{c.provenance.created} {c.provenance.operator}".strip()),
+        (tr("created"), f"{c.provenance.created} {c.provenance.operator}".strip()),
         (tr("program"), c.provenance.program_version),
         (tr("session"), f"{c.provenance.session} ({len(c.provenance.sources)} files)"),
-        (tr("picture"), f"{c.camera.width}x{c.camera.height} px"),
+        (tr("image"), f"{c.camera.width}x{c.camera.height} px"),
         (tr("camera response"), response_text(c.response)),
         (tr("focal length"), f"{c.camera.fx:.2f}, {c.camera.fy:.2f} px"),
         (tr("principal point"), f"{c.camera.cx:.2f}, {c.camera.cy:.2f} px"),
@@ -88,17 +115,22 @@ def _print_calibration(path: Path) -> None:
         (tr("tilt"), f"{np.degrees(np.arccos(c.plane.normal_camera[2])):.3f} deg"),
         (tr("grid"), f"{grid.shape[1]}x{grid.shape[0]} nodes, {1000 * grid.pitch_mm:.2f} um"),
     ]
-    for name, led in zip(("red", "green", "blue"), c.led_positions_mm, strict=True):
-        rows.append((f"{tr(name)} LED", "({:.3f}, {:.3f}, {:.3f}) mm".format(*led)))
+    names = tr("red LED"), tr("green LED"), tr("blue LED")
+    for name, led in zip(names, c.led_positions_mm, strict=True):
+        rows.append((name, "({:.3f}, {:.3f}, {:.3f}) mm".format(*led)))
+    visible_mm = Reconstructor(c, model=c.model).visible_depth_mm
+    if visible_mm is not None:
+        rows.append((tr("Smallest visible depth"), f"{1e3 * visible_mm:.0f} um"))
     if c.full is not None:
         m = c.full.membrane
-        shown = tr("{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, bounce {bounce:.2f}")
-        kept = {"two-lobe": tr("two-lobe"), "one-dimensional": tr("one-dimensional")}
+        shown = tr(
+            "{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, interreflection {bounce:.2f}"
+        )
         rows.append(
             (
                 tr("membrane"),
                 shown.format(
-                    kept=kept[c.full.membrane_kept],
+                    kept=label(c.full.membrane_kept),
                     gloss=m.gloss,
                     roughness=m.roughness,
                     bounce=m.bounce,
@@ -106,13 +138,13 @@ def _print_calibration(path: Path) -> None:
             )
         )
     for edit in c.provenance.edits:
-        channels = ", ".join(tr(name) for name in edit.channels)
+        channels = ", ".join(label(name) for name in edit.channels)
         text = tr("{part} ({channels}) {made} {operator}")
         rows.append(
             (
                 tr("edited by hand"),
                 text.format(
-                    part=tr(edit.part), channels=channels, made=edit.made, operator=edit.operator
+                    part=label(edit.part), channels=channels, made=edit.made, operator=edit.operator
                 ).strip(),
             )
         )

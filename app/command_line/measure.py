@@ -1,46 +1,45 @@
-"""``gelpolight measure``: how large the pressed object is."""
+"""``gelpolight measure``: the sizes of pressed objects."""
 
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from app.command_line.common import (
+from app.command_line.common import refuse_overwriting, write_json
+from app.command_line.parser import MENDABLE
+from app.command_line.reconstructing import (
+    add_despite_faults,
     add_model,
     load_reconstructor,
     read_frame,
-    refuse_overwriting,
-    write_json,
 )
 from app.command_line.terminal import say
 from app.command_line.tool_arguments import add_tool_arguments, chosen_tools
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import refuse_unwritable
-from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.measurement.indenter_tools import AUTO, measure_heightmap
+from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.measure import SHAPES
-from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Comparison, Measurement, Truth, compare
-from gelpolight_core.measurement.tools import ToolResult, result_as_dict
+from gelpolight_core.measurement.tools import Tool, ToolResult, result_as_dict
+from gelpolight_core.measurement.trust import judged
 from gelpolight_core.measurement.truth import read_truth
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
-AUTO = "auto"
 
-
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "measure", help=tr("say how large the pressed object is, or apply a measuring tool")
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
-    parser.add_argument("image", type=Path, metavar="IMAGE")
+    parser.add_argument("images", type=Path, nargs="+", metavar="IMAGE")
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--shape", choices=(*SHAPES, AUTO))
     add_tool_arguments(parser, what)
     parser.add_argument(
-        "--truth", type=Path, metavar="FILE", help=tr("truth.csv with this picture; with --shape")
+        "--truth", type=Path, metavar="FILE", help=tr("truth.csv with these images; with --shape")
     )
     parser.add_argument(
         "--seed",
@@ -50,82 +49,103 @@ def add_parser(commands: Any) -> None:
         help=tr("a point (mm) on the object to measure, where several are pressed; with --shape"),
     )
     parser.add_argument("--json", type=Path, metavar="FILE")
+    add_despite_faults(parser)
     add_model(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct the picture, fit the object or apply the tools, and print what they say."""
+    """Measure each image and print the results.
+
+    An image that cannot be measured is reported, and the other images are measured.
+    """
     if options.json:
-        used = [options.calibration, options.image, options.truth, options.tools]
+        used = [options.calibration, *options.images, options.truth, options.tools]
         refuse_overwriting([options.json], filter(None, used))
         refuse_unwritable(options.json)
     tools = chosen_tools(options)
-    truth = _truth(options)
+    truths = _truths(options)
     reconstructor = load_reconstructor(options.calibration, model=options.model)
-    frame = read_frame(options.image, reconstructor)
-    heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
+    several = len(options.images) > 1
+    entries, refused = [], 0
+    for image in options.images:
+        try:
+            entry, lines = _measured(image, reconstructor, tools, truths.get(image.name), options)
+        except InputError as error:
+            if not several:
+                raise
+            refused += 1
+            say(f"gelpolight: {_named(error, image)}", file=sys.stderr)
+            entries.append({"image": image.name, "error": str(error)})
+            continue
+        entries.append({"image": image.name} | entry if several else entry)
+        say("\n".join([f"{image}:", *(f"  {line}" for line in lines)] if several else lines))
+    if options.json:
+        write_json(entries if several else entries[0], options.json)
+    return MENDABLE if refused else 0
+
+
+def _measured(
+    image: Path,
+    reconstructor: Reconstructor,
+    tools: Sequence[Tool],
+    truth: Truth | None,
+    options: argparse.Namespace,
+) -> tuple[dict[str, Any], list[str]]:
+    """Reconstruct an image and fit the object or apply the tools. Return JSON values and text."""
+    frame = read_frame(image, reconstructor)
+    heightmap = measurable_depth(
+        reconstructor,
+        frame,
+        name=image.name,
+        where=str(image),
+        despite_faults=options.despite_faults,
+    )
+    findings = () if heightmap.health is None else heightmap.health.findings
+    faults = {"faults": [finding.as_dict() for finding in findings]}
     if tools:
-        results = [tool.apply(heightmap) for tool in tools]
-        content: dict[str, Any] = {
+        results = [judged(tool.apply(heightmap), heightmap) for tool in tools]
+        content = {
             "image": heightmap.source,
             "calibration_id": heightmap.calibration_id,
             "model": heightmap.model,
             "results": [result_as_dict(result) for result in results],
+            **faults,
         }
-        lines = [line for result in results for line in tool_lines(result)]
-    else:
-        seed = tuple(options.seed) if options.seed else None
-        shape = options.shape if options.shape != AUTO else _proposed(heightmap, seed, options)
-        measurement = measure_heightmap(heightmap, shape=shape, seed_mm=seed)
-        comparison = None if truth is None else compare(measurement, truth)
-        content = measurement.as_json(comparison)
-        lines = measurement_lines(measurement, comparison)
-        if options.shape == AUTO:
-            lines = [f"{tr('shape'):<12} {shape}", *lines]
-    if options.json:
-        write_json(content, options.json)
-    say("\n".join(lines))
-    return 0
+        return content, [line for result in results for line in tool_lines(result)]
+    seed = tuple(options.seed) if options.seed else None
+    measurement = judged(measure_heightmap(heightmap, shape=options.shape, seed_mm=seed), heightmap)
+    comparison = None if truth is None else compare(measurement, truth)
+    lines = measurement_lines(measurement, comparison)
+    if options.shape == AUTO:
+        lines = [f"{tr('shape'):<12} {measurement.shape}", *lines]
+    return measurement.as_json(comparison) | faults, lines
 
 
-def _truth(options: argparse.Namespace) -> Truth | None:
-    """Return the true sizes of the picture's object, where a file with them is named."""
+def _named(error: InputError, image: Path) -> str:
+    """Return an error's text, with the image's name where it does not name it."""
+    return str(error) if str(image) in str(error) else f"{image}: {error}"
+
+
+def _truths(options: argparse.Namespace) -> dict[str, Truth]:
+    """Return the true sizes of each image's object, if a file with them is given."""
     if options.truth is None:
-        return None
+        return {}
     if options.shape is None:
         raise InputError(
-            tr("a tool has no true sizes to compare with"),
+            tr("Tools cannot be compared with true sizes"),
             where="--truth",
-            advice=tr("Use it with --shape"),
+            advice=tr("Use this option together with --shape"),
         )
     rows = {row.file: row.truth for row in read_truth(options.truth).rows}
-    if options.image.name not in rows:
-        raise InputError(
-            tr("there is no row for {name}").format(name=options.image.name),
-            where=str(options.truth),
-            advice=tr("Add the picture with its shape and true sizes"),
-        )
-    return rows[options.image.name]
-
-
-def _proposed(
-    heightmap: HeightMap, seed_mm: tuple[float, float] | None, options: argparse.Namespace
-) -> str:
-    """Return the shape that is pressed."""
-    proposal = propose(heightmap, seed_mm=seed_mm)
-    if proposal is not None and proposal.shape in SHAPES:
-        return proposal.shape
-    found = (
-        tr("nothing that looks like a ball, a cylinder or a cuboid is pressed")
-        if proposal is None
-        else tr("it may be a {first} or a {second}").format(
-            first=proposal.candidates[0], second=proposal.candidates[1]
-        )
-    )
-    raise InputError(
-        found, where=str(options.image), advice=tr("Say what it is with --shape, or use --tool")
-    )
+    for image in options.images:
+        if image.name not in rows:
+            raise InputError(
+                tr("There is no row for {name}").format(name=image.name),
+                where=str(options.truth),
+                advice=tr("Add the image with its shape and true sizes"),
+            )
+    return rows
 
 
 def tool_lines(result: ToolResult) -> list[str]:

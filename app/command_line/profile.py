@@ -4,33 +4,25 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from app.command_line.common import (
-    add_model,
-    load_reconstructor,
-    numbers,
-    points,
-    read_frame,
-    refuse_overwriting,
-)
+from app.command_line.common import numbers, points, refuse_overwriting
+from app.command_line.reconstructing import add_model, load_reconstructor, read_frame
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import refuse_unwritable
 from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.translation import tr
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser("profile", help=tr("write the depth along a line as CSV"))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument("image", type=Path, metavar="IMAGE")
-    for name, place in (("from", "start"), ("to", "end")):
+    for name, key in (("from", "start"), ("to", "end")):
         parser.add_argument(
             f"--{name}",
-            dest=place,
+            dest=key,
             type=numbers,
             nargs="+",
             required=True,
@@ -46,29 +38,29 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct the picture, cut through it and write the section."""
+    """Reconstruct the image and write its section along the line."""
     refuse_overwriting([options.output], [options.calibration, options.image])
     refuse_unwritable(options.output)
-    start, end = _place(options.start, "--from"), _place(options.end, "--to")
+    start, end = _one_point(options.start, "--from"), _one_point(options.end, "--to")
     reconstructor = load_reconstructor(options.calibration, model=options.model)
     frame = read_frame(options.image, reconstructor)
     heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
     profile = take_profile(heightmap, start, end, width_mm=options.width)
     write_profile(profile, options.output)
     say(
-        tr("{n} points over {length:.3f} mm written to {path}").format(
+        tr("{n} points over {length:.3f} mm saved to {path}").format(
             n=profile.along_mm.size, length=profile.along_mm[-1], path=options.output
         )
     )
     return 0
 
 
-def _place(given: list[list[float]], where: str) -> tuple[float, float]:
-    places = points(given, where=where)
-    if len(places) != 1:
+def _one_point(given: list[list[float]], where: str) -> tuple[float, float]:
+    found = points(given, where=where)
+    if len(found) != 1:
         raise InputError(
-            tr("{n} places are given").format(n=len(places)),
+            tr("Number of points: {n}").format(n=len(found)),
             where=where,
-            advice=tr("Give one: X and Y in mm"),
+            advice=tr("Give one point: X and Y in mm"),
         )
-    return places[0]
+    return found[0]

@@ -1,4 +1,4 @@
-"""``gelpolight protocol``: the paper's evaluation protocol, pressed by the virtual bench itself."""
+"""``gelpolight protocol``: the paper's evaluation protocol, run by the virtual bench."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import argparse
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from app.command_line.common import StageProgress, add_model, add_workers, load_reconstructor
+from app.command_line.common import StageProgress, add_workers
 from app.command_line.evaluate import report
+from app.command_line.reconstructing import add_model, load_reconstructor
 from gelpolight_core.design.sensor_design import SensorDesign, read_design
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.press_workers import Equipment
@@ -19,8 +19,8 @@ from gelpolight_core.experiments.virtual_protocol import (
     press_protocol,
     run_ledger,
 )
-from gelpolight_core.export.atomic import make_folder
-from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.io.lock import RunLock
 from gelpolight_core.measurement.protocol import (
     SHAPES,
     Protocol,
@@ -34,26 +34,23 @@ from gelpolight_core.translation import tr
 
 REPORT = "report"
 FAR_MM = 200.0
-"""What there is room for is known when the sensor is calibrated."""
+"""The available area is only known after the calibration."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "protocol", help=tr("let the virtual bench press the paper's evaluation protocol")
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument(
         "output",
         type=Path,
         metavar="OUT",
-        help=tr("folder of the run; one that was left is gone on with"),
+        help=tr("folder of the run; an unfinished run is continued"),
     )
     parser.add_argument("--design", type=Path, metavar="FILE", help=tr("sensor design (TOML)"))
     parser.add_argument(
         "--calibration",
         type=Path,
         metavar="FILE",
-        help=tr("of that sensor; without it, the virtual sensor is calibrated first"),
+        help=tr("calibration of that sensor; by default, the virtual sensor is calibrated first"),
     )
     paper = Protocol()
     parser.add_argument("--shapes", nargs="+", choices=SHAPES, default=list(paper.shapes))
@@ -63,7 +60,7 @@ def add_parser(commands: Any) -> None:
         type=float,
         default=list(paper.sizes_mm),
         metavar="MM",
-        help=tr("sizes at the height of 1 mm"),
+        help=tr("sizes in mm, at a height of 1 mm"),
     )
     parser.add_argument(
         "--heights",
@@ -71,18 +68,20 @@ def add_parser(commands: Any) -> None:
         type=float,
         default=list(paper.heights_mm),
         metavar="MM",
-        help=tr("heights at the size of 5 mm"),
+        help=tr("heights in mm, at a size of 5 mm"),
     )
     parser.add_argument("--repeats", type=int, default=paper.repeats, metavar="N")
     parser.add_argument("--regions", type=int, default=paper.regions, metavar="N")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help=tr("of the places"))
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help=tr("seed of the random positions")
+    )
     add_model(parser)
     add_workers(parser, default=2)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Calibrate where need be, press, measure, and write the report."""
+    """Calibrate if necessary, press, measure, and write the report."""
     design = read_design(options.design) if options.design else SensorDesign()
     wanted = _wanted(options)
     make_folder(options.output)
@@ -105,9 +104,9 @@ def run(options: argparse.Namespace) -> int:
 def _wanted(options: argparse.Namespace) -> Protocol:
     if options.seed < 0:
         raise InputError(
-            tr("the seed is {seed}").format(seed=options.seed),
+            tr("The seed is {seed}").format(seed=options.seed),
             where="--seed",
-            advice=tr("Give a whole number from 0"),
+            advice=tr("Give a whole number of at least 0"),
         )
     return check_protocol(
         Protocol(
@@ -125,7 +124,7 @@ def _wanted(options: argparse.Namespace) -> Protocol:
 
 def _begin_or_go_on(folder: Path, wanted: Protocol, reconstructor: Reconstructor) -> ProtocolRun:
     calibration = reconstructor.calibration
-    # To hundredths, as it is written.
+    # Rounded to hundredths, like the written values.
     reach_mm = math.floor(100.0 * protocol_reach_mm(calibration)) / 100.0
     within = replace(wanted, reach_mm=reach_mm)
     if not (folder / FILE_NAME).is_file():
@@ -138,8 +137,10 @@ def _begin_or_go_on(folder: Path, wanted: Protocol, reconstructor: Reconstructor
     begun = open_run(folder)
     if begun.protocol != within or begun.content.calibration != calibration.identity:
         raise InputError(
-            tr("the folder holds a run of another protocol or calibration"),
+            tr("The folder contains a run of another protocol or calibration"),
             where=str(folder / FILE_NAME),
-            advice=tr("Give the same arguments as at its beginning, or name a new folder"),
+            advice=tr(
+                "Give the same arguments as at the start of that run, or choose a new folder"
+            ),
         )
     return begun

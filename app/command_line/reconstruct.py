@@ -1,38 +1,36 @@
-"""``gelpolight reconstruct``: pictures and recordings become height maps."""
+"""``gelpolight reconstruct``: turns images and recordings into height maps."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 from tqdm import tqdm
 
-from app.command_line.common import (
+from app.command_line.common import refuse_overwriting
+from app.command_line.inputs import Inputs
+from app.command_line.parser import MENDABLE
+from app.command_line.reconstructing import (
+    add_despite_faults,
     add_effort,
     add_model,
     load_reconstructor,
-    plan_lines,
-    refuse_overwriting,
+    trace_lines,
 )
-from app.command_line.inputs import Inputs
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
 from gelpolight_core.export.preview import write_preview
+from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.translation import tr
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser(
-        "reconstruct", help=tr("turn pictures and recordings into depth maps in mm")
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
     parser.add_argument(
-        "images", type=Path, nargs="+", metavar="IMAGE", help=tr("pictures and recordings")
+        "images", type=Path, nargs="+", metavar="IMAGE", help=tr("images and recordings")
     )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT")
     parser.add_argument(
@@ -42,44 +40,45 @@ def add_parser(commands: Any) -> None:
         help=tr("comma-separated list of {formats}").format(formats=", ".join(FORMATS)),
     )
     parser.add_argument(
-        "--pictures", action="store_true", help=tr("also a picture of each depth map (PNG)")
+        "--pictures", action="store_true", help=tr("also save an image of each depth map (PNG)")
     )
     parser.add_argument(
         "--uncertainty",
         action="store_true",
-        help=tr("also standard deviations, in npz; takes several times as long"),
+        help=tr("also compute standard deviations, in npz; takes several times as long"),
     )
     parser.add_argument(
         "--frames",
         default="",
         metavar="A:B",
-        help=tr("of a recording, the frames from A, counted from 0, up to but not with B"),
+        help=tr("frames of a recording from A, counted from 0, up to but not including B"),
     )
     parser.add_argument(
         "--explain",
         action="store_true",
-        help=tr("say which steps each picture needed, and why the others were left out"),
+        help=tr("show the steps of each image, and why others were left out"),
     )
+    add_despite_faults(parser)
     add_effort(parser)
     add_model(parser)
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reconstruct every picture and write its files."""
+    """Reconstruct every image and write its files."""
     formats = [name.strip() for name in options.format.split(",") if name.strip()]
     unknown = sorted(set(formats) - set(FORMATS))
     if unknown or not formats:
         raise InputError(
-            tr("unknown format {name}").format(name=", ".join(unknown) or '""'),
+            tr("Unknown format {name}").format(name=", ".join(unknown) or '""'),
             where="--format",
             advice=tr("Use one or more of {formats}").format(formats=", ".join(FORMATS)),
         )
     if options.uncertainty and "npz" not in formats:
         raise InputError(
-            tr("only npz has room for standard deviations"),
+            tr("Only npz can contain standard deviations"),
             where="--uncertainty",
-            advice=tr("Add npz to --format, or leave it out"),
+            advice=tr("Add npz to --format, or remove this option"),
         )
     endings = dict.fromkeys([*map(ending, formats), *(["png"] if options.pictures else [])])
     with Inputs(options.images, options.frames) as inputs:
@@ -90,17 +89,28 @@ def run(options: argparse.Namespace) -> int:
         )
         inputs.require_match(reconstructor.calibration)
         make_folder(options.output)
+        refused = 0
         for item in inputs:
             picture = item.read(reconstructor.calibration.response)
+            health = reconstructor.health(picture.rgb, name=item.name)
+            fault = health.meaningless
+            if fault is not None and not options.despite_faults:
+                refused += 1
+                say(f"gelpolight: {item.where}: {fault.line}", file=sys.stderr)
+                continue
             heightmap = reconstructor.depth(
-                picture.rgb, name=item.name, uncertainty=options.uncertainty
+                picture.rgb, name=item.name, uncertainty=options.uncertainty, health=health
             )
             write_heightmap(heightmap, options.output, formats=formats)
-            if options.explain and heightmap.plan is not None:
-                tqdm.write("\n".join([f"{item.where}:", *plan_lines(heightmap.plan)]))
+            if options.explain and heightmap.trace is not None:
+                tqdm.write("\n".join([f"{item.where}:", *trace_lines(heightmap.trace)]))
             for note in heightmap.notes:
                 tqdm.write(f"{item.where}: {note}", file=sys.stderr)
             if options.pictures:
                 write_preview(heightmap, picture.rgb, options.output / f"{item.stem}.png")
-    say(tr("{n} depth maps written to {folder}").format(n=len(inputs.items), folder=options.output))
-    return 0
+    saved = len(inputs.items) - refused
+    say(tr("{n} depth maps saved to {folder}").format(n=saved, folder=options.output))
+    if refused:
+        text = tr("{n} images were refused. Add --despite-faults to use them anyway.")
+        say(f"gelpolight: {text.format(n=refused)}", file=sys.stderr)
+    return MENDABLE if refused else 0

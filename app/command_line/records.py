@@ -1,17 +1,16 @@
-"""``gelpolight records``: what was measured with the lab's sensors."""
+"""``gelpolight records``: the measurements of the lab's sensors."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 from app.command_line.common import refuse_overwriting
 from app.command_line.terminal import harmless, say
 from app.workspace.workspace import default_folder
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import refuse_unwritable
+from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.translation import tr
@@ -19,17 +18,16 @@ from gelpolight_core.translation import tr
 _LINE = "{:>6}  {:<16}  {:<14}  {:<12}  {:<14} {:>10} {:>9} {:>10} {:>8}  {:<8}  {}"
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser("records", help=tr("list what was measured, or write it as CSV"))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument(
         "--workspace",
         type=Path,
         default=default_folder(),
         metavar="DIR",
-        help=tr("the folder of the sensors (default: {folder})").format(folder=default_folder()),
+        help=tr("the workspace folder (default: {folder})").format(folder=default_folder()),
     )
-    parser.add_argument("--sensor", metavar="SERIAL", help=tr("only what this sensor measured"))
+    parser.add_argument("--sensor", metavar="SERIAL", help=tr("only measurements of this sensor"))
     parser.add_argument("--csv", type=Path, metavar="FILE", help=tr("also write a table"))
     parser.set_defaults(run=run)
 
@@ -39,11 +37,9 @@ def run(options: argparse.Namespace) -> int:
     path = options.workspace / NAME
     if not path.is_file():
         raise InputError(
-            tr("there are no records"),
+            tr("There are no records"),
             where=str(path),
-            advice=tr(
-                "Name the folder of the sensors with --workspace, or measure something first"
-            ),
+            advice=tr("Give the workspace folder with --workspace, or measure something first"),
         )
     if options.csv is not None:
         refuse_overwriting([options.csv], [path])
@@ -59,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def table_lines(records: tuple[MeasurementRecord, ...]) -> list[str]:
-    """Return the measurements as lines of text, one for each measured value."""
+    """Return the measurements as lines of text, one per measured value."""
     head = _LINE.format(
         "id", tr("time (UTC)"), tr("sensor"), tr("shape"), tr("quantity"), tr("measured"),
         "sd", tr("true"), tr("error %"), tr("verdict"), tr("note"),

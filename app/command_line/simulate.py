@@ -1,10 +1,9 @@
-"""``gelpolight simulate``: a session folder of the virtual sensor, with its truth."""
+"""``gelpolight simulate``: a session folder of the virtual sensor, with true depths."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from app.command_line.common import StageProgress
 from app.command_line.terminal import say
@@ -13,11 +12,15 @@ from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.translation import tr
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command."""
-    parser = commands.add_parser("simulate", help=tr("make a session folder of the virtual sensor"))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command and its function."""
     parser.add_argument("output", type=Path, metavar="OUT")
     parser.add_argument("--design", type=Path, metavar="FILE", help=tr("sensor design (TOML)"))
+    parser.add_argument(
+        "--closed",
+        action="store_true",
+        help=tr("background, balls and scale only, as of a sensor that cannot be opened"),
+    )
     parser.set_defaults(run=run)
 
 
@@ -25,6 +28,6 @@ def run(options: argparse.Namespace) -> int:
     """Render the session."""
     design = read_design(options.design) if options.design else SensorDesign()
     with StageProgress() as tell:
-        simulate_session(design, options.output, progress=tell)
-    say(tr("Session written to {folder}").format(folder=options.output))
+        simulate_session(design, options.output, closed=options.closed, progress=tell)
+    say(tr("Session saved to {folder}").format(folder=options.output))
     return 0

@@ -1,4 +1,4 @@
-"""What goes to the terminal: texts from files and devices must not steer it."""
+"""Safe output to the terminal: text from files and devices must not control it."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ _LAYOUT = "\n\t"
 
 
 def harmless(text: str) -> str:
-    """Return a text of one line in which every character that steers a terminal is spelled out.
+    """Return a one-line text in which every control character is replaced by its code.
 
     Parameters
     ----------
     text : str
-        Of a file, a camera or a person, such as a note.
+        From a file, a camera or a person, such as a note.
     """
     return "".join(_spelled(c) for c in text)
 
 
 def say(text: str, *, end: str = "\n", file: TextIO | None = None, flush: bool = False) -> None:
-    """Print a text whose lines and columns are the program's own; all else in it is harmless.
+    """Print a text whose lines and columns come from the program. Control characters are replaced.
 
     Parameters
     ----------
     text, end, file, flush
-        As of :func:`print`.
+        As in :func:`print`.
     """
     shown = "".join(c if c in _LAYOUT else _spelled(c) for c in text)
     print(shown, end=end, file=file, flush=flush)
@@ -34,8 +34,9 @@ def say(text: str, *, end: str = "\n", file: TextIO | None = None, flush: bool =
 def _spelled(character: str) -> str:
     """Return a character, or its code.
 
-    Not printable are those that steer a terminal or turn the direction of writing, those that are
-    not seen, and halves of characters, which no stream takes.
+    The code replaces characters that control the terminal or the writing direction, invisible ones,
+    and
+    surrogates, which no stream accepts.
     """
     if character.isprintable() or unicodedata.category(character) == "Zs":
         return character

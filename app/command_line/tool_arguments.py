@@ -1,4 +1,4 @@
-"""The arguments that describe a measuring tool, and the tool that they describe."""
+"""The arguments of a measuring tool, and the tool made from them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 
 from app.command_line.common import numbers, points
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import parse_json, read_file
 from gelpolight_core.measurement.outline_tools import EDGES
 from gelpolight_core.measurement.tools import TOOLS, Tool, tool_from_dict, tools_from_json
-from gelpolight_core.reading import parse_json, read_file
 from gelpolight_core.translation import tr
 
 JSON_LIMIT = 50_000_000
 
-# How many places each tool takes; None: any number from there on.
-PLACES: dict[str, tuple[int, int | None]] = {
+# Number of points of each tool. None: no upper limit.
+POINT_COUNTS: dict[str, tuple[int, int | None]] = {
     "distance": (2, 2),
     "step-height": (2, 2),
     "profile-step": (2, 2),
@@ -32,10 +32,10 @@ PLACES: dict[str, tuple[int, int | None]] = {
 
 
 def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
-    """Add the tools to a group of which one is chosen, and their geometry to the parser."""
+    """Add the tools to a group of alternatives, and their geometry to the parser."""
     what.add_argument("--tool", choices=tuple(TOOLS), metavar="NAME", help=", ".join(TOOLS))
     what.add_argument(
-        "--tools", type=Path, metavar="FILE", help=tr("JSON file of tools, or of stored results")
+        "--tools", type=Path, metavar="FILE", help=tr("JSON file of tools, or of saved results")
     )
     parser.add_argument(
         "--at",
@@ -43,10 +43,20 @@ def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
         nargs="+",
         metavar="X Y",
         default=[],
-        help=tr("the tool's places in mm: ends, centres, apex and arms, or points of a rim"),
+        help=tr("the tool's points in mm: ends, centres, apex and arms, or points of a rim"),
     )
-    parser.add_argument("--width", type=float, metavar="MM", help=tr("across a profile"))
-    parser.add_argument("--level", type=float, metavar="MM", help=tr("depth of a profile's width"))
+    parser.add_argument(
+        "--width",
+        type=float,
+        metavar="MM",
+        help=tr("width of a profile in mm, over which depth is averaged"),
+    )
+    parser.add_argument(
+        "--level",
+        type=float,
+        metavar="MM",
+        help=tr("depth in mm at which a profile's width is measured"),
+    )
     parser.add_argument(
         "--range",
         type=float,
@@ -55,14 +65,16 @@ def add_tool_arguments(parser: argparse.ArgumentParser, what: Any) -> None:
         help=tr("one or two ranges along a profile: A B [C D]"),
     )
     parser.add_argument(
-        "--size", type=float, nargs=2, metavar=("A", "B"), help=tr("sides of rectangles")
+        "--size", type=float, nargs=2, metavar=("A", "B"), help=tr("sides of rectangles in mm")
     )
-    parser.add_argument("--yaw", type=float, metavar="DEG", help=tr("turn of rectangles"))
-    parser.add_argument("--edge", choices=EDGES, help=tr("where a circle or rectangle is measured"))
+    parser.add_argument("--yaw", type=float, metavar="DEG", help=tr("rotation of rectangles"))
+    parser.add_argument(
+        "--edge", choices=EDGES, help=tr("depth in mm at which a circle or rectangle is measured")
+    )
 
 
 def chosen_tools(options: argparse.Namespace) -> tuple[Tool, ...]:
-    """Return the tools of the arguments; none with ``--shape``.
+    """Return the tools of the arguments. None with ``--shape``.
 
     Raises
     ------
@@ -79,44 +91,44 @@ def chosen_tools(options: argparse.Namespace) -> tuple[Tool, ...]:
 
 
 def _geometry(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the tool's geometry as :func:`tool_from_dict` wants it."""
+    """Return the tool's geometry in the form of :func:`tool_from_dict`."""
     name = options.tool
-    places = points(options.at, where="--at") if options.at else []
-    least, most = PLACES[name]
-    if len(places) < least or (most is not None and len(places) > most):
+    placed = points(options.at, where="--at") if options.at else []
+    least, most = POINT_COUNTS[name]
+    if len(placed) < least or (most is not None and len(placed) > most):
         raise InputError(
-            tr("{n} places are given").format(n=len(places)),
-            where=tr("measuring tool {name}").format(name=name),
-            advice=tr("It takes {least} of them: --at X Y ...").format(
+            tr("Number of points: {n}").format(n=len(placed)),
+            where=tr("Measuring tool {name}").format(name=name),
+            advice=tr("It needs {least}: --at X Y ...").format(
                 least=least if most == least else tr("{n} or more").format(n=least)
             ),
         )
     if name in ("step-height", "rectangle"):
-        taken = {"at", "size", "yaw"} | ({"edge"} if name == "rectangle" else set())
-        _refuse_rest(options, taken, name)
-        areas = [_rectangle(options, place) for place in places]
+        allowed = {"at", "size", "yaw"} | ({"edge"} if name == "rectangle" else set())
+        _refuse_rest(options, allowed, name)
+        areas = [_rectangle(options, point) for point in placed]
         keys = ("rectangle",) if name == "rectangle" else ("first", "second")
         return dict(zip(keys, areas, strict=True)) | _given(edge=options.edge)
     if name.startswith("profile-"):
-        taken = {"at", "width", "range"} | ({"level"} if name == "profile-width" else set())
-        _refuse_rest(options, taken, name)
-        ends = {"start_mm": places[0], "end_mm": places[1]}
+        allowed = {"at", "width", "range"} | ({"level"} if name == "profile-width" else set())
+        _refuse_rest(options, allowed, name)
+        ends = {"start_mm": placed[0], "end_mm": placed[1]}
         return ends | _given(width_mm=options.width, level_mm=options.level) | _ranges(options)
     _refuse_rest(options, {"at"} | ({"edge"} if name == "circle" else set()), name)
     if name == "circle":
-        return {"points_mm": places} | _given(edge=options.edge)
+        return {"points_mm": placed} | _given(edge=options.edge)
     keys = {"distance": ("a_mm", "b_mm"), "angle": ("apex_mm", "first_mm", "second_mm")}.get(
         name, ("at_mm",)
     )
-    return dict(zip(keys, places, strict=False))
+    return dict(zip(keys, placed, strict=False))
 
 
 def _rectangle(options: argparse.Namespace, centre_mm: tuple[float, float]) -> dict[str, Any]:
     if options.size is None:
         raise InputError(
-            tr("the size is missing"),
-            where=tr("measuring tool {name}").format(name=options.tool),
-            advice=tr("Give it by --size A B, in mm"),
+            tr("The size is missing"),
+            where=tr("Measuring tool {name}").format(name=options.tool),
+            advice=tr("Give it with --size A B, in mm"),
         )
     return {"centre_mm": centre_mm, "sides_mm": options.size, **_given(yaw_deg=options.yaw)}
 
@@ -129,9 +141,9 @@ def _ranges(options: argparse.Namespace) -> dict[str, Any]:
         return {}
     if len(given) != 2 * len(keys):
         raise InputError(
-            tr("{n} numbers are given").format(n=len(given)),
+            tr("Number of values: {n}").format(n=len(given)),
             where="--range",
-            advice=tr("The tool {name} takes {n}").format(name=options.tool, n=2 * len(keys)),
+            advice=tr("The tool {name} needs {n}").format(name=options.tool, n=2 * len(keys)),
         )
     return {key: given[2 * k : 2 * k + 2] for k, key in enumerate(keys)}
 
@@ -140,14 +152,14 @@ def _given(**values: Any) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def _refuse_rest(options: argparse.Namespace, taken: set[str], name: str) -> None:
-    """Refuse an argument that would be ignored."""
+def _refuse_rest(options: argparse.Namespace, allowed: set[str], name: str) -> None:
+    """Raise an error for an argument that would be ignored."""
     for key in ("at", "width", "level", "range", "size", "yaw", "edge", "seed"):
-        if getattr(options, key) not in (None, []) and key not in taken:
+        if getattr(options, key) not in (None, []) and key not in allowed:
             raise InputError(
-                tr("it does not go with {name}").format(name=name),
+                tr("This option cannot be used with {name}").format(name=name),
                 where=f"--{key}",
-                advice=tr("Leave it out"),
+                advice=tr("Remove the option"),
             )
 
 
@@ -157,7 +169,7 @@ def _read(path: Path) -> Any:
         return parse_json(read_file(path, JSON_LIMIT))
     except (FileNotFoundError, ValueError) as error:
         raise InputError(
-            tr("the file cannot be read as JSON"),
+            tr("The file cannot be read as JSON"),
             where=str(path),
-            advice=tr("Name a file of tools, such as measure --json writes"),
+            advice=tr("Give a file of tools, as written by measure --json"),
         ) from error

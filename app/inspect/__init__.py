@@ -1,1 +1,1 @@
-"""Inspect: depth live in 3D and as maps, looked at and cut through."""
+"""Inspect: live depth in 3D and as maps, with cross-sections."""

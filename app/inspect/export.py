@@ -1,4 +1,4 @@
-"""Height maps into files: the frame that is shown, or a range of a recording."""
+"""Write height maps to files: the current frame or a range of a recording."""
 
 from __future__ import annotations
 
@@ -6,26 +6,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from app.sources.source import Frame, Source
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
 class ExportChoice:
-    """What a person chose.
+    """The export settings of the user.
 
     Attributes
     ----------
     folder : Path
-        Where the files go.
+        Destination folder.
     formats : tuple of str
-        Out of FORMATS.
+        Some of FORMATS.
     stride : int
-        The meshes take every so many-th row and column.
+        Meshes use every n-th row and column.
     frames : (first, last) or None
-        Numbers of frames of the recording, from 0; None: the frame that is shown.
+        Frame numbers in the recording, from 0. None: the current frame.
     """
 
     folder: Path
@@ -35,17 +36,35 @@ class ExportChoice:
 
 
 def format_words() -> dict[str, str]:
-    """Return what each format is good for."""
+    """Return the use of each format."""
     words = {
-        "npz": tr("npz: everything, for NumPy"),
-        "tif": tr("tif: depth, 32 bit float"),
-        "png": tr("png: depth, 16 bit with its scale"),
+        "npz": tr("npz: all data, for NumPy"),
+        "tif": tr("tif: depth, 32-bit float"),
+        "png": tr("png: depth, 16-bit with its scale"),
         "gsf": tr("gsf: depth, for Gwyddion"),
+        "csv": tr("csv: depth as a table, for spreadsheets"),
+        "xyz": tr("xyz: one point per line, for point cloud programs"),
         "vtp": tr("vtp: mesh, for ParaView"),
         "ply": tr("ply: mesh with normals"),
-        "stl": tr("stl: bare mesh, to print"),
+        "stl": tr("stl: mesh only, for 3D printing"),
+        "glb": tr("glb: glTF mesh in metres, for 3D viewers and web pages"),
     }
     return {name: words.get(name, name) for name in FORMATS}
+
+
+def frame_name(frame: Frame, source: Source | None) -> str:
+    """Return the name of an exported frame: of a recording, the same as in the export of a range.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame.
+    source : Source or None
+        Its source.
+    """
+    if frame.index is not None and source is not None:
+        return f"{source.name}-{frame.index:05d}.png"
+    return f"frame-{frame.number:05d}.png"
 
 
 def export_frame(heightmap: HeightMap, choice: ExportChoice, name: str) -> list[Path]:
@@ -67,11 +86,11 @@ def export_recording(
     path : Path
         The recording.
     reconstructor : Reconstructor
-        No other thread may use it meanwhile.
+        No other thread may use it at the same time.
     choice : ExportChoice
         With the frames.
     tell : callable
-        Told the share done; what it raises stops the work between two frames.
+        Called with the progress (0 to 1). An exception from it stops the work between two frames.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Asks what to export, and where to."""
+"""Dialog for the export settings."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLineEdit,
     QPushButton,
-    QSpinBox,
     QVBoxLayout,
     QWidget,
 )
 
 from app.inspect.export import ExportChoice, format_words
+from app.widgets.inputs import SpinBox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -28,16 +28,16 @@ FOLDER_WIDTH = 360
 
 
 class ExportDialog(QDialog):
-    """Lets a person choose formats, folder and frames.
+    """Lets the user choose formats, folder and frames.
 
     Parameters
     ----------
     folder : Path
-        Proposed.
+        Proposed folder.
     count : int
-        Frames of the recording that is replayed; 0: there is none.
+        Number of frames of the open recording. 0: there is none.
     at : int
-        The frame that it is at.
+        The current frame of the recording.
 
     Signals
     -------
@@ -62,23 +62,25 @@ class ExportDialog(QDialog):
             column.addWidget(box)
             self._formats[name] = box
         form = QFormLayout()
-        self._stride = named(QSpinBox(), "inspect.export.stride", tr("Every so many-th node"))
+        self._stride = named(SpinBox(), "inspect.export.stride", tr("Use every n-th node"))
         self._stride.setRange(1, 16)
-        self._stride.setToolTip(tr("Meshes take every so many-th row and column: smaller files"))
+        self._stride.setToolTip(
+            tr("Meshes use every n-th row and column, which makes smaller files")
+        )
         form.addRow(tr("Mesh: every n-th node"), self._stride)
         self._folder = named(QLineEdit(str(folder)), "inspect.export.folder", tr("Folder"))
         self._folder.setMinimumWidth(FOLDER_WIDTH)
         self._folder.textChanged.connect(self._check)
-        browse = named(QPushButton(tr("Browse…")), "inspect.export.browse", tr("Choose a folder"))
+        browse = named(QPushButton(tr("Browse…")), "inspect.export.browse", tr("Choose folder"))
         browse.clicked.connect(self._browse)
-        place = QHBoxLayout()
-        place.addWidget(self._folder, 1)
-        place.addWidget(browse)
-        form.addRow(tr("Folder"), place)
+        row = QHBoxLayout()
+        row.addWidget(self._folder, 1)
+        row.addWidget(browse)
+        form.addRow(tr("Folder"), row)
         self._range = named(
             QCheckBox(tr("Frames")), "inspect.export.range", tr("Export a range of frames")
         )
-        self._first, self._last = QSpinBox(), QSpinBox()
+        self._first, self._last = SpinBox(), SpinBox()
         named(self._first, "inspect.export.first", tr("First frame"))
         named(self._last, "inspect.export.last", tr("Last frame"))
         for box, value in ((self._first, at + 1), (self._last, count)):
@@ -104,12 +106,12 @@ class ExportDialog(QDialog):
 
     @property
     def choice(self) -> ExportChoice:
-        """What is chosen."""
+        """The current settings."""
         frames = None
         if self._range.isChecked():
             frames = self._first.value() - 1, self._last.value() - 1
         return ExportChoice(
-            # A mere name is a folder beside the one that was proposed.
+            # A name without a path is a folder next to the proposed one.
             folder=self._beside / Path(self._folder.text()).expanduser(),
             formats=tuple(name for name, box in self._formats.items() if box.isChecked()),
             stride=self._stride.value(),

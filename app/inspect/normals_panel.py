@@ -1,14 +1,15 @@
-"""Which way the surface faces, or how steep it is."""
+"""The surface normals or the slope."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.inspect.colour_bar import ColourBar
-from app.inspect.height_panel import extent_of
-from app.inspect.map_view import MapView
-from app.inspect.products import STEEPNESS, Shown
+from app.live.frame_results import Shown
+from app.live.height_panel import extent_of
+from app.view2d.map_view import MapView
+from app.view2d.quantities import STEEPEST_DEG
+from app.widgets.inputs import ComboBox
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
@@ -19,7 +20,7 @@ class NormalsPanel(QWidget):
     Signals
     -------
     chosen()
-        The other one is to be shown.
+        The other quantity was selected.
     """
 
     chosen = Signal()
@@ -28,34 +29,31 @@ class NormalsPanel(QWidget):
         super().__init__()
         named(self, "inspect.normals", tr("Normals"))
         self.map = MapView("inspect.normals.map", tr("Normals"))
-        self.bar = ColourBar("inspect.normals.bar", tr("Colours of the slope"))
-        self.bar.show_range("magma", *STEEPNESS[1:], "°")
-        self.bar.hide()
-        self._what = named(QComboBox(), "inspect.normals.what", tr("What is shown"))
+        self._what = named(ComboBox(), "inspect.normals.what", tr("Quantity shown"))
         self._what.addItem(tr("Normals: x in red, y in green"), "normals")
         self._what.addItem(tr("Slope"), "slope")
         self._what.currentIndexChanged.connect(self._on_chosen)
-        row = QHBoxLayout()
-        row.setSpacing(0)
-        row.addWidget(self.map, 1)
-        row.addWidget(self.bar)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
         column.addWidget(self._what)
-        column.addLayout(row, 1)
+        column.addWidget(self.map, 1)
         self.map.say(tr("No depth yet."))
 
     @property
     def what(self) -> str:
-        """What is shown: ``normals`` or ``slope``."""
+        """The shown quantity: ``normals`` or ``slope``."""
         return str(self._what.currentData())
 
     def show_frame(self, shown: Shown) -> None:
         """Show a frame."""
         if shown.normals is not None and shown.heightmap is not None:
-            self.map.show_picture(shown.normals, extent_of(shown.heightmap))
+            self.map.set_image(shown.normals, extent_of(shown.heightmap))
+            if self.what == "slope":
+                self.map.show_colours("magma", 0.0, STEEPEST_DEG, "°")
 
     def _on_chosen(self) -> None:
-        self.bar.setVisible(self.what == "slope")
+        # The colours of one quantity are meaningless for the other.
+        if self.map.has_image:
+            self.map.say(tr("Please wait."))
         self.chosen.emit()

@@ -1,4 +1,4 @@
-"""Error against run time: measured here, on a calibration that the person chooses."""
+"""Error against run time, measured on this machine with a calibration of the user's choice."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QCheckBox,
-    QComboBox,
     QDialog,
     QFileDialog,
     QFormLayout,
@@ -24,20 +22,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.context.context import AppContext
 from app.inspect.precision_plot import PrecisionPlot, errors
-from app.shell.context import AppContext
-from app.shell.jobs import Job, Jobs
+from app.services.jobs import Job, Jobs
+from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
-from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.file import read_open_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.experiments.work_precision import Point, pareto_front
-from gelpolight_core.experiments.work_precision_trial import (
-    chosen_methods,
+from gelpolight_core.experiments.front.measure import Point, pareto_front, recommended
+from gelpolight_core.experiments.front.trial import (
     measure_calibration,
     measure_virtual,
+    usual_methods,
 )
 from gelpolight_core.translation import tr
 
@@ -45,19 +44,19 @@ NUMBERS = ("median_ms", "p95_ms", "rms_um", "normal_deg", "height_percent", "siz
 
 
 class PrecisionDialog(QDialog):
-    """Lets a person measure what accuracy costs on this machine.
+    """Lets the user measure error against run time on this machine.
 
     Parameters
     ----------
     context : AppContext
-        With the library of calibrations.
+        Holds the library of calibrations.
     parent : QWidget, optional
         Owner.
 
     Attributes
     ----------
     points : tuple of Point
-        What was measured last.
+        The last results.
     """
 
     def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
@@ -77,18 +76,16 @@ class PrecisionDialog(QDialog):
         self.jobs.refused.connect(lambda text: self._say(text, "warn"))
 
     def _make_choice(self) -> None:
-        self.calibrations = named(QComboBox(), "precision.calibration", tr("Calibration"))
+        self.calibrations = named(ComboBox(), "precision.calibration", tr("Calibration"))
         self.calibrations.currentIndexChanged.connect(self._on_calibration)
         self.presses = named(PlainLabel(), "precision.presses", tr("Presses of known depth"))
         self.presses.setWordWrap(True)
         self.folder = named(
             QPushButton(tr("Session folder…")), "precision.folder", tr("Choose a session folder"),
-            tr("With presses/truth.csv and truth/*.npz: the true depth of each press"),
+            tr("A session folder with presses/truth.csv and truth/*.npz, the true depth of "
+                "each press"),
         )  # fmt: skip
         self.folder.clicked.connect(self.choose_folder)
-        self.everything = named(
-            QCheckBox(tr("All methods, too (takes minutes)")), "precision.all", tr("All methods")
-        )
         self.start = named(QPushButton(tr("&Measure")), "precision.start", tr("Measure"))
         self.start.setDefault(True)
         self.start.clicked.connect(self.measure)
@@ -97,7 +94,7 @@ class PrecisionDialog(QDialog):
         self.progress = named(QProgressBar(), "precision.progress", tr("Progress"))
 
     def _make_result(self) -> None:
-        self.error = named(QComboBox(), "precision.error", tr("Which error is drawn"))
+        self.error = named(ComboBox(), "precision.error", tr("Error shown in the diagram"))
         for name, label in errors().items():
             self.error.addItem(label, name)
         self.error.currentIndexChanged.connect(self._draw)
@@ -105,9 +102,9 @@ class PrecisionDialog(QDialog):
         self.plot.setMinimumHeight(200)
         heads = (
             tr("Method"), "ms", tr("p95 ms"), tr("RMS um"), tr("normals deg"), tr("height %"),
-            tr("size %"), tr("front"),
+            tr("size %"), tr("on front"),
         )  # fmt: skip
-        self.table = named(QTableWidget(0, len(heads)), "precision.table", tr("What was measured"))
+        self.table = named(QTableWidget(0, len(heads)), "precision.table", tr("Results"))
         self.table.setHorizontalHeaderLabels(heads)
         self.table.verticalHeader().hide()
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -116,22 +113,33 @@ class PrecisionDialog(QDialog):
         self.table.horizontalHeader().setSectionResizeMode(mode.ResizeToContents)
         self.table.horizontalHeader().setSectionResizeMode(0, mode.Stretch)
         self.table.setMaximumHeight(170)
-        self.words = named(PlainLabel(), "precision.words", tr("What there is to say"))
+        self.rate = self._wish("rate", tr("Frames per second that are needed"), tr(" frames/s"))
+        self.limit = self._wish("limit", tr("Largest error of the depth"), tr(" um RMS"))
+        self.advice = named(PlainLabel(), "precision.advice", tr("Recommended mode"))
+        self.words = named(PlainLabel(), "precision.words", tr("Notes"))
         self.words.setWordWrap(True)
         self.words.setMinimumHeight(2 * self.words.fontMetrics().lineSpacing())
         self.save = named(
-            QPushButton(tr("Save the report…")), "precision.save", tr("Save the report"),
-            tr("HTML with the diagrams, CSV and JSON"),
+            QPushButton(tr("Save report…")), "precision.save", tr("Save the report"),
+            tr("HTML with the diagrams, CSV, JSON and PNG"),
         )  # fmt: skip
         self.save.clicked.connect(self.choose_report)
         self.save.setEnabled(False)
+
+    def _wish(self, name: str, label: str, suffix: str) -> DoubleSpinBox:
+        box = named(DoubleSpinBox(), f"precision.{name}", label, label)
+        box.setRange(0.0, 10_000.0)
+        box.setDecimals(1)
+        box.setSpecialValueText(tr("any"))
+        box.setSuffix(suffix)
+        box.valueChanged.connect(self._recommend)
+        return box
 
     def _lay_out(self) -> None:
         where = QHBoxLayout()
         where.addWidget(self.presses, 1)
         where.addWidget(self.folder)
         begin = QHBoxLayout()
-        begin.addWidget(self.everything)
         begin.addWidget(self.progress, 1)
         begin.addWidget(self.start)
         begin.addWidget(self.stop)
@@ -139,7 +147,12 @@ class PrecisionDialog(QDialog):
         form.addRow(tr("Calibration"), self.calibrations)
         form.addRow(tr("Presses"), where)
         form.addRow("", begin)
-        form.addRow(tr("Draw"), self.error)
+        wish = QHBoxLayout()
+        wish.addWidget(self.rate)
+        wish.addWidget(self.limit)
+        wish.addWidget(self.advice, 1)
+        form.addRow(tr("Diagram"), self.error)
+        form.addRow(tr("I need"), wish)
         foot = QHBoxLayout()
         foot.addWidget(self.words, 1)
         foot.addWidget(self.save)
@@ -149,10 +162,10 @@ class PrecisionDialog(QDialog):
         column.addWidget(self.table)
         column.addLayout(foot)
 
-    # What is measured
+    # Inputs
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Offer the calibrations that the library has now."""
+        """Offer the calibrations that the library contains now."""
         self._show_calibrations()
         super().showEvent(event)
 
@@ -165,7 +178,7 @@ class PrecisionDialog(QDialog):
             self._say(str(error), "fail")
         for entry in entries:
             if entry.summary is not None:
-                self.calibrations.addItem(f"{entry.serial}  {entry.summary.identity}", entry)
+                self.calibrations.addItem(entry.name, entry)
                 if entry.in_use:
                     self.calibrations.setCurrentIndex(self.calibrations.count() - 1)
         self._on_calibration()
@@ -179,21 +192,23 @@ class PrecisionDialog(QDialog):
         self._folder = None
         self._virtual = entry is not None and entry.serial == self._design().serial
         if entry is None:
-            self._say(tr("There is no calibration yet: calibrate a sensor first."), "warn")
+            self._say(tr("There is no calibration yet. Calibrate a sensor first."), "warn")
         elif self._virtual:
-            self.presses.setText(tr("rendered by the virtual sensor"))
-            self._say(tr("Measures what accuracy costs on this machine."))
+            self.presses.setText(tr("simulated by the virtual sensor"))
+            self._say(tr("Measures the accuracy and run time of each method on this machine."))
         else:
-            self.presses.setText(tr("none chosen"))
-            self._say(tr("Choose a session folder of this sensor that has the truth beside it."))
+            self.presses.setText(tr("none selected"))
+            self._say(tr("Choose a session folder of this sensor that contains the true depths."))
         self._allow()
 
     def choose_folder(self) -> None:
-        """Let the person choose a session folder with truth."""
+        """Let the user choose a session folder with true depths."""
+        folder = str(self.context.settings.folder("session"))
         chosen = QFileDialog.getExistingDirectory(
-            self, tr("Session folder with truth"), str(self.context.settings.last_folder)
+            self, tr("Session folder with true depths"), folder
         )
         if chosen:
+            self.context.settings.keep_folder("session", Path(chosen).parent)
             self.use_folder(Path(chosen))
 
     def use_folder(self, folder: Path) -> None:
@@ -204,32 +219,39 @@ class PrecisionDialog(QDialog):
         self._allow()
 
     def measure(self) -> None:
-        """Measure, beside the window."""
+        """Measure in the background."""
         entry = self.calibrations.currentData()
         if entry is None or self.jobs.busy:
             return
         path, folder, design = entry.path, self._folder, self._design()
-        chosen = chosen_methods(self.everything.isChecked())
+        chosen = usual_methods()
 
         def work(tell: Callable[[float], None]) -> tuple[Point, ...]:
             def progress(_what: str, share: float) -> None:
                 tell(share)
 
-            calibration = read_calibration(path)
+            calibration = read_open_calibration(path)
             if folder is not None:
                 return measure_calibration(calibration, folder, chosen, progress=progress)
             return measure_virtual(calibration, design, chosen, progress=progress)
 
         self._say("")
+        self.context.requests.rest.emit(True)
         self.jobs.submit(
-            Job(tr("Measuring"), work, self.show_points, lambda text: self._say(text, "fail"))
+            Job(
+                tr("Measuring"),
+                work,
+                self.show_points,
+                lambda text: self._say(text, "fail"),
+                ended=lambda: self.context.requests.rest.emit(False),
+            )
         )
         self._allow()
 
-    # What came of it
+    # Results
 
     def show_points(self, points: tuple[Point, ...]) -> None:
-        """Show what was measured."""
+        """Show the results."""
         self.points = points
         front = pareto_front(points)
         self.table.setRowCount(len(points))
@@ -245,30 +267,50 @@ class PrecisionDialog(QDialog):
                 item.setToolTip(plain_tip(point.gap))
                 self.table.setItem(row, column, item)
         gaps = [f"{point.label}: {point.gap}" for point in points if point.gap]
-        text = tr("The dashed line is the front: nothing beats it in both time and error.")
+        text = tr("The dashed line is the front: no other method is both faster and more accurate.")
         self._say(" ".join([text, *gaps]))
         self._draw()
+        self._recommend()
         self._allow()
 
+    def _recommend(self) -> None:
+        """Say which mode to use for the frame rate and the error that are wanted."""
+        if not self.points:
+            self.advice.setText("")
+            return
+        found = recommended(
+            self.points, rate_hz=self.rate.value() or None, rms_um=self.limit.value() or None
+        )
+        if found is None:
+            self.advice.setText(tr("No mode on this machine is that fast and accurate"))
+            return
+        text = tr("Use: {mode} ({ms} ms, {um} um)").format(
+            mode=found.label,
+            ms=_digits(found.median_ms or 0.0),
+            um=_digits(found.rms_um or 0.0),
+        )
+        self.advice.setText(text)
+
     def choose_report(self) -> None:
-        """Let the person choose a folder, and write the report into it."""
+        """Let the user choose a folder, and write the report into it."""
         chosen = QFileDialog.getExistingDirectory(
-            self, tr("Folder for the report"), str(self.context.settings.last_folder)
+            self, tr("Folder for the report"), str(self.context.settings.folder("report"))
         )
         if chosen:
+            self.context.settings.keep_folder("report", Path(chosen))
             self.write_report(Path(chosen))
 
     def write_report(self, folder: Path) -> None:
-        """Write the report, beside the window."""
+        """Write the report in the background."""
         points = self.points
 
         def work(_tell: Callable[[float], None]) -> list[Path]:
-            from gelpolight_core.experiments.work_precision_report import write_work_precision
+            from gelpolight_core.experiments.front.report import write_work_precision
 
             return write_work_precision(points, (), folder)
 
         def done(written: list[Path]) -> None:
-            self._say(tr("Written: {file}").format(file=written[0]), "pass")
+            self._say(tr("Report saved: {file}").format(file=written[0]), "pass")
             self._allow()
 
         def failed(sentence: str) -> None:
@@ -296,11 +338,14 @@ class PrecisionDialog(QDialog):
         self.save.setEnabled(bool(self.points) and not busy)
 
     def reject(self) -> None:
-        """Measure no longer; Qt comes here from Escape and from every way of closing."""
+        """Stop measuring. Qt calls this for Escape and for every other way of closing."""
+        working = self.jobs.busy
         self.jobs.close()
+        if working:
+            self.context.requests.rest.emit(False)
         super().reject()
 
 
 def _digits(value: float) -> str:
-    """Return a number with three digits, never as a power of ten."""
+    """Return a number with three digits, never with an exponent."""
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"

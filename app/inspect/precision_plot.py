@@ -1,4 +1,4 @@
-"""Error against run time as a diagram: both logarithmic, the three efforts marked."""
+"""Diagram of error against run time, both logarithmic, with the three efforts marked."""
 
 from __future__ import annotations
 
@@ -9,24 +9,23 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.shell import theme
+from app.theme import theme
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
-from gelpolight_core.experiments.work_precision import Point, pareto_front
+from gelpolight_core.experiments.front.measure import Point, pareto_front
 from gelpolight_core.translation import tr
 
-# The paper states these of its own sensor and machine.
+# The paper's values for its own sensor and machine.
 PAPER_MS, PAPER_PERCENT = 100.0, {"height_percent": 8.0, "size_percent": 5.0}
 # (light, dark) and a shape for each family of methods.
 LOOKS = {
     "paper": ("#0b5cad", "#74b5f7", "o"),
     "effort": ("#1a7f37", "#57d27a", "t"),
-    "threads": ("#6b7785", "#9aa7b4", "d"),
     "precision": ("#8a3ffc", "#c9a6ff", "p"),
-    "term": ("#6b7785", "#9aa7b4", "x"),
+    "rival": ("#6b7785", "#9aa7b4", "x"),
 }
 LEAST = 1e-3
-# Nobody looks farther: logarithms of times from a microsecond to a day, and of errors.
+# Limits of the axes: times from a microsecond to a day, and the matching errors.
 LIMITS = {
     "xMin": -3.0,
     "xMax": 8.0,
@@ -35,12 +34,12 @@ LIMITS = {
     "minXRange": 0.15,
     "minYRange": 0.15,
 }
-# Ticks within a decade; and from how many decades on only powers of ten are marked.
+# Ticks within a decade, and the number of decades from which only powers of ten are marked.
 MOST_STEPS, MANY_DECADES = 8, 4.0
 
 
 def errors() -> dict[str, str]:
-    """Return which errors can be drawn, and what people read on the axis."""
+    """Return the errors that can be drawn, and their axis labels."""
     return {
         "rms_um": tr("depth, RMS (um)"),
         "height_percent": tr("height of the plateau (%)"),
@@ -50,16 +49,16 @@ def errors() -> dict[str, str]:
 
 
 class PrecisionPlot(QWidget):
-    """One marker for each method; what nothing beats is joined by a line."""
+    """One marker per method. A line joins those that no other method beats."""
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "precision.plot", tr("Error against the time of a frame"))
+        named(self, "precision.plot", tr("Error against processing time of a frame"))
         self._plot = without_menus(pg.PlotWidget(viewBox=pg.ViewBox(enableMenu=False)))
         self._plot.hideButtons()
         self._plot.setLogMode(x=True, y=True)
         self._plot.showGrid(x=True, y=True, alpha=0.25)
-        self._plot.setLabel("bottom", tr("time of a frame (ms)"))
+        self._plot.setLabel("bottom", tr("processing time of a frame (ms)"))
         self._plot.setLimits(**LIMITS)
         self._plot.sigRangeChanged.connect(self._set_ticks)
         for side in ("bottom", "left"):
@@ -72,7 +71,7 @@ class PrecisionPlot(QWidget):
         self._draw()
 
     def show_points(self, points: Sequence[Point], error: str) -> None:
-        """Draw one of the errors of all points that are no gaps."""
+        """Draw one of the errors for all points that have a result."""
         self._points, self._error = tuple(points), error
         self._draw()
 
@@ -90,20 +89,24 @@ class PrecisionPlot(QWidget):
             plot.getAxis(side).setTextPen(ink)
         plot.setLabel("left", errors()[self._error])
         plot.clear()
-        shown = [p for p in self._points if _place(p, self._error) is not None]
+        shown = [p for p in self._points if _coordinates(p, self._error) is not None]
         front = [p for p in pareto_front(self._points) if p in shown]
         if self._error == "rms_um" and front:
             line = pg.mkPen(ink, width=1, style=Qt.PenStyle.DashLine)
-            plot.plot(*zip(*(_place(p, self._error) for p in front), strict=True), pen=line)
+            plot.plot(*zip(*(_coordinates(p, self._error) for p in front), strict=True), pen=line)
         for point in shown:
-            light, bright, symbol = LOOKS.get(point.family, LOOKS["term"])
+            light, bright, symbol = LOOKS.get(point.family, LOOKS["rival"])
             size = 15 if point.family in ("effort", "paper") else 9
             self._mark(
-                _place(point, self._error), point.label, bright if dark else light, symbol, size
+                _coordinates(point, self._error),
+                point.label,
+                bright if dark else light,
+                symbol,
+                size,
             )
         if shown and self._error in PAPER_PERCENT:
-            place = PAPER_MS, PAPER_PERCENT[self._error]
-            self._mark(place, tr("the paper, of its own sensor"), ink.name(), "star", 15)
+            at = PAPER_MS, PAPER_PERCENT[self._error]
+            self._mark(at, tr("the paper, on its own sensor"), ink.name(), "star", 15)
         plot.autoRange(padding=0.18)
         self._set_ticks()
 
@@ -112,12 +115,12 @@ class PrecisionPlot(QWidget):
             self._plot.getAxis(side).setTicks([_ticks(*values)])
 
     def _mark(
-        self, place: tuple[float, float] | None, text: str, colour: str, symbol: str, size: int
+        self, at: tuple[float, float] | None, text: str, colour: str, symbol: str, size: int
     ) -> None:
-        assert place is not None
+        assert at is not None
         self._plot.plot(
-            [place[0]],
-            [place[1]],
+            [at[0]],
+            [at[1]],
             pen=None,
             symbol=symbol,
             symbolSize=size,
@@ -126,12 +129,12 @@ class PrecisionPlot(QWidget):
         )
         words = pg.TextItem(text, color=colour, anchor=(0.5, 1.4))
         self._plot.addItem(words, ignoreBounds=True)
-        # Text is placed in the plot's own, logarithmic, coordinates.
-        words.setPos(_logarithm(place))
+        # Text is positioned in the plot's own logarithmic coordinates.
+        words.setPos(_logarithm(at))
 
 
-def _place(point: Point, error: str) -> tuple[float, float] | None:
-    """Return (ms, error), or None for a gap."""
+def _coordinates(point: Point, error: str) -> tuple[float, float] | None:
+    """Return (ms, error), or None without a result."""
     value = getattr(point, error)
     if point.median_ms is None or value is None:
         return None
@@ -139,7 +142,7 @@ def _place(point: Point, error: str) -> tuple[float, float] | None:
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Return round values between two logarithms, as many as can be read, with their words."""
+    """Return round values between two logarithms, not too many to read, with their labels."""
     if high - low < 1.0:
         least, most = 10.0**low, 10.0**high
         step = _round_up((most - least) / MOST_STEPS)
@@ -158,5 +161,5 @@ def _round_up(step: float) -> float:
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= step)
 
 
-def _logarithm(place: tuple[float, float]) -> QPointF:
-    return QPointF(math.log10(place[0]), math.log10(place[1]))
+def _logarithm(at: tuple[float, float]) -> QPointF:
+    return QPointF(math.log10(at[0]), math.log10(at[1]))

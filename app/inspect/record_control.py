@@ -1,59 +1,57 @@
-"""The record button: every frame into a file, and how many were lost."""
+"""The record button: writes every frame to a file and counts lost frames."""
 
 from __future__ import annotations
 
-from datetime import datetime
-from pathlib import Path
+import math
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QWidget
 
-from app.inspect.link import LiveLink
-from app.shell.actions import make_action
-from app.shell.context import AppContext
+from app.context.context import AppContext
+from app.live.depth import LiveDepth
 from app.sources.recorder import Recorder, RecorderFigures, header_for
-from app.workspace.workspace import Workspace
+from app.sources.recording_room import Room, free_bytes, room_for
+from app.widgets.actions import make_action
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder
-from gelpolight_core.recording.recording import ENDING
 from gelpolight_core.translation import tr
 
 POLL_MS = 300
 
 
 class RecordControl(QObject):
-    """Records what the source delivers.
+    """Records the frames of the source.
 
     Signals
     -------
-    told(str)
-        How the recording fares; empty when there is none.
+    reported(str)
+        Status of the recording. Empty if there is none.
     """
 
-    told = Signal(str)
+    reported = Signal(str)
 
-    def __init__(self, link: LiveLink, owner: QWidget, *, context: AppContext) -> None:
+    def __init__(self, depth: LiveDepth, owner: QWidget, *, context: AppContext) -> None:
         super().__init__(owner)
-        self._link, self._context = link, context
+        self._depth, self._context = depth, context
         self._recorder: Recorder | None = None
+        self._warned = False
         self.action: QAction = make_action(
             owner, "inspect.record", tr("Record"), self.toggle, keys=("R",), icon_name="record",
-            tip=tr("Record every frame, lossless (R)"),
+            tip=tr("Record every frame without loss (R)"),
         )  # fmt: skip
         self.action.setCheckable(True)
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._poll)
-        link.switched.connect(self._on_switched)
+        depth.live.switched.connect(self._on_switched)
 
     @property
     def busy(self) -> bool:
-        """Whether a recording is under way, or still being written."""
+        """Whether a recording is running or still being written."""
         return self._recorder is not None
 
     def toggle(self) -> None:
-        """Begin to record, or end it."""
+        """Start recording, or stop it."""
         if self._recorder is None:
             self.start()
         else:
@@ -61,12 +59,14 @@ class RecordControl(QObject):
 
     def start(self) -> None:
         """Record into a new file of the sensor's folder."""
-        stream, info = self._link.stream, self._context.source.info
+        stream, info = self._depth.live.stream, self._context.source.info
         if stream is None or info is None:
             self.action.setChecked(False)
-            self._context.toasts.show(tr("There is no camera. Choose a source first."), "warn")
+            self._context.toasts.show(
+                tr("No camera is selected. Choose an image source first."), "warn"
+            )
             return
-        reconstructor = self._link.reconstructor
+        reconstructor = self._depth.reconstructor
         calibration = None if reconstructor is None else reconstructor.calibration
         serial = "" if calibration is None else calibration.sensor.serial
         header = header_for(
@@ -75,29 +75,30 @@ class RecordControl(QObject):
             calibration_id="" if calibration is None else calibration.identity,
         )
         try:
-            path = recording_path(self._context.workspace, serial or "unknown")
+            path = self._context.workspace.recording_path(serial or "unknown")
         except InputError as error:
             self.action.setChecked(False)
             self._context.toasts.show(str(error), "fail")
             return
         self._recorder = Recorder(stream, path, header)
         self._recorder.start()
+        self._warned = False
         self.action.setChecked(True)
         self._timer.start()
 
     def _on_switched(self) -> None:
-        """End a recording of a stream that has gone: the same camera, opened again, is another."""
-        if self._recorder is not None and self._recorder.stream is not self._link.stream:
+        """Stop recording a stream that was closed: a reopened camera is a new stream."""
+        if self._recorder is not None and self._recorder.stream is not self._depth.live.stream:
             self.stop()
 
     def stop(self) -> None:
-        """Take no more frames; what waits for the disk is still written, meanwhile."""
+        """Accept no more frames. Waiting frames are still written in the background."""
         if self._recorder is not None:
             self._recorder.finish()
         self.action.setChecked(False)
 
     def close(self) -> None:
-        """End the recording, and wait for what is still to be written."""
+        """Stop recording, and wait until everything is written."""
         self._timer.stop()
         recorder, self._recorder = self._recorder, None
         if recorder is not None:
@@ -110,14 +111,43 @@ class RecordControl(QObject):
         if figures.finished:
             self._tell_finished(self._recorder, figures)
             return
-        words = tr("Recording: {words}") if self.action.isChecked() else tr("Writing: {words}")
-        self.told.emit(words.format(words=recorder_text(figures)))
+        if not self.action.isChecked():
+            self.action.setText(tr("Writing…"))
+            self.reported.emit(tr("Writing: {words}").format(words=recorder_text(figures)))
+            return
+        room = room_for(
+            figures,
+            free_bytes=free_bytes(self._recorder.path),
+            limit_bytes=1e9 * self._context.settings.recording_limit_gb,
+        )
+        self.action.setText(
+            tr("{time}, {left}").format(time=time_text(figures.seconds), left=left_text(room))
+        )
+        words = tr("Recording: {words}, {left}")
+        self.reported.emit(words.format(words=recorder_text(figures), left=left_text(room)))
+        self._heed(room)
+
+    def _heed(self, room: Room) -> None:
+        """Stop when there is no room left, and warn a minute before."""
+        if room.full:
+            self.stop()
+            why = tr("The recording reached its size limit and was stopped. See Preferences.")
+            if not room.by_limit:
+                why = tr("The disk is almost full. The recording was stopped.")
+            self._context.toasts.show(why, "warn")
+        elif room.soon_full and not self._warned:
+            self._warned = True
+            text = tr("The recording stops in {left}: the disk is almost full.")
+            if room.by_limit:
+                text = tr("The recording stops in {left}: it reaches its size limit.")
+            self._context.toasts.show(text.format(left=time_text(room.left_s)), "warn")
 
     def _tell_finished(self, recorder: Recorder, figures: RecorderFigures) -> None:
         self._recorder = None
         self._timer.stop()
         self.action.setChecked(False)
-        self.told.emit("")
+        self.action.setText(tr("Record"))
+        self.reported.emit("")
         if figures.failure:
             self._context.toasts.show(figures.failure, "fail")
             return
@@ -129,23 +159,26 @@ class RecordControl(QObject):
         self._context.toasts.show(text, kind, actions=(replay,))
 
 
-def recording_path(workspace: Workspace, serial: str) -> Path:
-    """Return the place of a new recording; its folder is made."""
-    folder = workspace.sensor_folder(serial) / "recordings"
-    make_folder(folder)
-    stem = f"{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
-    path, number = folder / f"{stem}{ENDING}", 1
-    while path.exists():
-        number += 1
-        path = folder / f"{stem}-{number}{ENDING}"
-    return path
-
-
 def recorder_text(figures: RecorderFigures) -> str:
-    """Return how a recording fares, losses included."""
+    """Return the status of a recording, including losses."""
     text = tr("{n} frames, {s:.1f} s, {mb:.0f} MB").format(
         n=figures.frames, s=figures.seconds, mb=1e-6 * figures.size_bytes
     )
     if figures.lost:
         text += tr(", {n} lost").format(n=figures.lost)
     return text
+
+
+def time_text(seconds: float) -> str:
+    """Return a time as minutes and seconds, or as hours and minutes."""
+    whole = int(seconds)
+    if whole >= 3600:
+        return tr("{h} h {m:02d} min").format(h=whole // 3600, m=whole % 3600 // 60)
+    return tr("{m}:{s:02d} min").format(m=whole // 60, s=whole % 60)
+
+
+def left_text(room: Room) -> str:
+    """Return how long a recording can go on."""
+    if math.isinf(room.left_s):
+        return tr("{gb:.0f} GB left").format(gb=1e-9 * room.left_bytes)
+    return tr("{time} left").format(time=time_text(room.left_s))

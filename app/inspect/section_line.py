@@ -1,4 +1,4 @@
-"""The line and the rectangle on the height map, moved by their handles."""
+"""The section line and the measured rectangle on the height map, with handles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, QPointF, Signal
 from PySide6.QtGui import QColor, QPolygonF
 from PySide6.QtWidgets import QGraphicsPolygonItem
 
-from app.inspect.map_view import MapView
+from app.view2d.map_view import MapView
 from app.widgets.plots import own_handle_menus
 from gelpolight_core.measurement.area import Rectangle
 
@@ -62,7 +62,7 @@ class SectionLine(QObject):
         return start, end
 
     def set_width(self, width_mm: float) -> None:
-        """Show over which width is averaged."""
+        """Show the width that is averaged over."""
         self._width_mm = width_mm
         self._draw_band()
 
@@ -89,7 +89,7 @@ class RegionBox(QObject):
     Signals
     -------
     moved()
-        It has moved or changed its size.
+        The rectangle was moved or resized.
     """
 
     moved = Signal()
@@ -111,7 +111,7 @@ class RegionBox(QObject):
 
     @property
     def rectangle(self) -> Rectangle:
-        """Where it is."""
+        """The rectangle in mm."""
         at, size = self._roi.pos(), self._roi.size()
         wide, high = (max(abs(float(v)), LEAST_MM) for v in (size.x(), size.y()))
         return Rectangle((float(at.x()) + 0.5 * wide, float(at.y()) + 0.5 * high), (wide, high))

@@ -1,4 +1,4 @@
-"""The cross-section: depth along the line, and what is read off it."""
+"""The cross-section: depth along the line, and its measurements."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QFrame,
     QHBoxLayout,
     QPushButton,
@@ -18,8 +17,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.inspect.cuts import Cut, Section
-from app.inspect.profile_plot import ProfilePlot
+from app.view2d.cuts import Cut, Section
+from app.view2d.profile_plot import ProfilePlot
+from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core.measurement.measured import Measured
@@ -28,17 +28,19 @@ from gelpolight_core.translation import tr
 FIRST, SECOND = QColor(11, 92, 173, 60), QColor(23, 138, 70, 60)
 DEG = "deg"
 SIDE_WIDTH = 186
+# Those of ISO 21920-3 that fit on a sensor.
+CUTOFFS_MM = (0.25, 0.8, 2.5)
 
 
 class SectionPanel(QWidget):
-    """Shows the profile with two ranges to be compared, and the level of the width.
+    """Shows the profile with two ranges to compare, and the level of the width.
 
     Signals
     -------
     changed()
         A range, the width, the level, or whether the rectangle is measured has changed.
     save_wanted()
-        The profile shall be written to a file.
+        The user wants to save the profile.
     """
 
     changed = Signal()
@@ -51,7 +53,7 @@ class SectionPanel(QWidget):
         self.cut = Cut()
         self._make_plot()
         self._width = named(
-            QDoubleSpinBox(), "inspect.section.width", tr("Width"),
+            DoubleSpinBox(), "inspect.section.width", tr("Width"),
             tr("Depth is averaged over this width across the line"),
         )  # fmt: skip
         self._width.setRange(0.0, 5.0)
@@ -60,17 +62,18 @@ class SectionPanel(QWidget):
         self._width.setSuffix(tr(" mm wide"))
         self._width.valueChanged.connect(self.changed)
         self._region = named(
-            QCheckBox(tr("Roughness")), "inspect.section.region", tr("Measure the roughness"),
-            tr("Sa, Sq and Sz in a rectangle on the height map"),
+            QCheckBox(tr("Roughness")), "inspect.section.region", tr("Measure roughness"),
+            tr("Measure Sa, Sq and Sz in a rectangle on the height map"),
         )  # fmt: skip
         self._region.toggled.connect(self.changed)
         self._make_level()
+        self._make_cutoff()
         save = named(
             QPushButton(tr("Save…")), "inspect.section.save", tr("Save the profile"),
-            tr("As a table (CSV)"),
+            tr("Save as a table (CSV)"),
         )  # fmt: skip
         save.clicked.connect(self.save_wanted)
-        self._figures = named(MarkupLabel(), "inspect.section.figures", tr("Measured"))
+        self._figures = named(MarkupLabel(), "inspect.section.figures", tr("Measurements"))
         self._figures.setWordWrap(True)
         self._figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         scroll = QScrollArea()
@@ -85,6 +88,7 @@ class SectionPanel(QWidget):
         side = QVBoxLayout()
         side.addWidget(self._width)
         side.addWidget(self._level)
+        side.addWidget(self._cutoff)
         side.addLayout(last)
         side.addWidget(scroll, 1)
         row = QHBoxLayout(self)
@@ -95,7 +99,10 @@ class SectionPanel(QWidget):
     def _make_plot(self) -> None:
         self._plot = ProfilePlot("inspect.section.plot")
         self._plot.setToolTip(
-            tr("Drag the two bands to compare them, and the dashed line to measure the width there")
+            tr(
+                "Drag the two bands to compare two ranges. Drag the dashed line to set the "
+                "depth of the width"
+            )
         )
         self._plot.allow_level()
         self._ranges = []
@@ -109,26 +116,43 @@ class SectionPanel(QWidget):
 
     def _make_level(self) -> None:
         self._level = named(
-            QDoubleSpinBox(), "inspect.section.level", tr("Depth at which the width is measured"),
-            tr("Depth at which the width is measured; 0: half way up"),
+            DoubleSpinBox(), "inspect.section.level", tr("Depth at which the width is measured"),
+            tr("Depth at which the width is measured. 0: half of the height"),
         )  # fmt: skip
         self._level.setRange(0.0, 5.0)
         self._level.setDecimals(3)
         self._level.setSingleStep(0.01)
-        self._level.setSpecialValueText(tr("width half way up"))
+        self._level.setSpecialValueText(tr("width at half height"))
         self._level.setPrefix(tr("width at "))
         self._level.setSuffix(tr(" mm"))
         self._level.valueChanged.connect(self.changed)
         self._plot.level_dragged.connect(self._level.setValue)
 
+    def _make_cutoff(self) -> None:
+        self._cutoff = named(
+            ComboBox(), "inspect.section.cutoff", tr("Roughness of the line"),
+            tr("Measure Ra, Rq and Rz along the line (ISO 21920). The cut-off separates roughness "
+               "from waviness"),
+        )  # fmt: skip
+        self._cutoff.addItem(tr("no line roughness"), None)
+        for cutoff_mm in CUTOFFS_MM:
+            self._cutoff.addItem(tr("Ra, Rq, Rz: cut-off {c:g} mm").format(c=cutoff_mm), cutoff_mm)
+        self._cutoff.currentIndexChanged.connect(lambda _: self.changed.emit())
+
+    @property
+    def cutoff_mm(self) -> float | None:
+        """Cut-off of the roughness of the line. None: it is not measured."""
+        chosen = self._cutoff.currentData()
+        return None if chosen is None else float(chosen)
+
     @property
     def width_mm(self) -> float:
-        """Over which depth is averaged."""
+        """Width across the line over which depth is averaged."""
         return float(self._width.value())
 
     @property
     def level_mm(self) -> float | None:
-        """Depth at which the width is measured; None: half way."""
+        """Depth at which the width is measured. None: half of the height."""
         value = float(self._level.value())
         return value if value > 0.0 else None
 
@@ -148,7 +172,7 @@ class SectionPanel(QWidget):
         return low, high
 
     def show_cut(self, cut: Cut) -> None:
-        """Show what was measured of a frame."""
+        """Show the measurements of a frame."""
         self.cut = cut
         if cut.profile is not None:
             self._follow_length(float(cut.profile.along_mm[-1]))
@@ -159,7 +183,7 @@ class SectionPanel(QWidget):
         )
 
     def _follow_length(self, length: float) -> None:
-        """Keep the ranges at their shares of a line that became longer or shorter."""
+        """Keep the ranges at the same shares of a line whose length changed."""
         if abs(length - self._length) < 1e-6:
             return
         shares = self.ranges
@@ -173,7 +197,7 @@ class SectionPanel(QWidget):
 
 
 def figure_lines(figures: Sequence[Measured]) -> list[str]:
-    """Return measured values as lines of markup; the slopes of the two ranges are told apart."""
+    """Return measured values as lines of markup. The slopes of the two ranges are labelled."""
     lines, seen = [], 0
     for figure in figures:
         where = ""

@@ -1,4 +1,4 @@
-"""All views of the page as docks: moved, tabbed, hidden, and found again as they were left."""
+"""All views of the page as docks that can be moved, tabbed and hidden. The layout is saved."""
 
 from __future__ import annotations
 
@@ -7,53 +7,55 @@ from PySide6.QtWidgets import (
     QDockWidget,
     QMainWindow,
     QMenu,
-    QScrollArea,
     QToolBar,
     QToolButton,
     QWidget,
 )
 
-from app.inspect.cuts import Cut, Section
-from app.inspect.draped import DrapedLine
-from app.inspect.height_panel import HeightPanel
-from app.inspect.look import Look, look_as_text, look_from_text
-from app.inspect.look_panel import LookPanel
+from app.bench.bench_area import BenchArea
+from app.context.context import AppContext
+from app.context.source_button import SourceButton
+from app.inspect.display_panel import DisplayPanel
 from app.inspect.normals_panel import NormalsPanel
-from app.inspect.products import Shown, Wanted
 from app.inspect.quality_panel import QualityPanel
 from app.inspect.section_line import INK, REGION_INK, RegionBox, SectionLine
 from app.inspect.section_panel import SectionPanel
-from app.inspect.surface_panel import SurfacePanel, preset_names
+from app.live.frame_results import Shown, Wanted
+from app.live.height_panel import HeightPanel
+from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
-from app.live.picture_view import PictureView
-from app.shell.actions import make_action
-from app.shell.context import AppContext
-from app.shell.jobs import Jobs
+from app.services.jobs import Jobs
+from app.view2d.cuts import Cut, Section
+from app.view2d.display import Display, display_as_text, display_from_text
+from app.view2d.map_view import MapView
+from app.view2d.quantities import Reference, quantity_names
+from app.view3d.panel import SurfacePanel, view_names
+from app.view3d.surface import SurfaceLine
+from app.widgets.actions import make_action
 from app.widgets.naming import named
-from app.widgets.source_button import SourceButton
 from gelpolight_core.translation import tr
 
-# Raised when views are added, so that an older layout is not forced onto them.
+# Raised when views are added, so that an old layout is not applied to them.
 LAYOUT_VERSION = 2
 AREAS = Qt.DockWidgetArea
 
 
 class Views(QMainWindow):
-    """Holds the views and tells what they need.
+    """Holds the views and reports what they need.
 
     Signals
     -------
     wanted_changed()
-        Something was shown, hidden, or is to be shown otherwise.
+        A view was shown or hidden, or needs other content.
     pointed(float, float)
-        Place (x, y) under the pointer in one of the views, mm; NaN for none.
-    picture_pointed(float, float)
-        Pixel (u, v) under the pointer in the camera's picture; NaN for none.
+        Position (x, y) under the pointer in one of the views, mm. NaN for none.
+    image_pointed(float, float)
+        Pixel (u, v) under the pointer in the camera image. NaN for none.
     """
 
     wanted_changed = Signal()
     pointed = Signal(float, float)
-    picture_pointed = Signal(float, float)
+    image_pointed = Signal(float, float)
 
     def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
         super().__init__()
@@ -61,16 +63,20 @@ class Views(QMainWindow):
         self.setWindowFlags(Qt.WindowType.Widget)
         self.setDockNestingEnabled(True)
         self._context = context
-        self.surface = SurfacePanel(jobs)
-        self.height = HeightPanel()
+        self.surface = SurfacePanel(
+            jobs,
+            settings=context.settings,
+            flat=lambda: MapView("inspect.surface.flat", tr("Shaded map")),
+        )
+        self.reference: Reference | None = None
+        self.height = HeightPanel(adjustable=True)
         self.normals = NormalsPanel()
         self.quality = QualityPanel()
-        self.camera = PictureView()
+        self.camera = ImageView()
         self.section = SectionPanel()
         self.line, self.region = SectionLine(self.height.map), RegionBox(self.height.map)
-        self.look = LookPanel()
-        self._bench = QScrollArea()
-        self._bench.setWidgetResizable(True)
+        self.display = DisplayPanel()
+        self._bench = BenchArea(context.source)
         self.docks: dict[str, QDockWidget] = {}
         self._visible: dict[str, bool] = {}
         self._has_depth = False
@@ -96,7 +102,7 @@ class Views(QMainWindow):
         return bar
 
     def add_to_bar(self, widget: QWidget) -> None:
-        """Put a control beside the choice of the camera."""
+        """Add a control next to the camera button."""
         self.bar.insertWidget(self.bar.actions()[-1], widget)
 
     def _make_docks(self) -> None:
@@ -107,7 +113,7 @@ class Views(QMainWindow):
             ("normals", tr("Normals"), self.normals, "Alt+4"),
             ("quality", tr("Quality"), self.quality, "Alt+5"),
             ("section", tr("Cross-section"), self.section, "Alt+6"),
-            ("look", tr("Display"), self.look, "Alt+7"),
+            ("look", tr("Display"), self.display, "Alt+7"),
             ("bench", tr("Virtual bench"), self._bench, "Alt+8"),
         )
         for name, title, widget, keys in table:
@@ -123,12 +129,12 @@ class Views(QMainWindow):
             self._menu.addAction(action)
         self._menu.addSeparator()
         self._menu.addAction(
-            make_action(self, "inspect.layout", tr("Arrange as at first"), self.arrange)
+            make_action(self, "inspect.layout", tr("Reset the layout"), self.arrange)
         )
         self.arrange()
 
     def arrange(self) -> None:
-        """Put the views where they are at first."""
+        """Restore the default layout."""
         docks = self.docks
         for dock in docks.values():
             self.removeDockWidget(dock)
@@ -156,29 +162,32 @@ class Views(QMainWindow):
     def _connect(self) -> None:
         for view in (self.height.map, self.normals.map, self.quality.map, self.surface):
             view.pointed.connect(self.pointed)
-        self.camera.pointed.connect(self.picture_pointed)
-        self.camera.clicked.connect(self._on_picture_clicked)
-        self.look.changed.connect(self._on_look)
+        self.camera.pointed.connect(self.image_pointed)
+        self.camera.clicked.connect(self._on_image_clicked)
+        self.display.changed.connect(self._on_display)
+        self.surface.menu.colour_chosen.connect(self.display.colour_by)
+        self.height.range_dragged.connect(self.display.lock_range)
+        self.height.range_released.connect(self.display.unlock_range)
         self.quality.chosen.connect(self.wanted_changed)
         self.normals.chosen.connect(self.wanted_changed)
         for part in (self.line, self.region):
             part.moved.connect(self._lay_lines)
             part.moved.connect(self.wanted_changed)
         self.section.changed.connect(self._on_section)
-        for name, (text, keys) in preset_names().items():
+        for name, (text, keys) in view_names().items():
             make_action(
                 self, f"inspect.look_{name}", tr("3D: {name}").format(name=text),
-                lambda name=name: self.surface.look_from(name), keys=(keys,),
+                lambda name=name: self.surface.view_from(name), keys=(keys,),
             )  # fmt: skip
         make_action(
-            self, "inspect.lock", tr("Lock the range of colours"), self.look.toggle_lock,
+            self, "inspect.lock", tr("Lock the colour range"), self.display.toggle_lock,
             keys=("K",),
         )  # fmt: skip
 
-    # What the page asks
+    # Called by the page
 
     def wanted(self) -> Wanted:
-        """Return what is to be made of the frames: what is shown and no more."""
+        """Return what to compute from the frames: only what is shown."""
         shown = self._visible
         return Wanted(
             surface=shown["surface"],
@@ -188,20 +197,21 @@ class Views(QMainWindow):
             quality=self.quality.what if shown["quality"] else "",
             section=self._section() if shown["section"] else None,
             region=self.region.rectangle if self._measures_region() else None,
-            look=self.look.look,
+            display=self.display.display,
+            reference=self.reference,
         )
 
     def _section(self) -> Section:
         start, end = self.line.ends_mm
         first, second = self.section.ranges
         panel = self.section
-        return Section(start, end, panel.width_mm, first, second, panel.level_mm)
+        return Section(start, end, panel.width_mm, first, second, panel.level_mm, panel.cutoff_mm)
 
     def _measures_region(self) -> bool:
         return self._visible["section"] and self.section.has_region
 
     def show_frame(self, shown: Shown, *, still: bool) -> None:
-        """Show a frame in every view that is shown."""
+        """Show a frame in every visible view."""
         if shown.camera is not None:
             rows, columns = shown.frame.rgb.shape[:2]
             self.camera.show_rgb(shown.camera, size=(columns, rows))
@@ -212,8 +222,8 @@ class Views(QMainWindow):
             self._on_section()
         if shown.surface is not None:
             self.surface.show_surface(shown.surface)
-        self.height.show_frame(shown, self.look.look.colours)
-        self.look.show_range(*shown.range_mm)
+        self.height.show_frame(shown, self.display.display.colours, still=still)
+        self.display.show_range(*shown.range_mm)
         self.normals.show_frame(shown)
         if self._visible["quality"]:
             self.quality.show_frame(shown, still=still)
@@ -221,12 +231,12 @@ class Views(QMainWindow):
             self.section.show_cut(shown.cut)
 
     def prepare(self) -> None:
-        """Load what the shown views need, before the first depth comes."""
+        """Load what the visible views need, before the first depth arrives."""
         if self._visible["surface"]:
             self.surface.load()
 
     def forget(self) -> None:
-        """Show no depth: there is another calibration or source, or none."""
+        """Clear the depth: the calibration or source changed, or there is none."""
         words = tr("No depth yet.")
         self._has_depth = False
         self._on_section()
@@ -236,49 +246,52 @@ class Views(QMainWindow):
         self.section.show_cut(Cut())
 
     def show_cursor(self, x_mm: float, y_mm: float) -> None:
-        """Mark a place in every view of the depth."""
+        """Mark a position in every view of the depth."""
         for view in (self.height.map, self.normals.map, self.quality.map, self.surface):
             view.show_cursor(x_mm, y_mm)
 
+    def compare_with(self, reference: Reference | None) -> None:
+        """Show the difference from this height map in 3D from now on. None: no difference."""
+        self.reference = reference
+        self.display.colour_by("depth" if reference is None else "difference")
+        self.wanted_changed.emit()
+
     def show_pixel(self, pixel: tuple[float, float] | None) -> None:
-        """Mark a pixel in the camera's picture."""
+        """Mark a pixel in the camera image."""
         markers = () if pixel is None else (Marker(*pixel, "cross", "info"),)
         width, height = self.camera.picture_size
         self.camera.overlay.set_overlay(Overlay(markers=markers), (max(width, 1), max(height, 1)))
 
     def follow_source(self) -> None:
-        """Have the bench beside the views where the virtual sensor is the camera."""
-        source = self._context.source
-        virtual = source.info is not None and source.info.kind == "virtual"
-        dock = self.docks["bench"]
+        """Show the bench next to the views if the virtual sensor is the camera."""
+        virtual, dock = self._bench.follow(), self.docks["bench"]
         dock.toggleViewAction().setVisible(virtual)
-        if virtual and source.bench is not None and self._bench.widget() is None:
-            from app.bench.bench_panel import BenchPanel  # only the demo needs it
-
-            self._bench.setWidget(BenchPanel(bench=source.bench))
         dock.setVisible(virtual)
-        if source.info is None:
+        if self._context.source.info is None:
             self.camera.show_rgb(None)
+            self.camera.say(tr("No camera. Select a source."))
+        else:
+            self.camera.say(tr("Waiting for the first image of the camera."))
 
     # Layout
 
     def restore(self) -> None:
-        """Arrange the views and show depth as they were left."""
-        self.look.show_look(look_from_text(self._context.settings.look))
-        self._on_look()
+        """Restore the saved layout and display settings."""
+        self.display.show_display(display_from_text(self._context.settings.display("look")))
+        self._on_display()
         state = self._context.settings.layout("inspect")
         if not state.isEmpty():
             self.restoreState(state, LAYOUT_VERSION)
         self.follow_source()
 
     def keep(self) -> None:
-        """Remember how the views are arranged, and how they show depth."""
+        """Save the layout and display settings."""
         state: QByteArray = self.saveState(LAYOUT_VERSION)
         self._context.settings.keep_layout("inspect", state)
-        self._context.settings.look = look_as_text(self.look.look)
+        self._context.settings.keep_display("look", display_as_text(self.display.display))
 
     def finish(self) -> None:
-        """Give back what the views hold."""
+        """Release the resources of the views."""
         self.surface.finish()
 
     # Slots
@@ -286,8 +299,8 @@ class Views(QMainWindow):
     def _on_visible(self, name: str, on: bool) -> None:
         self._visible[name] = on
         maps = {"height": self.height, "normals": self.normals, "quality": self.quality}
-        if on and self._has_depth and name in maps and not maps[name].map.has_picture:
-            maps[name].map.say(tr("One moment."))
+        if on and self._has_depth and name in maps and not maps[name].map.has_image:
+            maps[name].map.say(tr("Please wait."))
         if name == "section":
             self._on_section()
         else:
@@ -301,21 +314,22 @@ class Views(QMainWindow):
         self.wanted_changed.emit()
 
     def _lay_lines(self) -> None:
-        """Show on the surface where it is measured."""
+        """Show the section line on the surface."""
         lines = []
         if self._visible["section"]:
-            lines.append(DrapedLine(self.line.ends_mm, INK))
+            lines.append(SurfaceLine(self.line.ends_mm, INK))
         if self._measures_region():
             corners = self.region.rectangle.outline_mm
-            lines.append(DrapedLine(tuple((float(x), float(y)) for x, y in corners), REGION_INK))
+            lines.append(SurfaceLine(tuple((float(x), float(y)) for x, y in corners), REGION_INK))
         self.surface.show_lines(tuple(lines))
 
-    def _on_look(self) -> None:
-        look: Look = self.look.look
-        self.surface.set_exaggeration(look.exaggeration)
+    def _on_display(self) -> None:
+        display: Display = self.display.display
+        self.surface.set_exaggeration(display.exaggeration)
+        self.surface.menu.set_colours(quantity_names(), display.colour_by)
         self.wanted_changed.emit()
 
-    def _on_picture_clicked(self, u: float, v: float) -> None:
+    def _on_image_clicked(self, u: float, v: float) -> None:
         source = self._context.source
         if source.info is not None and source.info.kind == "virtual" and source.bench is not None:
             source.bench.drag_to(u, v)

@@ -1,1 +1,1 @@
-"""The live picture: shown, checked, drawn upon."""
+"""The live image: display, checks and overlays."""

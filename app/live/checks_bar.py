@@ -1,4 +1,4 @@
-"""The line below the picture: the pixel under the pointer, focus, exposure, rate."""
+"""The bar below the image: pixel under the pointer, focus, exposure, frame rate."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QPalette, QPen, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
-from app.live.picture_checks import Exposure
+from app.live.image_checks import Exposure
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.naming import named
 from gelpolight_core.quality import Verdict
 from gelpolight_core.translation import tr
 
-# Below this the advice and the focus have no room side by side.
+# Below this width the advice and the focus bar do not fit side by side.
 NARROW = 620
 
 SIGNS = {Verdict.PASS: "\u2713", Verdict.WARN: "!", Verdict.FAIL: "\u2715"}
 
 
 class FocusBar(QWidget):
-    """How sharp the picture is against the sharpest of late; full is as sharp as it was."""
+    """Sharpness of the image relative to the recent best; full means as sharp as the best."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -27,11 +27,11 @@ class FocusBar(QWidget):
             self,
             "live.focus",
             tr("Focus"),
-            tr("Turn the lens until the bar is full and falls on either side"),
+            tr("Turn the lens until the bar is full and drops in both directions"),
         )
         self.share = 0.0
         policy = QSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        # Stills have no focus to turn to; the picture above must not jump for that.
+        # Still images have no focus to adjust; the image above must not jump because of that.
         policy.setRetainSizeWhenHidden(True)
         self.setSizePolicy(policy)
 
@@ -55,7 +55,8 @@ class FocusBar(QWidget):
         painter.setPen(QPen(palette.color(QPalette.ColorRole.Mid), 1.0))
         painter.setBrush(palette.color(QPalette.ColorRole.Base))
         painter.drawRoundedRect(frame, 3.0, 3.0)
-        # Two in three of the bar for the last third of the way, where the hand goes slowly.
+        # The last third of the range takes two thirds of the bar, because fine adjustment happens
+        # there.
         filled = QRectF(frame)
         filled.setWidth(frame.width() * self.share**3)
         tint = palette.color(QPalette.ColorRole.Highlight)
@@ -68,20 +69,20 @@ class FocusBar(QWidget):
 
 
 class ChecksBar(QWidget):
-    """Words and figures about the picture above: two lines, or four beneath a narrow one.
+    """Texts and figures about the image above: two lines, or four below a narrow one.
 
-    How many they are depends on the width alone, so that nothing jumps when a word changes.
+    The number of lines depends only on the width, so that nothing jumps when a text changes.
     """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        named(self, "live.checks", tr("Picture checks"))
+        named(self, "live.checks", tr("Image checks"))
         self.focus = FocusBar()
         self._exposure = named(PlainLabel(), "live.exposure", tr("Exposure"))
         self._pixel = named(PlainLabel(), "live.pixel", tr("Pixel under the pointer"))
         self._rate = named(PlainLabel(), "live.rate", tr("Frame rate"))
         self._rate.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        # Long words are cut off rather than widening the window.
+        # Long texts are cut off instead of widening the window.
         self._exposure.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._pixel.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._grid = QGridLayout(self)
@@ -92,7 +93,7 @@ class ChecksBar(QWidget):
         self._arrange(narrow=False)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give long advice a second line where one is too short."""
+        """Give long advice a second line if one is too short."""
         super().resizeEvent(event)
         self._arrange(narrow=event.size().width() < NARROW)
 
@@ -100,21 +101,21 @@ class ChecksBar(QWidget):
         if narrow == self._narrow:
             return
         self._narrow = narrow
-        places = {
+        cells = {
             self._exposure: (0, 0, 1, 2) if narrow else (0, 0, 1, 1),
             self.focus: (2, 0, 1, 1) if narrow else (0, 1, 1, 1),
             self._pixel: (1, 0, 1, 2) if narrow else (1, 0, 1, 1),
             self._rate: (2, 1, 1, 1) if narrow else (1, 1, 1, 1),
         }
-        for widget, place in places.items():
+        for widget, cell in cells.items():
             self._grid.removeWidget(widget)
-            self._grid.addWidget(widget, *place)
+            self._grid.addWidget(widget, *cell)
         self._exposure.setWordWrap(narrow)
         lines = 2 if narrow else 1
         self._exposure.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
 
     def show_exposure(self, exposure: Exposure | None) -> None:
-        """Show the advice about the exposure; None for nothing."""
+        """Show the advice about the exposure; None for no text."""
         text = f"{SIGNS[exposure.verdict]} {exposure.advice}" if exposure else ""
         if text != self._exposure.text():
             self._exposure.setText(text)
@@ -126,7 +127,7 @@ class ChecksBar(QWidget):
             self._pixel.setText(text)
 
     def show_rate(self, text: str) -> None:
-        """Show the frame rate and what was lost."""
+        """Show the frame rate and the number of dropped frames."""
         if text != self._rate.text():
             self._rate.setText(text)
             self._rate.setToolTip(plain_tip(text))

@@ -1,7 +1,7 @@
-"""Draws an overlay over the picture of a pyqtgraph view.
+"""Draws an overlay on the image of a pyqtgraph view.
 
-Everything is drawn at one width on the screen whatever the zoom, twice: a dark line below a bright
-one, which can be seen on any picture. What a colour means is also told by shape, dashes or words.
+Everything is drawn at a constant width on the screen, twice: a dark line below a bright one, which
+is visible on any image. Shape, dashes or text repeat what the colour means.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from app.live.handles import (
 )
 from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay, Role
 
-# Told apart by people who see no red or no green, too: they differ in brightness.
+# Distinguishable without red-green vision, too: the colours differ in brightness.
 ROLE_COLOURS: dict[Role, str] = {
     "good": "#3ddc84",
     "bad": "#ff6b5e",
@@ -34,30 +34,30 @@ ROLE_COLOURS: dict[Role, str] = {
     "led2": "#8fb4ff",
     "info": "#e8eef5",
 }
-# A word's worth of meaning before each note, for those to whom the colours look alike.
+# A word before each note, for users who cannot distinguish the colours.
 NOTE_SIGNS: dict[Role, str] = {"good": "\u2713", "bad": "\u2715", "expected": "?"}
 HALO = QColor(0, 0, 0, 170)
 PLATE = QColor(0, 0, 0, 150)
 MARKER_PX = 7.0
 GRIP_PX = 4.0
-# How near to a handle the pointer must be, in screen pixels: a fingertip's worth of tremor.
+# How near to a handle the pointer must be, in screen pixels.
 REACH_PX = 12.0
 MASK_ALPHA = 95
 
 
 class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
-    """Shows an overlay in picture coordinates and lets its handles be dragged.
+    """Shows an overlay in image coordinates; its handles can be dragged.
 
     Signals
     -------
     handle_moved(Handle)
         A drag ended.
-    handle_taken(str)
-        A handle was taken hold of.
+    handle_grabbed(str)
+        A handle was grabbed.
     """
 
     handle_moved = Signal(object)
-    handle_taken = Signal(str)
+    handle_grabbed = Signal(str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -69,23 +69,23 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         self.selected = ""
 
     def set_overlay(self, overlay: Overlay, size: tuple[int, int]) -> None:
-        """Show `overlay` over a picture of `size` (width, height)."""
+        """Show `overlay` on an image of `size` (width, height)."""
         if size != self._size:
             self.prepareGeometryChange()
             self._size = size
         if overlay.masks != self._overlay.masks:
-            self._masks = [_mask_picture(mask) for mask in overlay.masks if mask.area.any()]
-        # A result that comes in while a person drags must not tear the handle away.
+            self._masks = [_mask_image(mask) for mask in overlay.masks if mask.area.any()]
+        # A new result must not move the handle during a drag.
         self._overlay = overlay if self._dragged is None else with_handle(overlay, self._dragged)
         self.update()
 
     @property
     def handles(self) -> tuple[Handle, ...]:
-        """What can be moved."""
+        """The handles that can be moved."""
         return handles_of(self._overlay)
 
     def place(self, handle: Handle) -> None:
-        """Show a handle at another place."""
+        """Show a handle at another position."""
         self._overlay = with_handle(self._overlay, handle)
         self.update()
 
@@ -96,7 +96,7 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
 
     def boundingRect(self) -> QRectF:  # noqa: D102
         width, height = self._size
-        # Marks have a width on the screen, of which the picture's coordinates know nothing.
+        # Marks have a constant width on the screen, which does not scale with the image.
         return QRectF(-0.5 * width, -0.5 * height, 2.0 * width, 2.0 * height)
 
     def hoverEvent(self, event: Any) -> None:  # noqa: D102
@@ -139,11 +139,11 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
     def _take(self, over: tuple[Handle, Grip]) -> None:
         self._held = over
         self.select(over[0].name)
-        self.handle_taken.emit(over[0].name)
+        self.handle_grabbed.emit(over[0].name)
 
-    def _grip_at(self, place: QPointF) -> tuple[Handle, Grip] | None:
+    def _grip_at(self, position: QPointF) -> tuple[Handle, Grip] | None:
         width_px = self.pixelLength(pg.Point(1.0, 0.0)) or 1.0
-        return find_grip(self.handles, place.x(), place.y(), reach_px=REACH_PX * width_px)
+        return find_grip(self.handles, position.x(), position.y(), reach_px=REACH_PX * width_px)
 
     def paint(self, painter: QPainter, *_: Any) -> None:  # noqa: D102
         self._paint_masks(painter)
@@ -161,29 +161,29 @@ class OverlayItem(pg.GraphicsObject):  # type: ignore[misc]
         painter.restore()
 
     def _paint_masks(self, painter: QPainter) -> None:
-        for place, picture in self._masks:
-            painter.drawImage(place, picture)
+        for position, image in self._masks:
+            painter.drawImage(position, image)
 
 
-def _mask_picture(mask: Mask) -> tuple[QRectF, QImage]:
-    """Return a tint for the true pixels, one byte a pixel, coloured by a table, and its place.
+def _mask_image(mask: Mask) -> tuple[QRectF, QImage]:
+    """Return a tint for the true pixels, one byte per pixel with a colour table, and its position.
 
-    No more than these pixels: a few small spots would otherwise cost as much at each frame as the
-    whole picture does, several times over.
+    It covers only these pixels: a few small spots would otherwise cost several times as much per
+    frame as the whole image.
     """
     left, top, columns, rows = cv2.boundingRect(np.ascontiguousarray(mask.area).view(np.uint8))
-    # Qt wants every line to begin at a multiple of four bytes.
+    # Qt requires every line to begin at a multiple of four bytes.
     padded = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
     padded[:, :columns] = mask.area[top : top + rows, left : left + columns]
-    picture = QImage(padded.data, columns, rows, padded.shape[1], QImage.Format.Format_Indexed8)
+    image = QImage(padded.data, columns, rows, padded.shape[1], QImage.Format.Format_Indexed8)
     tint = QColor(ROLE_COLOURS[mask.role])
     tint.setAlpha(MASK_ALPHA)
-    picture.setColorTable([0, tint.rgba()])
-    return QRectF(left - 0.5, top - 0.5, columns, rows), picture.copy()
+    image.setColorTable([0, tint.rgba()])
+    return QRectF(left - 0.5, top - 0.5, columns, rows), image.copy()
 
 
 def _stroke(painter: QPainter, role: Role, draw: Any, *, width: float = 1.6) -> None:
-    """Draw twice: a dark halo, then the role's colour; what is expected is dashed."""
+    """Draw twice: a dark halo, then the role's colour; expected items are dashed."""
     dashed = Qt.PenStyle.DashLine if role == "expected" else Qt.PenStyle.SolidLine
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for pen in (
@@ -197,7 +197,7 @@ def _stroke(painter: QPainter, role: Role, draw: Any, *, width: float = 1.6) -> 
 def _paint_line(painter: QPainter, line: Line, to_screen: QTransform) -> None:
     polygon = to_screen.map(QPolygonF([QPointF(u, v) for u, v in line.points]))
     draw = painter.drawPolygon if line.closed else painter.drawPolyline
-    # What is only told for information stays thin: there may be a dozen earlier views of it.
+    # Information stays thin: there may be a dozen earlier views.
     if line.role == "info":
         painter.setBrush(Qt.BrushStyle.NoBrush)
         faint = QColor(ROLE_COLOURS["info"])
@@ -253,13 +253,13 @@ def _paint_marker(painter: QPainter, marker: Marker, to_screen: QTransform, sele
             width=2.4 if selected else 1.0,
         )
     if marker.text:
-        # What is expected lies near what was found: their words must not lie on each other.
+        # Expected items are close to the found ones: their texts must not overlap.
         beside = QPointF(x, y + s + 6.0 if marker.role == "expected" else y - s)
         _paint_text(painter, beside, marker.text, marker.role, gap=s + 5.0)
 
 
 def _paint_text(painter: QPainter, at: QPointF, text: str, role: Role, *, gap: float = 0.0) -> None:
-    """Write on a dark plate, `gap` to the right of a point, or to its left where the view ends."""
+    """Write on a dark plate, `gap` to the right of a point, or to its left at the view's edge."""
     metrics = QFontMetricsF(painter.font())
     width, height = metrics.horizontalAdvance(text) + 8.0, metrics.height() + 2.0
     view = QRectF(painter.window())

@@ -1,4 +1,4 @@
-"""Handles: the items of an overlay that a person may drag or nudge; no Qt in here."""
+"""Handles: the items of an overlay that the user can drag or move by key; no Qt in here."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from enum import Enum
 
 from app.live.overlay import Circle, Marker, Overlay
 
-# Below this a circle could no longer be told from its centre, nor be taken hold of.
+# Below this radius a circle could not be distinguished from its centre, or grabbed.
 LEAST_RADIUS_PX = 1.0
 
 
 class Grip(Enum):
-    """Which part of a handle is held."""
+    """The grabbed part of a handle."""
 
     CENTRE = "centre"
     RADIUS = "radius"
@@ -30,13 +30,13 @@ class Handle:
     radius_px: float = 0.0
 
     @property
-    def grip_place(self) -> tuple[float, float]:
-        """Where a circle is taken hold of to resize it: its rightmost point."""
+    def grip_position(self) -> tuple[float, float]:
+        """The resize point of a circle: its rightmost point."""
         return self.u + self.radius_px, self.v
 
 
 def handles_of(overlay: Overlay) -> tuple[Handle, ...]:
-    """Return what can be moved, in the order in which the keyboard goes through it."""
+    """Return all handles, in the order of the keyboard."""
     circles = (Handle(c.handle, c.u, c.v, c.radius_px) for c in overlay.circles if c.handle)
     markers = (Handle(m.handle, m.u, m.v) for m in overlay.markers if m.handle)
     return (*circles, *markers)
@@ -45,12 +45,12 @@ def handles_of(overlay: Overlay) -> tuple[Handle, ...]:
 def find_grip(
     handles: Iterable[Handle], u: float, v: float, *, reach_px: float
 ) -> tuple[Handle, Grip] | None:
-    """Return the handle nearest to a point and which part of it, None beyond `reach_px`."""
+    """Return the handle nearest to a point and its part; None beyond `reach_px`."""
     near: list[tuple[float, Handle, Grip]] = []
     for handle in handles:
         near.append((math.hypot(handle.u - u, handle.v - v), handle, Grip.CENTRE))
         if handle.radius_px > 0.0:
-            # The whole rim resizes, so that nobody has to hunt for the small square.
+            # The whole rim resizes, so that nobody has to aim at the small square.
             off = abs(math.hypot(handle.u - u, handle.v - v) - handle.radius_px)
             near.append((off, handle, Grip.RADIUS))
     near = [item for item in near if item[0] <= reach_px]
@@ -67,7 +67,7 @@ def drag(
     now: tuple[float, float],
     size: tuple[int, int],
 ) -> Handle:
-    """Return a handle after a drag from `start` to `now`, its centre kept in the picture."""
+    """Return a handle after a drag from `start` to `now`; its centre stays in the image."""
     if grip is Grip.RADIUS:
         before = math.hypot(start[0] - handle.u, start[1] - handle.v)
         after = math.hypot(now[0] - handle.u, now[1] - handle.v)
@@ -76,7 +76,7 @@ def drag(
 
 
 def move(handle: Handle, du: float, dv: float, size: tuple[int, int]) -> Handle:
-    """Return a handle moved by pixels, its centre kept in the picture of `size` (width, height)."""
+    """Return a handle moved by pixels; its centre stays in the image of `size` (width, height)."""
     return replace(
         handle,
         u=min(max(handle.u + du, 0.0), size[0] - 1.0),
@@ -85,14 +85,14 @@ def move(handle: Handle, du: float, dv: float, size: tuple[int, int]) -> Handle:
 
 
 def resize(handle: Handle, by_px: float) -> Handle:
-    """Return a circle's handle with another radius; a marker has none and stays as it is."""
+    """Return a circle's handle with another radius; a marker has no radius and does not change."""
     if handle.radius_px <= 0.0:
         return handle
     return replace(handle, radius_px=max(handle.radius_px + by_px, LEAST_RADIUS_PX))
 
 
 def next_name(handles: Sequence[Handle], name: str, step: int) -> str:
-    """Return the name of the handle `step` places on from `name`, round and round."""
+    """Return the name of the handle `step` positions after `name`, cyclically."""
     names = [handle.name for handle in handles]
     if not names:
         return ""
@@ -102,7 +102,7 @@ def next_name(handles: Sequence[Handle], name: str, step: int) -> str:
 
 
 def with_handle(overlay: Overlay, handle: Handle) -> Overlay:
-    """Return an overlay whose item of that name is where the handle is."""
+    """Return an overlay with the item of that name moved to the handle."""
 
     def marker(item: Marker) -> Marker:
         return replace(item, u=handle.u, v=handle.v) if item.handle == handle.name else item

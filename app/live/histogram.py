@@ -1,4 +1,4 @@
-"""A small histogram of the three channels, laid over a corner of the picture."""
+"""A small histogram of the three channels over a corner of the image."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 MARGIN_PX = 6
-# Dashes tell the channels apart without colour, as the letters beside them say.
+# Line styles distinguish the channels without colour, together with the letters.
 CHANNELS: tuple[tuple[Role, str, Qt.PenStyle], ...] = (
     ("led0", tr("R"), Qt.PenStyle.SolidLine),
     ("led1", tr("G"), Qt.PenStyle.DashLine),
@@ -75,7 +75,7 @@ class Histogram(QWidget):
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.setPen(QPen(colour, 1.4, style))
         painter.drawPolyline(QPolygonF(points))
-        # The end of scale, where a pixel says nothing more, stands out as a bar of its own.
+        # The end of the scale, where a pixel is saturated, is a separate bar.
         painter.setPen(QPen(colour, 3.0))
         painter.drawLine(points[-1], QPointF(points[-1].x(), plot.bottom()))
 

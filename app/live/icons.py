@@ -1,4 +1,4 @@
-"""The picture tools' icons, drawn in the colour of the text around them."""
+"""The icons of the image tools, drawn in the colour of the text."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def tool_icon(name: str, colour: QColor, *, ratio: float = 2.0) -> QIcon:
     name : str
         One of ``ICONS``.
     colour : QColor
-        The text's, so that the icon follows the theme.
+        Colour of the text, so that the icon follows the theme.
     ratio : float, optional
         Screen pixels per point.
     """
-    picture = QPixmap(round(SIDE * ratio), round(SIDE * ratio))
-    picture.setDevicePixelRatio(ratio)
-    picture.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(picture)
+    pixmap = QPixmap(round(SIDE * ratio), round(SIDE * ratio))
+    pixmap.setDevicePixelRatio(ratio)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     pen = QPen(colour, 1.6)
     pen.setCapStyle(Qt.PenCapStyle.RoundCap)
@@ -33,7 +33,7 @@ def tool_icon(name: str, colour: QColor, *, ratio: float = 2.0) -> QIcon:
     painter.setPen(pen)
     ICONS[name](painter)
     painter.end()
-    return QIcon(picture)
+    return QIcon(pixmap)
 
 
 def _lines(painter: QPainter, *strokes: tuple[tuple[float, float], ...]) -> None:

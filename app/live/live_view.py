@@ -1,4 +1,4 @@
-"""The live picture with its tools: what every page shows of a camera."""
+"""The live image with its tools, used by every page that shows a camera."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.live.checks_bar import ChecksBar
 from app.live.handles import Handle, move, next_name, resize
 from app.live.histogram import Histogram
-from app.live.overlay import Overlay
-from app.live.picture_checks import (
+from app.live.image_checks import (
     BestFocus,
     Rgb,
     channel_histograms,
@@ -26,69 +25,70 @@ from app.live.picture_checks import (
     measure_focus,
     pixel_text,
 )
-from app.live.picture_view import PictureView
-from app.live.tools import PictureTools
+from app.live.image_view import ImageView
+from app.live.overlay import Overlay
+from app.live.tools import ImageTools
 from app.live.zebra import eight_bits, with_zebra
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.translation import tr
 
 TICK_MS = 16
-# Words and figures five times a second: faster than they can be read.
+# Texts and figures change five times per second; faster changes cannot be read.
 CHECK_S = 0.2
 RATE_S = 0.5
-# One pixel in nine: still a hundred thousand of a small camera.
+# One pixel in nine: still a hundred thousand for a small camera.
 CHECK_STRIDE = 3
 NUDGE_PX = 0.2
 LARGE_NUDGE_PX = 2.0
-# A nudge has ended when no key came for so long.
+# Moving by key ends when no key was pressed for this time.
 NUDGE_END_MS = 250
 ZOOM_STEP = 1.25
 CORNER_PX = 10
 
 
 class FrameLike(Protocol):
-    """What this view needs of a frame."""
+    """The part of a frame that this view needs."""
 
     @property
     def rgb(self) -> Rgb:
-        """(rows, columns, 3), never rewritten."""
+        """(rows, columns, 3), never changed."""
 
 
 class MailboxLike(Protocol):
-    """A slot that holds the newest frame."""
+    """A slot with the newest frame."""
 
     def take(self) -> FrameLike | None:
         """Return the frame and empty the slot."""
 
 
 class StreamLike(Protocol):
-    """Where frames come from."""
+    """A stream of frames."""
 
     @property
     def newest(self) -> MailboxLike:
-        """The newest frame, taken by this view alone."""
+        """The newest frame, read only by this view."""
 
     def figures(self) -> Any:
-        """Return the rate and what was lost."""
+        """Return the frame rate and the dropped frames."""
 
 
 class LiveView(QWidget):
-    """Shows a stream or a still, checks it, and lets a person put an overlay's handles right.
+    """Shows a stream or a still image with checks, and an overlay with movable handles.
 
     Signals
     -------
     moved(str, float, float, float)
-        Handle, u, v and radius (0 for a marker), after a drag or a nudge.
+        Handle, u, v and radius (0 for a marker), after a drag or a move by key.
     clicked(float, float)
         A left click at (u, v).
     dragged(str, float, float)
-        "begin", "move" or "end" of a drag, and where: see :meth:`hand_drags_on`.
+        "begin", "move" or "end" of a drag, and its position: see :meth:`hand_drags_on`.
     saved(str)
-        A snapshot was written to this file.
+        Path of the saved snapshot.
     refused(str)
-        A sentence: why a snapshot was not written.
+        Error message: why a snapshot was not saved.
     """
 
     moved = Signal(str, float, float, float)
@@ -101,20 +101,20 @@ class LiveView(QWidget):
         super().__init__(parent)
         named(self, "live", tr("Live view"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.snapshot_folder = _pictures_folder()
+        self.snapshot_folder = _default_folder()
         self._stream: StreamLike | None = None
         self._rgb: Rgb | None = None
         self._overlay = Overlay()
         self._best_focus = BestFocus()
         self._judges_focus = True
         self._checked_s = -math.inf
-        self._rate_told_s = -math.inf
+        self._rate_shown_s = -math.inf
         self._pointer = (math.nan, math.nan)
         self._shown_frames = 0
-        self._tools = PictureTools(self)
-        self._picture = PictureView()
+        self._tools = ImageTools(self)
+        self._image = ImageView()
         self._checks = ChecksBar()
-        self._histogram = Histogram(self._picture)
+        self._histogram = Histogram(self._image)
         self._histogram.hide()
         self._lay_out()
         self._connect()
@@ -124,22 +124,22 @@ class LiveView(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
         column.addWidget(self._tools)
-        column.addWidget(self._picture, 1)
+        column.addWidget(self._image, 1)
         column.addWidget(self._checks)
 
     def _connect(self) -> None:
         self._tools.pressed.connect(self._on_tool)
         self._tools.switched.connect(self._on_switch)
-        self._picture.pointed.connect(self._on_pointed)
-        self._picture.clicked.connect(self.clicked)
-        self._picture.dragged.connect(self.dragged)
-        self._picture.zoomed.connect(self._tools.show_zoom)
-        self._picture.resized.connect(self._place_histogram)
-        self._picture.overlay.handle_moved.connect(self._on_handle_moved)
+        self._image.pointed.connect(self._on_pointed)
+        self._image.clicked.connect(self.clicked)
+        self._image.dragged.connect(self.dragged)
+        self._image.zoomed.connect(self._tools.show_zoom)
+        self._image.resized.connect(self._place_histogram)
+        self._image.overlay.handle_moved.connect(self._on_handle_moved)
         self._tick = QTimer(self)
         self._tick.setTimerType(Qt.TimerType.PreciseTimer)
         self._tick.setInterval(TICK_MS)
-        self._tick.timeout.connect(self._take_newest)
+        self._tick.timeout.connect(self._show_newest_frame)
         self._nudge_end = QTimer(self)
         self._nudge_end.setSingleShot(True)
         self._nudge_end.setInterval(NUDGE_END_MS)
@@ -147,20 +147,20 @@ class LiveView(QWidget):
 
     @property
     def shown_frames(self) -> int:
-        """How many pictures were shown since it was made."""
+        """Number of images shown so far."""
         return self._shown_frames
 
-    # What pages ask of it
+    # Called by the pages
 
     def set_stream(self, stream: StreamLike | None) -> None:
-        """Show the newest frames of `stream` from now on; None: none, the picture goes."""
+        """Show the newest frames of `stream` from now on; None: remove the image."""
         self._stream = stream
         self._best_focus = BestFocus()
         self._show_focus(stream is not None)
         self._tick.stop()
         if stream is None:
             self._rgb = None
-            self._picture.show_rgb(None)
+            self._image.show_rgb(None)
             self._checks.show_exposure(None)
             self._checks.show_pixel("")
             self._checks.show_rate("")
@@ -173,23 +173,23 @@ class LiveView(QWidget):
         """Show a frame."""
         self._show(frame.rgb)
 
-    def show_picture(self, rgb: Rgb) -> None:
-        """Show a still, (rows, columns, 3) uint8 or uint16, and check it at once."""
+    def show_image(self, rgb: Rgb) -> None:
+        """Show a still image, (rows, columns, 3) uint8 or uint16, and check it at once."""
         self._checked_s = -math.inf
         self._show_focus(False)
         self._show(rgb)
 
     def set_overlay(self, overlay: Overlay | None) -> None:
-        """Draw over the picture; None: nothing."""
+        """Draw an overlay on the image; None: remove it."""
         self._overlay = overlay or Overlay()
         self._draw_overlay()
 
     def hand_drags_on(self, on: bool) -> None:
-        """Tell of drags beside the handles in :attr:`dragged`, in place of panning with them."""
-        self._picture.hand_drags_on(on)
+        """Emit drags that start beside the handles as :attr:`dragged` instead of panning."""
+        self._image.hand_drags_on(on)
 
     def judge_focus(self, on: bool) -> None:
-        """Show the focus of live pictures, or not: most things have no edges to focus on."""
+        """Show or hide the focus of live images: most scenes have no edges to focus on."""
         self._judges_focus = on
         self._show_focus(self._stream is not None)
 
@@ -197,11 +197,11 @@ class LiveView(QWidget):
         self._checks.focus.setVisible(on and self._judges_focus)
 
     def freeze(self, on: bool) -> None:
-        """Keep the picture that is shown, while the stream goes on."""
+        """Freeze the shown image while the stream continues."""
         self._tools.switch("freeze", on)
 
     def zebra(self, on: bool) -> None:
-        """Stripe what is at the end of scale."""
+        """Show stripes on saturated pixels."""
         self._tools.switch("zebra", on)
 
     def show_histogram(self, on: bool) -> None:
@@ -209,36 +209,36 @@ class LiveView(QWidget):
         self._tools.switch("histogram", on)
 
     def fit(self) -> None:
-        """Show the whole picture."""
-        self._picture.fit()
+        """Show the whole image."""
+        self._image.fit()
 
     def full_size(self) -> None:
-        """Show one picture pixel on one screen pixel."""
-        self._picture.full_size()
+        """Show one image pixel on one screen pixel."""
+        self._image.full_size()
 
     def say(self, text: str) -> None:
-        """Change what stands where there is no picture."""
-        self._picture.say(text)
+        """Change the text that is shown when there is no image."""
+        self._image.say(text)
 
     def snapshot(self, path: Path) -> None:
-        """Write the picture that is shown, without marks, as PNG with all its bits.
+        """Save the shown image as PNG with full bit depth and without marks.
 
         Raises
         ------
         InputError
-            Where there is no picture or the file cannot be written.
+            If there is no image or the file cannot be written.
         """
         if self._rgb is None:
             raise InputError(
-                tr("there is no picture to save"),
-                where=tr("live view"),
-                advice=tr("Choose a source first"),
+                tr("there is no image to save"),
+                where=tr("Live view"),
+                advice=tr("Select a source first"),
             )
         _, png = cv2.imencode(".png", np.ascontiguousarray(self._rgb[..., ::-1]))
         write_atomically(path, lambda file: file.write(png.tobytes()))
 
     def save_snapshot(self) -> None:
-        """Write the picture into :attr:`snapshot_folder`, named by date and time."""
+        """Save the image into :attr:`snapshot_folder`, named by date and time."""
         name = datetime.now().astimezone().strftime("snapshot-%Y%m%d-%H%M%S-%f")[:-3] + ".png"
         path = self.snapshot_folder / name
         try:
@@ -251,13 +251,13 @@ class LiveView(QWidget):
 
     # Frames
 
-    def _take_newest(self) -> None:
+    def _show_newest_frame(self) -> None:
         if self._stream is None or self._tools.is_on("freeze"):
             return
         frame = self._stream.newest.take()
         if frame is not None:
             self._show(frame.rgb)
-        self._tell_rate(self._stream)
+        self._show_rate(self._stream)
 
     def _show(self, rgb: Rgb) -> None:
         resized = self._rgb is None or self._rgb.shape != rgb.shape
@@ -270,14 +270,14 @@ class LiveView(QWidget):
         if now_s - self._checked_s >= CHECK_S:
             self._checked_s = now_s
             self._check(rgb, now_s)
-            self._tell_pixel()
+            self._show_pixel()
 
     def _render(self) -> None:
         if self._rgb is None:
             return
         striped = self._tools.is_on("zebra")
         shown = with_zebra(self._rgb, self._shown_frames) if striped else eight_bits(self._rgb)
-        self._picture.show_rgb(shown)
+        self._image.show_rgb(shown)
 
     def _check(self, rgb: Rgb, now_s: float) -> None:
         self._checks.show_exposure(measure_exposure(rgb))
@@ -285,22 +285,22 @@ class LiveView(QWidget):
         if self._histogram.isVisible():
             self._histogram.show_counts(channel_histograms(rgb[::CHECK_STRIDE, ::CHECK_STRIDE]))
 
-    def _tell_rate(self, stream: StreamLike) -> None:
-        """Tell the rate, or, when frames come no more, why."""
+    def _show_rate(self, stream: StreamLike) -> None:
+        """Show the frame rate, or why no more frames arrive."""
         now_s = time.monotonic()
-        if now_s - self._rate_told_s < RATE_S:
+        if now_s - self._rate_shown_s < RATE_S:
             return
-        self._rate_told_s = now_s
+        self._rate_shown_s = now_s
         figures = stream.figures()
         rate = tr("{r:.0f} frames/s, {d} dropped").format(r=figures.rate_hz, d=figures.dropped)
         self._checks.show_rate(figures.lost or rate)
 
     def _draw_overlay(self) -> None:
         shown = self._overlay if self._tools.is_on("overlay") else Overlay()
-        self._picture.overlay.set_overlay(shown, self._drawing_size())
+        self._image.overlay.set_overlay(shown, self._drawing_size())
 
     def _drawing_size(self) -> tuple[int, int]:
-        width, height = self._picture.picture_size
+        width, height = self._image.picture_size
         return max(width, 1), max(height, 1)
 
     # Tools
@@ -322,9 +322,9 @@ class LiveView(QWidget):
 
     def _on_pointed(self, u: float, v: float) -> None:
         self._pointer = (u, v)
-        self._tell_pixel()
+        self._show_pixel()
 
-    def _tell_pixel(self) -> None:
+    def _show_pixel(self) -> None:
         self._checks.show_pixel("" if self._rgb is None else pixel_text(self._rgb, *self._pointer))
 
     # Handles
@@ -334,7 +334,7 @@ class LiveView(QWidget):
         self.moved.emit(handle.name, handle.u, handle.v, handle.radius_px)
 
     def _selected(self) -> Handle | None:
-        item = self._picture.overlay
+        item = self._image.overlay
         return next((h for h in item.handles if h.name == item.selected), None)
 
     def _end_nudge(self) -> None:
@@ -343,13 +343,13 @@ class LiveView(QWidget):
             self.moved.emit(handle.name, handle.u, handle.v, handle.radius_px)
 
     def _nudge(self, event: QKeyEvent) -> bool:
-        """Move or resize the selected handle if the key says so; return whether it did."""
+        """Move or resize the selected handle if the key is for it; return whether it was."""
         handle = self._selected()
         if handle is None:
             return False
         held = event.modifiers()
         step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ShiftModifier else NUDGE_PX
-        # A plus is typed with Shift on many keyboards, so that Ctrl makes the large step here.
+        # A plus needs Shift on many keyboards, so Ctrl makes the large step here.
         radius_step = LARGE_NUDGE_PX if held & Qt.KeyboardModifier.ControlModifier else NUDGE_PX
         match event.key():
             case Qt.Key.Key_Left | Qt.Key.Key_Right | Qt.Key.Key_Up | Qt.Key.Key_Down:
@@ -361,14 +361,14 @@ class LiveView(QWidget):
                 handle = resize(handle, -radius_step)
             case _:
                 return False
-        self._picture.overlay.place(handle)
+        self._image.overlay.place(handle)
         self._nudge_end.start()
         return True
 
     # Qt
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102
-        item = self._picture.overlay
+        item = self._image.overlay
         if self._nudge(event):
             return
         match event.key():
@@ -378,9 +378,9 @@ class LiveView(QWidget):
             case Qt.Key.Key_Escape if item.selected:
                 item.select("")
             case Qt.Key.Key_Plus | Qt.Key.Key_Equal:
-                self._picture.zoom_by(ZOOM_STEP)
+                self._image.zoom_by(ZOOM_STEP)
             case Qt.Key.Key_Minus:
-                self._picture.zoom_by(1.0 / ZOOM_STEP)
+                self._image.zoom_by(1.0 / ZOOM_STEP)
             case _:
                 super().keyPressEvent(event)
 
@@ -397,7 +397,7 @@ class LiveView(QWidget):
             self._end_nudge()
 
     def _place_histogram(self) -> None:
-        corner = self._picture.rect().bottomRight()
+        corner = self._image.rect().bottomRight()
         self._histogram.move(
             corner.x() - self._histogram.width() - CORNER_PX,
             corner.y() - self._histogram.height() - CORNER_PX,
@@ -412,6 +412,6 @@ _ARROWS = {
 }
 
 
-def _pictures_folder() -> Path:
-    pictures = QStandardPaths.StandardLocation.PicturesLocation
-    return Path(QStandardPaths.writableLocation(pictures)) / "GelPoLight Studio"
+def _default_folder() -> Path:
+    images = QStandardPaths.StandardLocation.PicturesLocation
+    return Path(QStandardPaths.writableLocation(images)) / "GelPoLight Studio"

@@ -1,8 +1,8 @@
-"""What is drawn over a picture, as plain data.
+"""The overlay on an image, as plain data.
 
-Positions are picture pixels (u, v) with pixel centres at whole numbers, as everywhere in the core.
-An item with a `handle` can be dragged; :class:`app.live.live_view.LiveView` tells where it went.
-Items that hold an array are equal to themselves only, for arrays are not compared at a glance.
+Positions are image pixels (u, v) with pixel centres at integers, as everywhere in the core.
+An item with a `handle` can be dragged; :class:`app.live.live_view.LiveView` reports the new
+position. Items with an array are equal only to themselves, because comparing arrays is slow.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ MarkerKind = Literal["cross", "dot", "ring", "plus"]
 
 @dataclass(frozen=True, slots=True)
 class Marker:
-    """A point, drawn at one size whatever the zoom.
+    """A point, drawn at the same size at any zoom.
 
     Attributes
     ----------
     u, v : float
-        Where.
+        Position in pixels.
     kind : str
-        Its shape.
+        Shape of the point.
     role : str
-        What it means.
+        Meaning of the point.
     text : str
-        Written beside it.
+        Text next to the point.
     handle : str
-        Its name for dragging; empty where it stays put.
+        Name for dragging; empty if the point cannot be moved.
     """
 
     u: float
@@ -45,7 +45,7 @@ class Marker:
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A circle in the picture; with a `handle` it can be moved and resized."""
+    """A circle in the image; with a `handle` it can be moved and resized."""
 
     u: float
     v: float
@@ -65,7 +65,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mask:
-    """Pixels, `area` (rows, columns) bool of the picture's size, shown as a tint."""
+    """Pixels, `area` (rows, columns) bool of the image's size, shown as a tint."""
 
     area: NDArray[np.bool_]
     role: Role
@@ -81,7 +81,7 @@ class Note:
 
 @dataclass(frozen=True, slots=True)
 class Overlay:
-    """Everything that is drawn over one picture."""
+    """Everything that is drawn on one image."""
 
     markers: tuple[Marker, ...] = ()
     circles: tuple[Circle, ...] = ()

@@ -1,4 +1,4 @@
-"""The row of picture tools, each with a key of its own."""
+"""The row of image tools, each with its own key."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ TOOLS = {
 
 
 def tool_texts() -> dict[str, str]:
-    """Return what each tool is called."""
+    """Return the label of each tool."""
     return {
         "fit": tr("Fit to view"),
         "full_size": tr("Full size, 100 %"),
         "freeze": tr("Freeze"),
-        "snapshot": tr("Save a snapshot"),
-        "zebra": tr("Stripes where saturated"),
+        "snapshot": tr("Save snapshot"),
+        "zebra": tr("Mark saturated pixels"),
         "histogram": tr("Histogram"),
-        "overlay": tr("Marks on the picture"),
+        "overlay": tr("Show marks"),
     }
 
 
-class PictureTools(QWidget):
-    """Flat buttons; their keys work wherever the focus is inside `owner`.
+class ImageTools(QWidget):
+    """Flat buttons; their keys work while the focus is inside `owner`.
 
     Signals
     -------
     pressed(str)
-        A tool that does not stay pressed.
+        A tool that does not stay pressed was used.
     switched(str, bool)
-        One that does.
+        A tool that stays pressed was switched.
     """
 
     pressed = Signal(str)
@@ -55,7 +55,7 @@ class PictureTools(QWidget):
 
     def __init__(self, owner: QWidget) -> None:
         super().__init__()
-        named(self, "live.tools", tr("Picture tools"))
+        named(self, "live.tools", tr("Image tools"))
         self._buttons: dict[str, QToolButton] = {}
         self._zoom = named(PlainLabel(), "live.zoom", tr("Magnification"))
         row = QHBoxLayout(self)
@@ -83,7 +83,7 @@ class PictureTools(QWidget):
         return button
 
     def is_on(self, name: str) -> bool:
-        """Whether a tool is pressed."""
+        """Return whether a tool is pressed."""
         return self._buttons[name].isChecked()
 
     def switch(self, name: str, on: bool) -> None:
@@ -91,7 +91,7 @@ class PictureTools(QWidget):
         self._buttons[name].setChecked(on)
 
     def show_zoom(self, scale: float) -> None:
-        """Show the magnification, 1 for full size; NaN: there is nothing to magnify."""
+        """Show the magnification, 1 for full size; NaN if there is no image."""
         self._zoom.setText("" if math.isnan(scale) else f"{100.0 * scale:.0f} %")
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102

@@ -1,4 +1,4 @@
-"""Frames as eight bits for the screen, with stripes over what is at the end of scale."""
+"""Frames as eight bits for the screen, with stripes on saturated pixels."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.live.picture_checks import Rgb, saturated
+from app.live.image_checks import Rgb, saturated
 
 STRIPE_PX = 6
-# No LED of the sensor is magenta, and no membrane answers so.
+# No LED of the sensor is magenta, and no membrane looks like it.
 STRIPE_RGB = (255, 0, 255)
 
 
 def eight_bits(rgb: Rgb) -> NDArray[np.uint8]:
-    """Return a picture as the screen shows it; of 16 bits the high byte."""
+    """Return an image as shown on the screen; of 16 bits the high byte."""
     if rgb.dtype == np.uint8:
         return np.asarray(rgb, np.uint8)
     return (rgb >> 8).astype(np.uint8)
 
 
 def with_zebra(rgb: Rgb, phase: int = 0) -> NDArray[np.uint8]:
-    """Return a picture for the screen, striped where a channel is at the end of scale.
+    """Return an image for the screen, striped where a channel is saturated.
 
     Parameters
     ----------

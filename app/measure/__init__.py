@@ -1,1 +1,1 @@
-"""Measure: tools on the height map, the truth beside them, and the lab's records."""
+"""Measure: tools on the height map, comparison with true values, and the lab's records."""

@@ -1,4 +1,4 @@
-"""Measured values as people write them: no more digits than the standard deviation allows."""
+"""Measured values as text, with no more digits than the standard deviation justifies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UNITS = {"mm": " mm", "um": " \N{MICRO SIGN}m", "deg": "°", "%": " %", "percent
 
 
 def decimals_for(sd: float | None, unit: str) -> int:
-    """Return how many decimals a value may have: two digits of its standard deviation."""
+    """Return the number of decimals of a value: two digits of its standard deviation."""
     usual = WITHOUT_SD.get(unit, 3)
     if sd is None or not math.isfinite(sd) or sd <= 0.0:
         return usual
@@ -22,17 +22,17 @@ def decimals_for(sd: float | None, unit: str) -> int:
 
 
 def unit_behind(unit: str) -> str:
-    """Return a unit as it stands behind a number."""
+    """Return a unit as text after a number."""
     return UNITS.get(unit, f" {unit}")
 
 
 def unit_of(name: str) -> str:
-    """Return the unit that the name of a kept quantity ends in: ``mm`` of ``diameter_mm``."""
+    """Return the unit at the end of the name of a saved quantity: ``mm`` of ``diameter_mm``."""
     return name.rpartition("_")[2]
 
 
 def value_text(value: float, sd: float | None, unit: str) -> str:
-    """Return ``5.012 ± 0.024 mm``, or the value alone where no standard deviation is stated."""
+    """Return ``5.012 ± 0.024 mm``, or only the value if there is no standard deviation."""
     decimals = decimals_for(sd, unit)
     behind = unit_behind(unit)
     if not math.isfinite(value):
@@ -46,5 +46,5 @@ def value_text(value: float, sd: float | None, unit: str) -> str:
 
 
 def figure_text(figure: Measured) -> str:
-    """Return a figure as people write it."""
+    """Return a figure as text."""
     return value_text(figure.value, figure.sd, figure.unit)

@@ -1,4 +1,4 @@
-"""Where a tool can be taken hold of, and what becomes of it when it is moved; no Qt in here."""
+"""The grips of a tool, and the tool after a grip was moved. Without Qt."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from gelpolight_core.measurement.tools import (
 Point = tuple[float, float]
 LEAST_SIDE_MM = 0.1
 TURN_REACH = 0.35
-"""How far beyond the middle of its first side's end a rectangle is taken hold of to turn it."""
+"""Distance of a rectangle's rotation grip from the middle of its first side's end."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """A place of a tool that can be moved.
+    """A point of a tool that can be moved.
 
     Attributes
     ----------
     name : str
-        Which of the tool's.
+        Name of the grip within the tool.
     at_mm : (float, float)
-        Where, (x, y).
+        Position (x, y).
     """
 
     name: str
@@ -42,7 +42,7 @@ class Grip:
 
 
 def grips_of(tool: Tool) -> tuple[Grip, ...]:
-    """Return what of a tool can be moved, in the order in which the keyboard goes through it."""
+    """Return the grips of a tool in the order of the keyboard selection."""
     match tool:
         case Distance():
             return Grip("a", tool.a_mm), Grip("b", tool.b_mm)
@@ -66,7 +66,7 @@ def grips_of(tool: Tool) -> tuple[Grip, ...]:
 
 
 def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:
-    """Return a tool with one of its grips at another place."""
+    """Return a tool with one of its grips moved."""
     match tool:
         case Distance() | ProfileWidth() | Angle():
             return replace(tool, **{f"{grip}_mm": to_mm})
@@ -85,7 +85,7 @@ def moved(tool: Tool, grip: str, to_mm: Point) -> Tool:
 
 
 def outline_of(tool: Tool) -> tuple[tuple[Point, ...], ...]:
-    """Return the lines of a tool as it was put there, before anything is measured."""
+    """Return the lines of a tool as it was placed, before anything is measured."""
     match tool:
         case Distance():
             return ((tool.a_mm, tool.b_mm),)
@@ -101,7 +101,7 @@ def outline_of(tool: Tool) -> tuple[tuple[Point, ...], ...]:
 
 
 def nearest_grip(grips: tuple[Grip, ...], at_mm: Point, *, reach_mm: float) -> Grip | None:
-    """Return the grip nearest to a place; None beyond the reach."""
+    """Return the grip nearest to a point. None if all are out of reach."""
     near = min(grips, key=lambda g: math.dist(g.at_mm, at_mm), default=None)
     return near if near is not None and math.dist(near.at_mm, at_mm) <= reach_mm else None
 
@@ -110,8 +110,8 @@ def _of_rectangle(area: Rectangle, prefix: str) -> tuple[Grip, ...]:
     a, b = 0.5 * area.sides_mm[0], 0.5 * area.sides_mm[1]
     return (
         Grip(f"{prefix}centre", area.centre_mm),
-        Grip(f"{prefix}corner", _place(area, a, b)),
-        Grip(f"{prefix}turn", _place(area, a + TURN_REACH, 0.0)),
+        Grip(f"{prefix}corner", _point(area, a, b)),
+        Grip(f"{prefix}turn", _point(area, a + TURN_REACH, 0.0)),
     )
 
 
@@ -127,7 +127,7 @@ def _rectangle_moved(area: Rectangle, grip: str, to_mm: Point) -> Rectangle:
     return replace(area, sides_mm=sides)
 
 
-def _place(area: Rectangle, along: float, across: float) -> Point:
+def _point(area: Rectangle, along: float, across: float) -> Point:
     cos, sin = math.cos(math.radians(area.yaw_deg)), math.sin(math.radians(area.yaw_deg))
     x, y = area.centre_mm
     return x + cos * along - sin * across, y + sin * along + cos * across

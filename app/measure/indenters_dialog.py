@@ -1,4 +1,4 @@
-"""The list of known indenters, to be edited like a small spreadsheet."""
+"""Dialog to edit the list of known indenters like a small spreadsheet."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.measure.placing import INDENTERS, kind_label
-from app.shell.icons import icon
+from app.theme.icons import icon
+from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -30,12 +31,12 @@ NAME, SHAPE, SIZE, SECOND, HEIGHT = range(5)
 
 
 class IndentersDialog(QDialog):
-    """Edits the list; what cannot be is said below it, and the list is not taken.
+    """Edits the list. Errors are shown below it, and an invalid list is not accepted.
 
     Attributes
     ----------
     indenters : tuple of Indenter
-        As accepted.
+        The accepted list.
     """
 
     def __init__(self, indenters: tuple[Indenter, ...], parent: QWidget | None = None) -> None:
@@ -45,7 +46,7 @@ class IndentersDialog(QDialog):
         self.resize(680, 480)
         self.indenters = indenters
         self.table = self._make_table()
-        self.problem = named(PlainLabel(), "measure.indenters.problem", tr("What is wrong"))
+        self.problem = named(PlainLabel(), "measure.indenters.problem", tr("Errors in the list"))
         self.problem.setWordWrap(True)
         show_meaning(self.problem, "fail")
         add = _button("add", tr("&Add"))
@@ -62,7 +63,10 @@ class IndentersDialog(QDialog):
         row.addStretch(1)
         row.addWidget(buttons)
         words = PlainLabel(
-            tr("Lengths in mm. The depth is how far it goes in until its base touches, if it has.")
+            tr(
+                "All lengths are in mm. Depth is the height of the indenter from its face to "
+                "its base, if it has one."
+            )
         )
         words.setWordWrap(True)
         column = QVBoxLayout(self)
@@ -101,7 +105,7 @@ class IndentersDialog(QDialog):
             if column != NAME:
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             self.table.setItem(row, column, item)
-        shape = named(QComboBox(), f"measure.indenters.shape{row}", tr("Shape"))
+        shape = named(ComboBox(), f"measure.indenters.shape{row}", tr("Shape"))
         for name in INDENTERS:
             shape.addItem(kind_label(name), name)
         shape.setCurrentIndex(shape.findData(indenter.shape))
@@ -109,13 +113,13 @@ class IndentersDialog(QDialog):
         self.table.setCurrentCell(row, NAME)
 
     def remove_rows(self) -> None:
-        """Take the selected ones out."""
+        """Remove the selected indenters."""
         rows = {index.row() for index in self.table.selectedIndexes()}
         for row in sorted(rows, reverse=True):
             self.table.removeRow(row)
 
     def accept(self) -> None:
-        """Take the list, or say what is wrong with it."""
+        """Accept the list, or show its errors."""
         try:
             found = tuple(self._indenter(row) for row in range(self.table.rowCount()))
         except InputError as error:
@@ -131,9 +135,9 @@ class IndentersDialog(QDialog):
         size = self._length(row, SIZE)
         if size is None:
             raise InputError(
-                tr("the size is missing"),
-                where=tr("indenter {name}").format(name=name),
-                advice=tr("Give its diameter or side in mm"),
+                tr("The size is missing"),
+                where=tr("Indenter {name}").format(name=name),
+                advice=tr("Enter its diameter or side in mm"),
             )
         second = self._length(row, SECOND) if shape.currentData() == "cuboid" else None
         return Indenter(name, shape.currentData(), size, second, self._length(row, HEIGHT))
@@ -150,9 +154,9 @@ class IndentersDialog(QDialog):
             return float(text.replace(",", "."))
         except ValueError as error:
             raise InputError(
-                tr("'{text}' is no number").format(text=text),
-                where=tr("indenter {name}").format(name=self._text(row, NAME)),
-                advice=tr("Give lengths in mm, such as 5 or 3.5"),
+                tr("'{text}' is not a number").format(text=text),
+                where=tr("Indenter {name}").format(name=self._text(row, NAME)),
+                advice=tr("Enter lengths in mm, such as 5 or 3.5"),
             ) from error
 
 

@@ -1,6 +1,6 @@
-"""What was measured beside what is true: errors, and whether they are within the limits.
+"""Measured and true values: errors, and whether they are within the limits.
 
-The errors of the fitted indenters are those that ``gelpolight measure --truth`` tells.
+The errors of the fitted indenters are the same as those of ``gelpolight measure --truth``.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from app.shell.settings import Limits
+from app.services.settings import Limits
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult
@@ -19,16 +19,16 @@ DEPTH_FIGURES = frozenset({"step_height", "height", "depth_difference", "mean_de
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What a person says is true of what a tool measures.
+    """The true values of an object, as the user entered them.
 
     Attributes
     ----------
     size_mm : float or None
-        The diameter, the mean side, or the tool's first figure in its own unit; None: not known.
+        The diameter, the mean side, or the tool's first figure in its own unit. None: unknown.
     height_mm : float or None
-        How deep an indenter was pressed in; None: not known.
+        Indentation depth. None: unknown.
     name : str
-        Name of the known indenter; empty where the numbers were typed.
+        Name of the known indenter. Empty if the numbers were typed.
     """
 
     size_mm: float | None = None
@@ -38,20 +38,20 @@ class Stated:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One figure beside the truth.
+    """One figure with its true value.
 
     Attributes
     ----------
     quantity : str
         ``size``, ``height`` or the figure's name.
     label, unit : str
-        For people.
+        Text for the user.
     measured, true : float
         In `unit`.
     error_percent : float
-        Signed, of the true value.
+        Signed, relative to the true value.
     limit_percent : float
-        Largest error to pass.
+        Maximum error to pass.
     """
 
     quantity: str
@@ -64,27 +64,27 @@ class Judged:
 
     @property
     def error(self) -> float:
-        """Measured less true, in `unit`."""
+        """Measured minus true value, in `unit`."""
         return self.measured - self.true
 
     @property
     def passed(self) -> bool:
-        """Whether the error is within the limit; never for a number that is not finite."""
+        """Whether the error is within the limit. False for values that are not finite."""
         return abs(self.error_percent) <= self.limit_percent
 
 
 def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Judged, ...]:
-    """Compare a result with what is true of it.
+    """Compare a result with its true values.
 
     Returns
     -------
     tuple of Judged
-        Empty where nothing is stated.
+        Empty if no true value is given.
 
     Raises
     ------
     InputError
-        If a stated length is not greater than zero.
+        If a given length is not greater than zero.
     """
     if result.measurement is not None:
         return _judge_indenter(result.measurement, stated, limits)
@@ -94,11 +94,11 @@ def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Judged, .
     true = stated.size_mm
     if not (math.isfinite(true) and true > 0.0):
         raise InputError(
-            tr("a true value of {value}").format(value=true),
-            where=tr("truth"),
-            advice=tr("Give a value greater than zero"),
+            tr("The true value is {value}").format(value=true),
+            where=tr("True value"),
+            advice=tr("Enter a value greater than zero"),
         )
-    # The sign of a step says in which order its areas were clicked.
+    # The sign of a step only depends on the order of the clicks.
     measured = abs(figure.value) if figure.name in DEPTH_FIGURES else figure.value
     in_depth = figure.name in DEPTH_FIGURES
     limit = limits.height_percent if in_depth else limits.size_percent
@@ -109,7 +109,7 @@ def judge(result: ToolResult, stated: Stated, limits: Limits) -> tuple[Judged, .
 def _judge_indenter(fit: Measurement, stated: Stated, limits: Limits) -> tuple[Judged, ...]:
     if stated.size_mm is None and stated.height_mm is None:
         return ()
-    # What is not known is taken as measured, and nothing is told of it.
+    # For unknown values the measured ones are used, and they are not reported.
     size = fit.size_mm if stated.size_mm is None else stated.size_mm
     height = fit.height_mm if stated.height_mm is None else stated.height_mm
     found = compare(fit, Truth(fit.shape, size, height))

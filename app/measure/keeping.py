@@ -1,37 +1,37 @@
-"""What goes into the records of a result on the screen; no Qt."""
+"""The record of a result. Without Qt."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 from app.measure.judging import Judged, Stated
-from app.shell.settings import Limits
+from app.services.settings import Limits
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import ToolResult, result_as_dict, tool_as_dict
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, Quantity, indenter_record, verdict_of
 
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A result with what is known around it.
+    """A result with its context.
 
     Attributes
     ----------
     result : ToolResult
-        What a tool said.
+        Result of a tool.
     judged : tuple of Judged
-        How it compares with the truth; empty where none is stated.
+        Comparison with the true values. Empty if there are none.
     stated : Stated
-        The truth as stated.
+        The true values as entered.
     limits : Limits
-        By which it was judged.
+        Limits of the verdict.
     heightmap : HeightMap
-        What was measured on.
+        The height map that was measured.
     serial : str
         The sensor.
     operator, note : str
-        Who measured, and what they wrote.
+        Operator, and their note.
     """
 
     result: ToolResult
@@ -45,7 +45,7 @@ class Kept:
 
 
 def record_of(kept: Kept) -> MeasurementRecord:
-    """Return what is to be kept."""
+    """Return the record to be saved."""
     fit = kept.result.measurement
     record = _other_record(kept) if fit is None else _fit_record(kept, fit)
     settings = {"model": kept.heightmap.model, "tool": tool_as_dict(kept.result.tool)}
@@ -96,11 +96,11 @@ def _other_record(kept: Kept) -> MeasurementRecord:
 
 
 def _with_truth(quantities: tuple[Quantity, ...], kept: Kept) -> tuple[Quantity, ...]:
-    """Put the true values beside the measured ones: of the size first, then of the depth."""
+    """Put the true values next to the measured ones: size first, then depth."""
     found = list(quantities)
     for row in kept.judged:
-        place = 1 if row.quantity == "height" and kept.result.measurement is not None else 0
-        found[place] = replace(
-            found[place], value=row.measured, truth=row.true, limit_percent=row.limit_percent
+        index = 1 if row.quantity == "height" and kept.result.measurement is not None else 0
+        found[index] = replace(
+            found[index], value=row.measured, truth=row.true, limit_percent=row.limit_percent
         )
     return tuple(found)

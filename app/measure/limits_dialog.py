@@ -1,4 +1,4 @@
-"""Up to which error a measurement passes."""
+"""Dialog for the maximum errors to pass."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell.settings import Limits
+from app.services.settings import Limits
+from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 
 class LimitsDialog(QDialog):
-    """Asks for the two limits; the paper's are offered again by a button."""
+    """Asks for the two limits. A button restores those of the paper."""
 
     def __init__(self, limits: Limits, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        named(self, "measure.limits", tr("Limits of the error"))
-        self.setWindowTitle(tr("Limits of the error"))
+        named(self, "measure.limits", tr("Error limits"))
+        self.setWindowTitle(tr("Error limits"))
         self._limits = limits
         words = PlainLabel(
             tr(
-                "A measurement passes when it is no farther from the truth than this."
-                " The paper reports 5 % in the plane and 8 % in depth of its own sensor."
+                "A measurement passes if its errors are within these limits. The paper "
+                "reports 5 % in the plane and 8 % in depth for its own sensor."
             )
         )
         words.setWordWrap(True)
-        self.size = _percent("measure.limits.size", tr("Largest error in the plane"))
-        self.height = _percent("measure.limits.height", tr("Largest error in depth"))
+        self.size = _percent("measure.limits.size", tr("Maximum error in the plane"))
+        self.height = _percent("measure.limits.height", tr("Maximum error in depth"))
         self._show(limits)
         form = QFormLayout()
         form.addRow(tr("In the plane"), self.size)
@@ -45,7 +46,7 @@ class LimitsDialog(QDialog):
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
         restore = buttons.button(kinds.RestoreDefaults)
-        restore.setText(tr("The paper's"))
+        restore.setText(tr("Paper values"))
         restore.clicked.connect(lambda: self._show(Limits()))
         column = QVBoxLayout(self)
         column.addWidget(words)
@@ -54,7 +55,7 @@ class LimitsDialog(QDialog):
 
     @property
     def limits(self) -> Limits:
-        """The limits as they are set."""
+        """The limits as set."""
         return replace(
             self._limits, size_percent=self.size.value(), height_percent=self.height.value()
         )
@@ -65,7 +66,7 @@ class LimitsDialog(QDialog):
 
 
 def _percent(name: str, accessible: str) -> QDoubleSpinBox:
-    box = named(QDoubleSpinBox(), name, accessible)
+    box = named(DoubleSpinBox(), name, accessible)
     box.setDecimals(1)
     box.setRange(0.1, 100.0)
     box.setSuffix(tr(" %"))

@@ -1,6 +1,7 @@
-"""From a picture and what was drawn on it to figures; runs beside the window.
+"""From an image and the tools on it to figures. Runs in the background.
 
-A picture is read and reconstructed as ``gelpolight measure`` does it, so that both say the same.
+An image is read and reconstructed as ``gelpolight measure`` does it, so that both give the same
+results.
 """
 
 from __future__ import annotations
@@ -14,38 +15,40 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from app.inspect.look import Look
-from app.measure.map_picture import MapPicture, map_picture
+from app.measure.map_image import MapImage, map_image
 from app.measure.sheet import Sheet
 from app.sources.source import Frame
-from gelpolight_core.calibration.calibration import Calibration
+from app.view2d.display import Display
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.proposal import Proposal, propose
 from gelpolight_core.measurement.tools import Tool, ToolResult
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.measurement.trust import judged
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.response.curve import CameraResponse
-from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import read_picture, require_colour
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Taken:
-    """A picture that is measured on.
+class MeasuredImage:
+    """An image to measure on.
 
     Attributes
     ----------
     name : str
-        What people call it.
+        Name shown to the user.
     path : Path or None
-        Its file; None for one that the camera gave.
+        Its file. None for a camera image.
     frame : Frame or None
-        What the camera gave; None for a file.
+        The frame of the camera. None for a file.
     serial : str
-        Of the sensor that it is known to be of; empty where that is not known.
+        Serial of its sensor. Empty if unknown.
     """
 
     name: str
@@ -59,7 +62,7 @@ class Taken:
         Raises
         ------
         InputError
-            If the file cannot be used, or the picture is grey.
+            If the file cannot be used, or the image is greyscale.
         """
         if self.path is not None:
             picture = read_picture(self.path, response=response)
@@ -73,7 +76,7 @@ class Taken:
 def _linear(
     rgb: NDArray[np.uint8] | NDArray[np.uint16], response: CameraResponse | None
 ) -> NDArray[np.float32]:
-    """Return a frame as linear light, by the very operations that a file goes through."""
+    """Return a frame as linear light, with the same operations as for a file."""
     if response is not None:
         return response.linearise(rgb)
     return np.asarray(rgb, np.float32) / np.float32(np.iinfo(rgb.dtype).max)
@@ -81,7 +84,7 @@ def _linear(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Question:
-    """What is to be measured.
+    """What to measure.
 
     Attributes
     ----------
@@ -89,50 +92,50 @@ class Question:
         Of the sensor.
     model : str
         The calibration's, or ``paper``.
-    taken : Taken
-        The picture.
+    image : MeasuredImage
+        The image.
     sheet : Sheet
         The tools on it.
     propose : bool
-        Whether it is to be said what is pressed.
+        Whether to detect the object.
     """
 
     calibration: Calibration
     model: str
-    taken: Taken
+    image: MeasuredImage
     sheet: Sheet
     propose: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
-    """What came of it.
+    """The results.
 
     Attributes
     ----------
     heightmap : HeightMap
-        Of the picture, with its uncertainty.
-    picture : MapPicture
+        Of the image, with its uncertainty.
+    map_image : MapImage
         How it is shown.
     linear : (rows, columns, 3) float32
-        The camera's picture, linear light.
+        The camera image, linear light.
     results : mapping of int to ToolResult or str
-        By the tools' keys; a sentence where a tool could not be applied.
+        By the tools' keys. A sentence if a tool could not be applied.
     proposal : Proposal or None
-        What is pressed, where that was asked and can be said.
+        The detected object, if requested and found.
     """
 
     heightmap: HeightMap
-    picture: MapPicture
+    map_image: MapImage
     linear: NDArray[np.float32]
     results: Mapping[int, ToolResult | str] = field(default_factory=lambda: MappingProxyType({}))
     proposal: Proposal | None = None
 
 
 class Measuring:
-    """Answers questions; keeps what does not change from one to the next.
+    """Answers questions, and keeps what does not change between them.
 
-    A function for one thread at a time. None in the place of a question: forget all that is kept.
+    Used by one thread at a time. None instead of a question clears all kept data.
     """
 
     def __init__(self) -> None:
@@ -140,8 +143,8 @@ class Measuring:
 
     def _forget(self) -> None:
         self._reconstructor: Reconstructor | None = None
-        self._taken: Taken | None = None
-        self._shown: tuple[HeightMap, MapPicture, NDArray[np.float32]] | None = None
+        self._image: MeasuredImage | None = None
+        self._shown: tuple[HeightMap, MapImage, NDArray[np.float32]] | None = None
         self._results: dict[Tool, ToolResult | str] = {}
 
     def __call__(self, question: Question | None) -> Answer | None:
@@ -150,35 +153,34 @@ class Measuring:
         Raises
         ------
         InputError
-            If the picture cannot be used, or is not of the calibration's sensor or size.
+            If the image cannot be used, or does not fit the calibration's sensor or size.
         """
         if question is None:
             self._forget()
             return None
-        heightmap, picture, linear = self._depth_of(question)
+        heightmap, shown, linear = self._depth_of(question)
         results = {}
         for item in question.sheet.items:
             if item.tool not in self._results:
                 self._results[item.tool] = apply_tool(item.tool, heightmap)
             results[item.key] = self._results[item.tool]
         proposal = propose(heightmap) if question.propose else None
-        return Answer(heightmap, picture, linear, MappingProxyType(results), proposal)
+        return Answer(heightmap, shown, linear, MappingProxyType(results), proposal)
 
-    def _depth_of(self, question: Question) -> tuple[HeightMap, MapPicture, NDArray[np.float32]]:
+    def _depth_of(self, question: Question) -> tuple[HeightMap, MapImage, NDArray[np.float32]]:
         reconstructor = self._reconstructor_for(question)
-        if question.taken is not self._taken or self._shown is None:
-            self._taken = None
-            _require_sensor(question.taken, question.calibration)
-            picture = question.taken.picture(question.calibration.response)
-            heightmap = reconstructor.depth(
-                picture.rgb, name=question.taken.name, normals=False, uncertainty=True
-            )
-            self._shown = heightmap, map_picture(heightmap, Look()), picture.rgb
-            self._taken, self._results = question.taken, {}
+        if question.image is not self._image or self._shown is None:
+            self._image = None
+            _require_sensor(question.image, question.calibration)
+            picture = question.image.picture(question.calibration.response)
+            name = question.image.name
+            heightmap = measurable_depth(reconstructor, picture.rgb, name=name)
+            self._shown = heightmap, map_image(heightmap, Display()), picture.rgb
+            self._image, self._results = question.image, {}
         return self._shown
 
     def _reconstructor_for(self, question: Question) -> Reconstructor:
-        """Return one of its own: another thread's must not be used at the same time."""
+        """Return its own reconstructor, because that of another thread must not be shared."""
         known = self._reconstructor
         if (
             known is None
@@ -186,31 +188,32 @@ class Measuring:
             or known.model != question.model
         ):
             self._reconstructor = Reconstructor(question.calibration, model=question.model)
-            self._taken = None
+            self._image = None
         assert self._reconstructor is not None
         return self._reconstructor
 
 
-def _require_sensor(taken: Taken, calibration: Calibration) -> None:
+def _require_sensor(image: MeasuredImage, calibration: Calibration) -> None:
     serial = calibration.sensor.serial
-    if taken.serial not in ("", serial):
+    if image.serial not in ("", serial):
         raise InputError(
-            tr("the picture is of {other}, the calibration in use is of {one}").format(
-                other=taken.serial, one=serial
-            ),
-            where=taken.name,
+            tr(
+                "The image comes from sensor {other}, but the calibration in use belongs to "
+                "sensor {one}"
+            ).format(other=image.serial, one=serial),
+            where=image.name,
             advice=tr("Choose a calibration of that sensor"),
         )
 
 
 def apply_tool(tool: Tool, heightmap: HeightMap) -> ToolResult | str:
-    """Return what a tool says of a map, or why it says nothing."""
+    """Return the result of a tool on a map, or why there is none."""
     try:
-        return tool.apply(heightmap)
+        return judged(tool.apply(heightmap), heightmap)
     except InputError as error:
         return str(error)
-    except Exception as error:  # one tool that fails must not take the others' figures away
+    except Exception as error:  # a tool that fails must not remove the figures of the others
         _LOG.exception("The tool %s failed", tool.name)
-        return tr("A fault of this program: {kind}; the log has it.").format(
+        return tr("Internal error: {kind}. See the log for details.").format(
             kind=type(error).__name__
         )

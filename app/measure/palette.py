@@ -1,4 +1,4 @@
-"""The palette of measuring tools: one button each, with a key of its own."""
+"""The palette of measuring tools: one button each, with its own key."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import QToolButton, QVBoxLayout, QWidget
 
 from app.measure.placing import Kind, kinds
-from app.shell.icons import icon
+from app.theme.icons import icon
 from app.widgets.naming import named
 from app.widgets.tool_key import add_tool_key
 from gelpolight_core.translation import tr
@@ -15,12 +15,12 @@ SIDE = 26
 
 
 class Palette(QWidget):
-    """One button for each kind of tool; a second press lets it go.
+    """One button for each kind of tool. A second click deselects it.
 
     Signals
     -------
     chosen(str)
-        Name of the kind; empty when none is chosen any more.
+        Name of the kind. Empty if none is chosen any more.
     """
 
     chosen = Signal(str)
@@ -53,13 +53,13 @@ class Palette(QWidget):
         self.buttons[kind.name] = button
         return button
 
-    def let_go(self) -> None:
+    def deselect(self) -> None:
         """Choose none."""
         for button in self.buttons.values():
             button.setChecked(False)
 
     def allow(self, on: bool) -> None:
-        """Offer the tools, or none."""
+        """Enable or disable the tools."""
         for button in self.buttons.values():
             button.setEnabled(on)
 

@@ -1,4 +1,4 @@
-"""From clicks on the map to a tool: how many places each asks for, and in which order; no Qt."""
+"""From clicks on the map to a tool: number and order of its points. Without Qt."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ INDENTERS = ("ball", "cylinder", "cuboid")
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of tool, as a person chooses it.
+    """One kind of tool.
 
     Attributes
     ----------
     name : str
         As in the core.
     label : str
-        What people call it.
+        Name shown to the user.
     key : str
         The key that chooses it.
     asks : tuple of str
-        What each click means.
+        Prompt for each click.
     """
 
     name: str
@@ -54,7 +54,10 @@ def kinds() -> tuple[Kind, ...]:
     on_it = (tr("Click on the object"),)
     return (
         Kind(
-            "distance", tr("Distance"), "D", (tr("Click the first place"), tr("Click the second"))
+            "distance",
+            tr("Distance"),
+            "D",
+            (tr("Click the first point"), tr("Click the second point")),
         ),
         Kind(
             "step-height",
@@ -66,19 +69,27 @@ def kinds() -> tuple[Kind, ...]:
             "profile-width",
             tr("Profile width"),
             "W",
-            (tr("Click where the section begins"), tr("Click where it ends")),
+            (tr("Click the start of the section"), tr("Click the end of the section")),
         ),
         Kind(
             "angle",
             tr("Angle"),
             "A",
-            (tr("Click the end of one arm"), tr("Click the apex"), tr("Click the other arm's end")),
+            (
+                tr("Click the end of one arm"),
+                tr("Click the apex"),
+                tr("Click the end of the other arm"),
+            ),
         ),
         Kind(
             "circle",
             tr("Circle"),
             "C",
-            (tr("Click a place of the rim"), tr("Click a second"), tr("Click a third")),
+            (
+                tr("Click a point on the rim"),
+                tr("Click a second point on the rim"),
+                tr("Click a third point on the rim"),
+            ),
         ),
         Kind(
             "rectangle",
@@ -93,33 +104,33 @@ def kinds() -> tuple[Kind, ...]:
 
 
 def kind_label(name: str) -> str:
-    """Return what people call a kind of tool."""
+    """Return the name of a kind of tool for the user."""
     return next((kind.label for kind in kinds() if kind.name == name), name)
 
 
-def make_tool(name: str, places: Sequence[Point]) -> Tool:
-    """Return the tool through places, as many as its kind asks for."""
+def make_tool(name: str, points: Sequence[Point]) -> Tool:
+    """Return the tool through points, as many as its kind needs."""
     match name:
         case "distance":
-            return Distance(places[0], places[1])
+            return Distance(points[0], points[1])
         case "step-height":
             sides = (STEP_SIDE_MM, STEP_SIDE_MM)
-            return StepHeight(Rectangle(places[0], sides), Rectangle(places[1], sides))
+            return StepHeight(Rectangle(points[0], sides), Rectangle(points[1], sides))
         case "profile-width":
-            return ProfileWidth(places[0], places[1])
+            return ProfileWidth(points[0], points[1])
         case "angle":
-            return Angle(apex_mm=places[1], first_mm=places[0], second_mm=places[2])
+            return Angle(apex_mm=points[1], first_mm=points[0], second_mm=points[2])
         case "circle":
-            return Circle(tuple(places))
+            return Circle(tuple(points))
         case "rectangle":
-            (x0, y0), (x1, y1) = places
+            (x0, y0), (x1, y1) = points
             sides = max(abs(x1 - x0), LEAST_SIDE_MM), max(abs(y1 - y0), LEAST_SIDE_MM)
             return RectangleTool(Rectangle(((x0 + x1) / 2.0, (y0 + y1) / 2.0), sides))
-    return {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}[name](places[0])
+    return {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}[name](points[0])
 
 
-def first_places(name: str, middle_mm: Point) -> tuple[Point, ...]:
-    """Return places for a tool that is put there by a key, about the middle of what is shown."""
+def first_points(name: str, middle_mm: Point) -> tuple[Point, ...]:
+    """Return points for a tool that is placed with the keyboard, around the centre of the view."""
     x, y = middle_mm
     r = FIRST_REACH_MM
     match name:

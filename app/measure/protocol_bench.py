@@ -1,4 +1,4 @@
-"""The virtual bench as the hand that presses the protocol."""
+"""The virtual bench makes the presses of the protocol."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gelpolight_core.measurement.protocol import PressWanted
 
 
 class BenchHand:
-    """Lays on the bench what the protocol asks for, as a technician would.
+    """Places on the bench what the protocol requests.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class BenchHand:
         self._laid: PressWanted | None = None
 
     def lift(self) -> None:
-        """Take everything off the sensor."""
+        """Remove everything from the sensor."""
         self._laid = None
         if self._bench.scene.item != "bare":
             self._bench.lay("bare")

@@ -1,4 +1,4 @@
-"""Beside the live picture: what to press next, how it goes, and how far the run is."""
+"""Panel next to the live image: the next press, its state, and the progress of the run."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.measure.protocol_look import object_name
-from app.shell import theme
+from app.measure.press_check import object_name
+from app.theme import theme
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -38,17 +38,17 @@ class RunPanel(QWidget):
     Signals
     -------
     bare_wanted()
-        The membrane is bare: take its picture.
+        The membrane is bare: capture it.
     capture_wanted()
-        Take this press now, steady or not.
+        Capture this press now, steady or not.
     take_back_wanted()
-        Make the last press again.
+        Repeat the last press.
     bench_wanted(bool)
-        Let the virtual bench press, or stop it.
+        Start or stop presses by the virtual bench.
     evaluate_wanted()
-        Show the result of what is pressed so far.
+        Show the result of the presses so far.
     leave_wanted()
-        Leave the run; it can be gone on with.
+        Leave the run. It can be continued later.
     """
 
     bare_wanted = Signal()
@@ -60,7 +60,7 @@ class RunPanel(QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        named(self, "protocol.panel", tr("The next press"))
+        named(self, "protocol.panel", tr("Next press"))
         self.setFixedWidth(WIDTH)
         column = QVBoxLayout(self)
         column.setContentsMargins(12, 10, 12, 10)
@@ -72,21 +72,21 @@ class RunPanel(QWidget):
         self._build_foot(column)
 
     def _build_task(self, column: QVBoxLayout) -> None:
-        self.title = named(PlainLabel(), "protocol.title", tr("What to press next"))
+        self.title = named(PlainLabel(), "protocol.title", tr("Next object"))
         font = self.title.font()
         font.setPointSizeF(font.pointSizeF() * 1.35)
         font.setBold(True)
         self.title.setFont(font)
         self.title.setWordWrap(True)
-        self.where = named(PlainLabel(), "protocol.where", tr("Where to press it"))
+        self.where = named(PlainLabel(), "protocol.where", tr("Position"))
         self.where.setWordWrap(True)
-        self.live = named(PlainLabel(), "protocol.live", tr("What the live picture shows"))
+        self.live = named(PlainLabel(), "protocol.live", tr("State of the live image"))
         font = self.live.font()
         font.setPixelSize(15)
         self.live.setFont(font)
         self.live.setWordWrap(True)
         self.live.setAlignment(Qt.AlignmentFlag.AlignTop)
-        # Room that is always there, so that nothing below moves when a sentence changes.
+        # Reserved space, so that nothing below moves when a text changes.
         self.live.setMinimumHeight(LIVE_LINES * self.live.fontMetrics().lineSpacing() + 12)
         self.where.setMinimumHeight(2 * self.where.fontMetrics().lineSpacing() + 2)
         self.where.setAlignment(Qt.AlignmentFlag.AlignTop)
@@ -95,9 +95,9 @@ class RunPanel(QWidget):
 
     def _build_buttons(self, column: QVBoxLayout) -> None:
         self.bare = named(
-            QPushButton(tr("The membrane is &bare: begin")),
+            QPushButton(tr("Capture &bare membrane")),
             "protocol.bare",
-            tr("Take the picture of the bare membrane, and begin"),
+            tr("Capture the bare membrane and start"),
         )
         self.bare.setMinimumHeight(38)
         self.bare.clicked.connect(self.bare_wanted)
@@ -105,20 +105,20 @@ class RunPanel(QWidget):
             QPushButton(tr("&Capture now")),
             "protocol.capture",
             tr("Capture this press now"),
-            tr("It is taken by itself once it is steady; it is refused if it is not"),
+            tr("A steady press is captured automatically. A press that moves is refused"),
         )
         self.capture.clicked.connect(self.capture_wanted)
         self.take_back = named(
-            QPushButton(tr("&Repeat the last")),
+            QPushButton(tr("&Repeat last press")),
             "protocol.take_back",
-            tr("Make the last press again"),
-            tr("Its picture is kept in the folder discarded"),
+            tr("Repeat the last press"),
+            tr('The old image is moved to the folder "discarded"'),
         )
         self.take_back.clicked.connect(self.take_back_wanted)
         self.bench = named(
-            QCheckBox(tr("&Let the bench do it")),
+            QCheckBox(tr("&Use virtual bench")),
             "protocol.bench",
-            tr("Let the virtual bench press by itself"),
+            tr("Let the virtual bench make the presses"),
         )
         self.bench.toggled.connect(self.bench_wanted)
         column.addWidget(self.bare)
@@ -129,7 +129,7 @@ class RunPanel(QWidget):
         column.addWidget(self.bench)
 
     def _build_progress(self, column: QVBoxLayout) -> None:
-        self.progress = named(QProgressBar(), "protocol.progress", tr("How far the run is"))
+        self.progress = named(QProgressBar(), "protocol.progress", tr("Progress of the run"))
         self.progress.setTextVisible(False)
         self.counts = named(
             PlainLabel(), "protocol.counts", tr("Presses done, refused and measured")
@@ -156,13 +156,13 @@ class RunPanel(QWidget):
             QPushButton(tr("Lea&ve")),
             "protocol.leave",
             tr("Leave the run"),
-            tr("Every press is kept: it goes on where you leave it"),
+            tr("Every press is saved. You can continue here later"),
         )
         self.leave.clicked.connect(self.leave_wanted)
         self.evaluate = named(
             QPushButton(tr("Show the &result")),
             "protocol.evaluate",
-            tr("Evaluate what is pressed so far"),
+            tr("Evaluate the presses so far"),
         )
         self.evaluate.clicked.connect(self.evaluate_wanted)
         row = QHBoxLayout()
@@ -171,9 +171,9 @@ class RunPanel(QWidget):
         column.addLayout(row)
 
     def show_press(self, press: PressWanted | None, repeats: int) -> None:
-        """Say what to press next; None: all is done."""
+        """Show the next press. None: all are done."""
         if press is None:
-            self.title.setText(tr("All presses are made"))
+            self.title.setText(tr("All presses are done"))
             self.where.setText(tr("Show the result."))
             return
         self.title.setText(object_name(press.truth))
@@ -185,16 +185,16 @@ class RunPanel(QWidget):
         x, y = press.place_mm
         text = tr("{region}: at ({x:.1f}, {y:.1f}) mm").format(region=region, x=x, y=y)
         if press.truth.shape == "cuboid":
-            text += tr(", turned as drawn")
+            text += tr(", rotated as drawn")
         self.where.setText(text + ".")
 
     def show_live(self, sentence: str, *, good: bool = False) -> None:
-        """Say what the live picture shows."""
+        """Show the state of the live image."""
         self.live.setText(sentence)
         show_meaning(self.live, "pass" if good else "")
 
     def show_progress(self, progress: RunProgress, measured: int) -> None:
-        """Say how far the run is."""
+        """Show the progress of the run."""
         self.progress.setRange(0, progress.total)
         self.progress.setValue(progress.done)
         text = tr("{done} of {total} presses, {measured} measured").format(
@@ -233,7 +233,7 @@ class RunPanel(QWidget):
         self.last.setRowCount(min(self.last.rowCount(), MOST_ROWS))
 
     def changeEvent(self, event: QEvent) -> None:
-        """Take the colours of a new theme."""
+        """Apply the colours of a new theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "last"):
             for row in range(self.last.rowCount()):
@@ -244,7 +244,7 @@ class RunPanel(QWidget):
 
 
 def region_name(press: PressWanted) -> str:
-    """Return what people call a press's region."""
+    """Return the name of a press's region for the user."""
     if press.region == SAME_REGION:
         return tr("Same region")
     return tr("Random region {n}").format(n=press.region.removeprefix("r").lstrip("0"))

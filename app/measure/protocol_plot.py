@@ -10,7 +10,7 @@ from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
-from app.shell import theme
+from app.theme import theme
 from app.widgets.label import MarkupLabel
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
@@ -18,6 +18,8 @@ from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
     PAPER_PERCENT,
+    RANDOM,
+    SAME,
     Evaluation,
     PressResult,
     dimension_mm,
@@ -25,7 +27,7 @@ from gelpolight_core.measurement.evaluation import (
 )
 from gelpolight_core.translation import tr
 
-# Okabe and Ito's, the light theme's and the dark theme's; the shapes' signs differ too.
+# Colours of Okabe and Ito for the light and the dark theme. The symbols differ, too.
 COLOURS = {"cylinder": ("#0072b2", "#56b4e9"), "cuboid": ("#d55e00", "#e69f00")}
 SIGNS = {"cylinder": "o", "cuboid": "s"}
 WORDS = {"cylinder": "\N{BLACK CIRCLE}", "cuboid": "\N{BLACK SQUARE}"}
@@ -34,7 +36,7 @@ FILL_ALPHA = 110
 
 
 class Fig13(QWidget):
-    """Bars are means, whiskers one standard deviation, signs the presses, the line the paper's."""
+    """Bars are means, whiskers one standard deviation, symbols the presses, dashes the paper."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -43,7 +45,7 @@ class Fig13(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(4)
         head = QHBoxLayout()
-        self.legend = named(MarkupLabel(), "protocol.legend", tr("What the signs mean"))
+        self.legend = named(MarkupLabel(), "protocol.legend", tr("Legend"))
         head.addWidget(self.legend, 1)
         column.addLayout(head)
         self._grid = QGridLayout()
@@ -62,7 +64,7 @@ class Fig13(QWidget):
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_repaint"):
-            # Not at once: Qt walks over all widgets, and none may be made or lost meanwhile.
+            # Later: Qt is walking over all widgets, and none may be created or deleted meanwhile.
             self._repaint.start()
 
     def _draw(self) -> None:
@@ -80,8 +82,9 @@ class Fig13(QWidget):
                 plot = self._panel(evaluation.series(direction, kinds[name]), direction, name)
                 self._grid.addWidget(plot, row, column)
                 self._plots.append(plot)
+        names = {"cylinder": tr("cylinder"), "cuboid": tr("cuboid")}
         parts = [
-            f"<span style='color:{_colour(shape).name()}'>{WORDS[shape]}</span> {tr(shape)}"
+            f"<span style='color:{_colour(shape).name()}'>{WORDS[shape]}</span> {names[shape]}"
             for shape in COLOURS
             if any(r.press.truth.shape == shape for r in evaluation.results)
         ]
@@ -104,21 +107,22 @@ class Fig13(QWidget):
         plot.setLabel("bottom", across, color=text.name())
         plot.setLabel("left", tr("absolute error (%)"), color=text.name())
         title = tr("Planar direction") if direction == "planar" else tr("Depth direction")
-        plot.setTitle(title if regions == ALL else f"{title}, {tr(regions)}", color=text.name())
+        words = {SAME: tr("same region"), RANDOM: tr("random regions")}.get(regions)
+        plot.setTitle(title if words is None else f"{title}, {words}", color=text.name())
         top = PAPER_PERCENT[direction]
         for k, (shape, sign) in enumerate(SIGNS.items()):
             own = [r for r in results if r.press.truth.shape == shape]
-            for place, dimension in enumerate(dimensions):
+            for centre, dimension in enumerate(dimensions):
                 errors = _errors(own, direction, dimension)
                 if errors.size:
-                    _bar(plot, place + (k - 0.5) * BAR_WIDTH * 1.1, errors, _colour(shape), sign)
+                    _bar(plot, centre + (k - 0.5) * BAR_WIDTH * 1.1, errors, _colour(shape), sign)
                     top = max(top, float(errors.max()))
         dashes = pg.mkPen(text, width=1.2, dash=[5, 4])
         plot.addItem(pg.InfiniteLine(PAPER_PERCENT[direction], angle=0, pen=dashes))
         plot.setMouseEnabled(x=False, y=False)
         plot.hideButtons()
-        places = (-0.6, max(len(dimensions), 1) - 0.4)
-        plot.setRange(xRange=places, yRange=(0.0, 1.1 * top), padding=0)
+        x_range = (-0.6, max(len(dimensions), 1) - 0.4)
+        plot.setRange(xRange=x_range, yRange=(0.0, 1.1 * top), padding=0)
         return plot
 
 
@@ -138,7 +142,7 @@ def _errors(
 
 def _bar(
     plot: pg.PlotWidget,
-    place: float,
+    centre: float,
     errors: np.ndarray[tuple[int], np.dtype[np.float64]],
     colour: QColor,
     sign: str,
@@ -147,13 +151,13 @@ def _bar(
     fill.setAlpha(FILL_ALPHA)
     mean = float(errors.mean())
     plot.addItem(
-        pg.BarGraphItem(x=[place], height=[mean], width=BAR_WIDTH, brush=fill, pen=pg.mkPen(None))
+        pg.BarGraphItem(x=[centre], height=[mean], width=BAR_WIDTH, brush=fill, pen=pg.mkPen(None))
     )
     if errors.size > 1:
         spread = float(errors.std(ddof=1))
         plot.addItem(
             pg.ErrorBarItem(
-                x=np.array([place]),
+                x=np.array([centre]),
                 y=np.array([mean]),
                 top=np.array([spread]),
                 bottom=np.array([min(spread, mean)]),
@@ -164,6 +168,6 @@ def _bar(
     jitter = np.linspace(-0.3, 0.3, errors.size) * BAR_WIDTH if errors.size > 1 else np.zeros(1)
     plot.addItem(
         pg.ScatterPlotItem(
-            place + jitter, errors, symbol=sign, size=5, brush=colour, pen=pg.mkPen(None)
+            centre + jitter, errors, symbol=sign, size=5, brush=colour, pen=pg.mkPen(None)
         )
     )

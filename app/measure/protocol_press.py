@@ -1,4 +1,4 @@
-"""Pressing the protocol: the live picture with the mark, and captures that happen by themselves."""
+"""Makes the presses of the protocol: live image with the mark, and automatic capture."""
 
 from __future__ import annotations
 
@@ -8,15 +8,21 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from app.calibrate.camera_link import CameraLink
-from app.calibrate.watching import Watching
+from app.context.context import AppContext
+from app.live.live_detection import LiveDetection
 from app.live.live_view import LiveView
 from app.live.overlay import Overlay
+from app.live.session import LiveSession
+from app.measure.press_check import (
+    TOLERANCE_MM,
+    PressCheck,
+    Target,
+    make_target,
+    why_not_bare,
+)
 from app.measure.protocol_bench import BenchHand
-from app.measure.protocol_look import TOLERANCE_MM, PressLooker, Target, make_target
 from app.measure.protocol_panel import RunPanel
 from app.measure.protocol_work import ProtocolWork
-from app.shell.context import AppContext
 from app.sources.processor import Failure
 from app.widgets.naming import named
 from gelpolight_core.measurement.steadiness import judge_press
@@ -24,18 +30,18 @@ from gelpolight_core.translation import tr
 
 FRAMES = 4
 HAND_MS = 100
-"""How often the virtual bench looks what it should do."""
+"""Interval at which the virtual bench checks for its next action."""
 
 
 class PressingView(QWidget):
-    """Leads through the presses of one run.
+    """Guides the user through the presses of one run.
 
     Signals
     -------
     left()
-        The person leaves the run.
+        The user leaves the run.
     result_wanted()
-        The person wants to see the result.
+        The user wants to see the result.
     """
 
     left = Signal()
@@ -43,27 +49,26 @@ class PressingView(QWidget):
 
     def __init__(self, work: ProtocolWork, *, context: AppContext) -> None:
         super().__init__()
-        named(self, "protocol.pressing", tr("Press the protocol"))
+        named(self, "protocol.pressing", tr("Make the presses"))
         self._work, self._context = work, context
         self._bare: NDArray[Any] | None = None
         self._target: Target | None = None
-        self._looker: PressLooker | None = None
+        self._check: PressCheck | None = None
         self._hand: BenchHand | None = None
         self._must_move = False
-        self._watching = Watching(self)
-        self.camera = CameraLink(self._watching, context=context, parent=self)
-        self.live = LiveView()
+        self.live = LiveSession(context=context, name="protocol", parent=self)
+        self._detection = LiveDetection(self.live)
+        self.image = LiveView()
         self.panel = RunPanel()
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(0)
-        row.addWidget(self.live, 1)
+        row.addWidget(self.image, 1)
         row.addWidget(self.panel)
         self._tick = QTimer(self)
         self._tick.setInterval(HAND_MS)
         self._tick.timeout.connect(self._move_hand)
         self._connect()
-        self.camera.use(True)
         self._follow_source()
         self._show_next()
 
@@ -75,47 +80,50 @@ class PressingView(QWidget):
         panel.bench_wanted.connect(self._on_bench)
         panel.evaluate_wanted.connect(self.result_wanted)
         panel.leave_wanted.connect(self.left)
-        self._watching.detected.connect(self._on_detected)
-        self._watching.refused.connect(self.panel.show_live)
-        self.camera.switched.connect(self._on_switched)
-        self.camera.lost.connect(self._on_lost)
-        self._context.source.changed.connect(self._on_source)
+        self.live.processed.connect(self._on_detected)
+        self.live.switched.connect(self._on_switched)
+        self.live.lost.connect(self._on_lost)
+        self.live.source_changed.connect(self._on_source)
         work.measured.connect(panel.show_measured)
         work.changed.connect(self._show_progress)
 
-    # What the view around it asks
+    # Called by the parent view
 
     def enter(self) -> None:
-        """Look at the camera."""
-        self.camera.enter(True)
+        """Start using the camera."""
+        self.live.enter(True)
 
     def leave(self) -> None:
-        """Let the camera go; the bench rests too."""
+        """Release the camera, and stop the bench."""
         self._tick.stop()
-        self.camera.enter(False)
+        self.live.enter(False)
 
     def close_run(self) -> None:
         """Stop for good."""
         self._tick.stop()
-        self._context.source.changed.disconnect(self._on_source)
-        self.camera.enter(False)
+        self.live.finish()
 
     # The bare membrane
 
     def take_bare(self) -> None:
-        """Take the picture that presses are told from."""
-        self._watching.capture(1, self._keep_bare)
+        """Capture the image of the bare membrane as the reference for all presses."""
+        self.live.capture(1, self._keep_bare, self.panel.show_live)
 
     def _keep_bare(self, frames: list[NDArray[Any]]) -> None:
         camera, seen = self._work.calibration.camera, frames[-1].shape
         if seen[:2] != (camera.height, camera.width):
             self.panel.show_live(
                 tr(
-                    "The camera's picture is {u}x{v}, the calibration is for {w}x{h}: choose the "
-                    "camera of this sensor in the bar above."
+                    "The camera image is {u}x{v} pixels, but the calibration is for "
+                    "{w}x{h}. Choose the camera of this sensor in the bar above."
                 ).format(u=seen[1], v=seen[0], w=camera.width, h=camera.height)
             )
             self.panel.bench.setChecked(False)
+            return
+        problem = why_not_bare(frames[-1], self._work.calibration)
+        if problem:
+            self._show_next()
+            self.panel.show_live(problem)
             return
         self._bare = frames[-1]
         self._aim()
@@ -123,9 +131,9 @@ class PressingView(QWidget):
     # Presses
 
     def capture(self) -> None:
-        """Take the press as it is now; it is judged all the same."""
-        if self._looker is not None:
-            self._watching.capture(FRAMES, self._judge)
+        """Capture the press as it is. It is still checked."""
+        if self._check is not None:
+            self.live.capture(FRAMES, self._judge, self.panel.show_live)
 
     def _judge(self, frames: list[NDArray[Any]]) -> None:
         target = self._target
@@ -138,9 +146,9 @@ class PressingView(QWidget):
             tolerance_px=TOLERANCE_MM * target.pixels_per_mm,
         )
         if not judged.accepted:
-            # The same again would be refused again; of one that moved, holding still is enough.
+            # An identical press would be refused again. If it moved, holding still is enough.
             self._must_move = not judged.moved
-            self._watching.forget_movement()
+            self._detection.forget_movement()
             self._work.refuse(target.press, judged.reason)
             self.panel.show_live(tr("Refused: {why}").format(why=judged.reason))
             return
@@ -154,23 +162,23 @@ class PressingView(QWidget):
         self._aim()
 
     def _aim(self) -> None:
-        """Ask for the next press."""
+        """Request the next press."""
         self._must_move = False
         press = self._work.run.next()
-        # Nobody looks at the pictures any more: what is left to measure is measured the sooner.
-        self.camera.use(press is not None)
+        # The images are no longer needed, so the remaining measurements get more time.
+        self.live.use(press is not None)
         self._show_next()
         if press is None or self._bare is None:
-            self._target = self._looker = None
-            self._watching.look_with(None)
-            self.live.set_overlay(Overlay())
+            self._target = self._check = None
+            self._detection.set_detector(None)
+            self.image.set_overlay(Overlay())
             return
-        self._target = make_target(press, self._work.picture)
-        self._looker = PressLooker(self._target, self._bare)
-        self._watching.look_with(self._looker)
+        self._target = make_target(press, self._work.image_map)
+        self._check = PressCheck(self._target, self._bare)
+        self._detection.set_detector(self._check)
 
     def _on_detected(self, item: Any) -> None:
-        if self._looker is None or self._watching.capturing:
+        if self._check is None or self.live.capturing:
             return
         if isinstance(item, Failure):
             self.panel.show_live(item.sentence)
@@ -178,15 +186,15 @@ class PressingView(QWidget):
         seen = item.value
         if seen is None:
             return
-        self.live.set_overlay(seen.detection.overlay)
-        # What was seen for the press before is no word on this one.
-        held = self._looker.phase == "hold" and seen.detection.ready
+        self.image.set_overlay(seen.detection.overlay)
+        # Observations of the previous press do not apply to this one.
+        held = self._check.phase == "hold" and seen.detection.held
         if self._must_move and held and not seen.moved:
             return
         self._must_move = False
         self.panel.show_live(seen.detection.sentence, good=held)
         if held and seen.still:
-            self.panel.show_live(tr("Steady: it is being taken."), good=True)
+            self.panel.show_live(tr("Steady. Capturing…"), good=True)
             self.capture()
 
     # What is shown
@@ -198,16 +206,22 @@ class PressingView(QWidget):
         self._show_progress()
         ready = self._bare is not None and press is not None
         self.panel.capture.setEnabled(ready)
-        there = self._watching.stream is not None
-        self.panel.bare.setVisible(self._bare is None and press is not None)
+        there = self.live.stream is not None
+        # It stays after the first time: if that was wrong, every press would be refused.
+        self.panel.bare.setVisible(press is not None)
         self.panel.bare.setEnabled(there)
+        self.panel.bare.setText(
+            tr("Capture &bare membrane")
+            if self._bare is None
+            else tr("Capture &bare membrane again")
+        )
         if press is None:
             self.panel.show_live("")
         elif not there:
-            self.panel.show_live(tr("No camera: choose one in the bar above."))
+            self.panel.show_live(tr("No camera is selected. Choose one in the bar above."))
         elif self._bare is None:
             self.panel.show_live(
-                tr("Lift everything off the sensor, then say so: presses are told from that.")
+                tr('Lift everything off the sensor, then click "Capture bare membrane".')
             )
 
     def _show_progress(self) -> None:
@@ -217,9 +231,8 @@ class PressingView(QWidget):
 
     def _on_source(self) -> None:
         self._follow_source()
-        # Another camera's bare membrane is another picture.
+        # Another camera needs its own image of the bare membrane.
         self._bare = None
-        self.camera.open()
 
     def _follow_source(self) -> None:
         source = self._context.source
@@ -231,13 +244,13 @@ class PressingView(QWidget):
             self.panel.bench.setChecked(False)
 
     def _on_switched(self) -> None:
-        self.live.set_stream(self._watching.stream)
-        if self._watching.stream is None:
+        self.image.set_stream(self.live.stream)
+        if self.live.stream is None:
             done = self._work.run.next() is None
-            none = tr("No camera: choose one in the bar above.")
-            self.live.say(tr("All presses are made.") if done else none)
+            none = tr("No camera is selected. Choose one in the bar above.")
+            self.image.say(tr("All presses are done.") if done else none)
         self._aim()
-        if self.panel.bench.isChecked() and self._watching.stream is not None:
+        if self.panel.bench.isChecked() and self.live.stream is not None:
             self._tick.start()
 
     def _on_lost(self, why: str) -> None:
@@ -253,14 +266,14 @@ class PressingView(QWidget):
     def _move_hand(self) -> None:
         """Do what a technician would do now."""
         press = self._work.run.next()
-        if self._hand is None or press is None or self._watching.capturing:
+        if self._hand is None or press is None or self.live.capturing:
             if press is None:
                 self._tick.stop()
             return
         if self._bare is None:
             self._hand.lift()
             self.take_bare()
-        elif self._looker is not None and self._looker.phase == "lift":
+        elif self._check is not None and self._check.phase == "lift":
             self._hand.lift()
         elif not self._must_move:
             self._hand.press(press)

@@ -1,4 +1,4 @@
-"""The result of a run: the figure, the gauge's table, every press, and the report's files."""
+"""The result of a run: figure, repeatability table, all presses, and the report files."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.context.context import AppContext
 from app.measure.protocol_plot import Fig13
 from app.measure.protocol_work import REPORT, ProtocolWork
-from app.shell.context import AppContext
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -43,7 +43,7 @@ class ResultView(QWidget):
     Signals
     -------
     back_wanted()
-        Go back to pressing.
+        Return to the presses.
     left()
         Leave the run.
     """
@@ -61,7 +61,7 @@ class ResultView(QWidget):
         column.setContentsMargins(12, 10, 12, 10)
         column.setSpacing(8)
         column.addLayout(self._build_head())
-        self.sentence = named(PlainLabel(), "protocol.sentence", tr("What came out"))
+        self.sentence = named(PlainLabel(), "protocol.sentence", tr("Results"))
         self.sentence.setWordWrap(True)
         column.addWidget(self.sentence)
         self.figure = Fig13()
@@ -73,7 +73,7 @@ class ResultView(QWidget):
         split.setStretchFactor(1, 2)
         split.setChildrenCollapsible(False)
         column.addWidget(split, 1)
-        self.progress = named(QProgressBar(), "protocol.result.progress", tr("Work that runs"))
+        self.progress = named(QProgressBar(), "protocol.result.progress", tr("Running work"))
         keep = self.progress.sizePolicy()
         keep.setRetainSizeWhenHidden(True)
         self.progress.setSizePolicy(keep)
@@ -89,12 +89,12 @@ class ResultView(QWidget):
         self.verdict.setFont(font)
         row.addWidget(self.verdict, 1)
         self.buttons = {
-            name: named(QPushButton(text), f"protocol.{name}", said)
-            for name, text, said in (
-                ("back", tr("&Go on pressing"), tr("Go back to the presses")),
-                ("save", tr("&Save the report"), tr("Write CSV, HTML and PDF beside the run")),
+            name: named(QPushButton(text), f"protocol.{name}", tip)
+            for name, text, tip in (
+                ("back", tr("&Continue pressing"), tr("Return to the presses")),
+                ("save", tr("&Save the report"), tr("Write CSV, HTML and PDF next to the run")),
                 ("save_as", tr("Save &as…"), tr("Write CSV, HTML and PDF into another folder")),
-                ("leave_result", tr("Lea&ve"), tr("Leave the run; everything is kept")),
+                ("leave_result", tr("Lea&ve"), tr("Leave the run. Everything is saved")),
             )
         }
         for button in self.buttons.values():
@@ -106,12 +106,12 @@ class ResultView(QWidget):
         return row
 
     def wait(self) -> None:
-        """Say that the evaluation is on its way."""
-        self.verdict.setText(tr("Measuring what is not measured yet"))
+        """Show that the evaluation is running."""
+        self.verdict.setText(tr("Measuring the remaining presses"))
         show_meaning(self.verdict, "")
 
     def show_evaluation(self, evaluation: Evaluation) -> None:
-        """Show what came out."""
+        """Show the results."""
         self._evaluation = evaluation
         limits = self._context.settings.limits
         self._limits_percent = limits.size_percent, limits.height_percent
@@ -152,7 +152,7 @@ class ResultView(QWidget):
             holder = QWidget()
             inside = QVBoxLayout(holder)
             pooled = PlainLabel("      ".join(f"{label}: {value}" for label, value in gauge.facts))
-            named(pooled, "protocol.pooled", tr("Repeatability of all objects"))
+            named(pooled, "protocol.pooled", tr("Repeatability over all objects"))
             pooled.setWordWrap(True)
             inside.addWidget(pooled)
             inside.addWidget(table, 1)
@@ -161,22 +161,22 @@ class ResultView(QWidget):
         self._tabs.setCurrentIndex(min(max(chosen, 0), self._tabs.count() - 1))
 
     def show_work(self, title: str, share: float) -> None:
-        """Show what runs; an empty title: nothing."""
+        """Show the running work. An empty title: none."""
         self.progress.setVisible(bool(title))
         self.progress.setFormat(f"{title} %p %")
-        # A single evaluation has no share to tell.
+        # A single evaluation reports no progress.
         self.progress.setRange(0, 100 if share > 0.0 else 0)
         self.progress.setValue(round(100 * share))
 
     def save(self, folder: Path) -> None:
-        """Write every file of the report, judged as it is shown, into a folder."""
+        """Write every file of the report, with the verdict shown, into a folder."""
         if self._evaluation is None:
             return
 
         def done(written: tuple[Path, ...]) -> None:
             url = QUrl.fromLocalFile(str(folder))
             self._context.toasts.show(
-                tr("Report written: {n} files in {folder}").format(n=len(written), folder=folder),
+                tr("Report saved: {n} files in {folder}").format(n=len(written), folder=folder),
                 "pass",
                 actions=((tr("Open the folder"), lambda: QDesktopServices.openUrl(url)),),
             )
@@ -185,15 +185,15 @@ class ResultView(QWidget):
 
     def _save_as(self) -> None:
         chosen = QFileDialog.getExistingDirectory(
-            self, tr("Folder of the report"), str(self._context.settings.last_folder)
+            self, tr("Folder for the report"), str(self._context.settings.folder("report"))
         )
         if chosen:
-            self._context.settings.last_folder = Path(chosen)
+            self._context.settings.keep_folder("report", Path(chosen))
             self.save(Path(chosen))
 
 
 def listing_table(name: str, listing: Listing) -> QTableWidget:
-    """Return a report's table as a widget.
+    """Return a table of the report as a widget.
 
     Parameters
     ----------

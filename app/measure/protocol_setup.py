@@ -1,4 +1,4 @@
-"""Setting up a run of the evaluation protocol: which sensor, what is pressed, how often."""
+"""Set-up of an evaluation run: sensor, objects, number of presses."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.widgets.inputs import ComboBox, SpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -33,20 +34,20 @@ T = TypeVar("T")
 WIDTH = 520
 MOST_RUNS = 8
 SECONDS_A_PRESS = 20
-"""What a practised hand needs, with lifting and finding the place."""
+"""Time of a practised user per press, including lifting and positioning."""
 PAPER = Protocol()
 
 
 @dataclass(frozen=True, slots=True)
 class KnownRun:
-    """A run that can be gone on with.
+    """A run that can be continued.
 
     Attributes
     ----------
     folder : Path
         Its folder.
     text : str
-        What people read: sensor, when, how far.
+        Text for the user: sensor, date, progress.
     """
 
     folder: Path
@@ -54,14 +55,14 @@ class KnownRun:
 
 
 class ProtocolSetup(QScrollArea):
-    """Asks what is to be pressed; offers the runs that were left.
+    """Asks which objects to press, and offers unfinished runs.
 
     Signals
     -------
     begin_wanted(str)
-        Begin a new run with the calibration in this file.
+        Start a new run with the calibration in this file.
     run_wanted(str)
-        Go on with the run in this folder.
+        Continue the run in this folder.
     """
 
     begin_wanted = Signal(str)
@@ -89,19 +90,20 @@ class ProtocolSetup(QScrollArea):
     def _build_form(self, column: QVBoxLayout) -> None:
         column.setSpacing(10)
         column.addWidget(_heading(tr("Evaluate a sensor")))
-        said = PlainLabel(
+        explanation = PlainLabel(
             tr(
-                "Press cylinders and cuboids of known size, in one region and in random ones. The"
-                " program shows where, takes each press by itself once it is steady, and compares"
-                " what it measures with the truth."
+                "Press cylinders and cuboids of known size, in one region and in random "
+                "regions. The program shows the position, captures each press "
+                "automatically when it is steady, and compares the measured values with "
+                "the true ones."
             )
         )
-        said.setWordWrap(True)
-        said.setFixedWidth(WIDTH)
-        column.addWidget(said)
+        explanation.setWordWrap(True)
+        explanation.setFixedWidth(WIDTH)
+        column.addWidget(explanation)
         top = QFormLayout()
         self.calibration = named(
-            QComboBox(), "protocol.calibration", tr("Sensor and calibration to evaluate")
+            ComboBox(), "protocol.calibration", tr("Sensor and calibration to evaluate")
         )
         self.calibration.setSizeAdjustPolicy(
             QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
@@ -140,14 +142,16 @@ class ProtocolSetup(QScrollArea):
             box.valueChanged.connect(self._count)
             counts.addRow(label, box)
         column.addLayout(counts)
-        self.summary = named(PlainLabel(), "protocol.summary", tr("What this comes to"))
+        self.summary = named(
+            PlainLabel(), "protocol.summary", tr("Number of objects and presses, and time")
+        )
         self.summary.setWordWrap(True)
         column.addWidget(self.summary)
-        self.begin = named(QPushButton(tr("&Begin")), "protocol.begin", tr("Begin the run"))
+        self.begin = named(QPushButton(tr("&Start")), "protocol.begin", tr("Start the run"))
         self.begin.setMinimumHeight(40)
         self.begin.clicked.connect(lambda: self.begin_wanted.emit(self.calibration.currentData()))
         column.addWidget(self.begin)
-        self.problem = named(PlainLabel(), "protocol.problem", tr("Why it was not begun"))
+        self.problem = named(PlainLabel(), "protocol.problem", tr("Why the run was not started"))
         self.problem.setWordWrap(True)
         show_meaning(self.problem, "fail")
         self.problem.setFixedWidth(WIDTH)
@@ -156,7 +160,9 @@ class ProtocolSetup(QScrollArea):
 
     def _build_runs(self, column: QVBoxLayout) -> None:
         column.addWidget(_heading(tr("Runs so far")))
-        self._no_runs = PlainLabel(tr("None yet. A run can be left at any press and gone on with."))
+        self._no_runs = PlainLabel(
+            tr("None yet. You can leave a run at any press and continue it later.")
+        )
         self._no_runs.setWordWrap(True)
         self._no_runs.setFixedWidth(320)
         column.addWidget(self._no_runs)
@@ -165,7 +171,7 @@ class ProtocolSetup(QScrollArea):
         column.addStretch(1)
 
     def protocol(self) -> Protocol:
-        """Return what is chosen."""
+        """Return the chosen settings."""
         return Protocol(
             shapes=_chosen(self.shapes),
             sizes_mm=_chosen(self.sizes),
@@ -175,13 +181,13 @@ class ProtocolSetup(QScrollArea):
         )
 
     def show_entries(self, entries: Sequence[Entry]) -> None:
-        """Offer these calibrations; the one in use first, unless another was chosen."""
+        """Offer these calibrations. The one in use is preselected, unless another was chosen."""
         before = self.calibration.currentData()
         self.calibration.clear()
         good = [entry for entry in entries if entry.summary is not None]
         for entry in sorted(good, key=lambda e: not e.in_use):
             note = tr(" (in use)") if entry.in_use else ""
-            self.calibration.addItem(f"{entry.serial}: {entry.path.stem}{note}", str(entry.path))
+            self.calibration.addItem(f"{entry.serial}: {entry.name}{note}", str(entry.path))
         self.calibration.setCurrentIndex(max(self.calibration.findData(before), 0) if good else -1)
         self._count()
 
@@ -197,7 +203,7 @@ class ProtocolSetup(QScrollArea):
             button = named(
                 QPushButton(run.text),
                 f"protocol.run.{number}",
-                tr("Go on with {run}").format(run=run.text.replace("\n", ", ")),
+                tr("Continue {run}").format(run=run.text.replace("\n", ", ")),
                 str(run.folder),
             )
             button.setFixedWidth(320)
@@ -206,17 +212,17 @@ class ProtocolSetup(QScrollArea):
             self._runs.addWidget(button)
 
     def show_problem(self, sentence: str) -> None:
-        """Say why nothing was begun; empty: nothing is wrong."""
+        """Show why the run was not started. Empty: no error."""
         self.problem.setText(sentence)
 
     def _count(self) -> None:
-        """Say what the choice comes to, and allow to begin where it comes to something."""
+        """Show the total of the settings, and enable the start if it is not empty."""
         protocol = self.protocol()
         count = len(protocol.presses())
         if not self.calibration.count():
-            text = tr("Calibrate a sensor first: there is no calibration in the library.")
+            text = tr("There is no calibration in the library. Calibrate a sensor first.")
         elif not count:
-            text = tr("Choose a shape, a size or height, and how often it is pressed.")
+            text = tr("Choose a shape, a size or height, and the number of presses.")
         else:
             text = tr("Objects: {objects}. Presses: {n}, about {time} by hand.").format(
                 objects=len(protocol.objects), n=count, time=_duration(count * SECONDS_A_PRESS)
@@ -247,7 +253,7 @@ def _choices(
     column: QVBoxLayout,
     changed: Callable[[], None],
 ) -> dict[T, QCheckBox]:
-    """Return check boxes, one for each choice, in a group of their own."""
+    """Return check boxes, one for each choice, in their own group box."""
     group = named(QGroupBox(title), f"protocol.{kind}s", title)
     row = QHBoxLayout(group)
     boxes = {}
@@ -267,7 +273,7 @@ def _chosen(boxes: Mapping[T, QCheckBox]) -> tuple[T, ...]:
 
 
 def _number(name: str, accessible: str, value: int) -> QSpinBox:
-    box = named(QSpinBox(), f"protocol.{name}", accessible)
+    box = named(SpinBox(), f"protocol.{name}", accessible)
     box.setRange(0, 99)
     box.setValue(value)
     box.setAlignment(Qt.AlignmentFlag.AlignRight)

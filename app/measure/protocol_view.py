@@ -1,4 +1,4 @@
-"""The evaluation protocol: set it up or go on with a run, press it, and see what came out."""
+"""The evaluation protocol: set up or continue a run, make its presses, and see the result."""
 
 from __future__ import annotations
 
@@ -11,39 +11,39 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
+from app.context.context import AppContext
+from app.context.source_button import SourceButton
 from app.measure.protocol_press import PressingView
 from app.measure.protocol_result import ResultView
 from app.measure.protocol_setup import KnownRun, ProtocolSetup
 from app.measure.protocol_work import Equipped, ProtocolWork, equip
-from app.shell.context import AppContext
-from app.shell.jobs import Job, Jobs
+from app.services.jobs import Job, Jobs
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
-from app.widgets.source_button import SourceButton
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.user import user_name
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.protocol import Protocol, check_protocol, protocol_reach_mm
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.records.evaluation_entry import evaluation_record
 from gelpolight_core.translation import tr
-from gelpolight_core.who import user_name
 
 NAME_FORMAT = "%Y-%m-%d-%H%M%S"
 
 
 class ProtocolView(QWidget):
-    """The whole of the evaluation protocol, for a page to hold.
+    """The whole evaluation protocol, as a widget of a page.
 
     Parameters
     ----------
     context : AppContext
-        The program's.
+        Shared by all pages.
 
     Signals
     -------
     completed(object)
-        A run is evaluated to its end: the MeasurementRecord to be kept of it.
+        A run is completely evaluated: the MeasurementRecord to be saved.
     """
 
     completed = Signal(object)
@@ -74,38 +74,38 @@ class ProtocolView(QWidget):
     def _build_bar(self) -> QHBoxLayout:
         row = QHBoxLayout()
         row.setContentsMargins(12, 6, 12, 6)
-        self.heading = named(PlainLabel(), "protocol.heading", tr("The run"))
+        self.heading = named(PlainLabel(), "protocol.heading", tr("Current run"))
         row.addWidget(self.heading, 1)
         row.addWidget(SourceButton(context=self.context, page="protocol", none=tr("No camera")))
         return row
 
-    # What the page around it asks
+    # Called by the parent page
 
     def enter(self) -> None:
-        """Show what is new, and look at the camera."""
+        """Update, and start using the camera."""
         self._shown = True
         self._refresh()
         if self.pressing is not None and self._stack.currentWidget() is self.pressing:
             self.pressing.enter()
 
     def leave(self) -> None:
-        """Let the camera go."""
+        """Release the camera."""
         self._shown = False
         if self.pressing is not None:
             self.pressing.leave()
 
     def may_close(self) -> bool:
-        """Everything is on disk; work that runs is stopped."""
+        """Return True: everything is on disk. Running work is stopped."""
         self._close_run()
         for work in self._retiring:
             work.close()
         self._jobs.close()
         return True
 
-    # Ways to begin
+    # Start a run
 
     def begin(self, calibration: Path) -> None:
-        """Begin a new run of what is chosen."""
+        """Start a new run with the chosen settings."""
         wanted = self.setup.protocol()
 
         def work(tell: Callable[[float], None]) -> Equipped:
@@ -115,7 +115,7 @@ class ProtocolView(QWidget):
         self._start(tr("Reading the calibration"), work)
 
     def open_run(self, folder: Path) -> None:
-        """Go on with a run where it was left."""
+        """Continue a run."""
 
         def work(tell: Callable[[float], None]) -> Equipped:
             tell(0.0)
@@ -132,7 +132,7 @@ class ProtocolView(QWidget):
     def _new_run(self, path: Path, wanted: Protocol) -> Equipped:
         calibration = read_calibration(path)
         reach_mm = math.floor(100.0 * protocol_reach_mm(calibration)) / 100.0
-        protocol = check_protocol(replace(wanted, reach_mm=reach_mm), where=tr("choice"))
+        protocol = check_protocol(replace(wanted, reach_mm=reach_mm), where=tr("settings"))
         serial = calibration.sensor.serial
         name = datetime.now().astimezone().strftime(NAME_FORMAT)
         folder = self.context.workspace.protocols_folder(serial) / name
@@ -140,12 +140,12 @@ class ProtocolView(QWidget):
         return equip(run, path)
 
     def _calibration_of(self, identity: str) -> Path:
-        """Return the file of the calibration that a run was begun with."""
+        """Return the calibration file of a run."""
         for entry in self.context.workspace.entries():
             if entry.summary is not None and entry.summary.identity == identity:
                 return entry.path
         raise InputError(
-            tr("the calibration {id} of this run is not in the library").format(id=identity),
+            tr("The calibration {id} of this run is not in the library").format(id=identity),
             where=str(self.context.workspace.sensors_folder),
             advice=tr("Import its file on the Sensors page"),
         )
@@ -236,7 +236,7 @@ class ProtocolView(QWidget):
     # The set-up
 
     def _refresh(self) -> None:
-        """Show the calibrations and the runs that there are now."""
+        """Show the present calibrations and runs."""
         try:
             self.setup.show_entries(self.context.workspace.entries())
             self.setup.show_runs([_known(folder) for folder in self.context.workspace.protocols()])
@@ -249,12 +249,12 @@ class ProtocolView(QWidget):
 
 
 def _known(folder: Path) -> KnownRun:
-    """Return a run as it is offered; a damaged one says so when it is opened."""
+    """Return the list entry of a run. A damaged one is reported when it is opened."""
     name = f"{folder.parent.parent.name}, {folder.name}"
     try:
         progress = open_run(folder).progress
     except InputError:
-        return KnownRun(folder, tr("{name}\ndamaged: open it to see why").format(name=name))
+        return KnownRun(folder, tr("{name}\ndamaged: open it to see the reason").format(name=name))
     if progress.done == progress.total:
         state = tr("complete, {n} presses").format(n=progress.total)
     else:

@@ -1,4 +1,4 @@
-"""A run of the protocol on screen: what is pressed is kept at once, and measured beside."""
+"""A run of the protocol: presses are saved at once and measured in the background."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from typing import Any
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
-from app.measure.protocol_look import PictureMap
-from app.shell.jobs import Job, Jobs
+from app.measure.press_check import ImageMap
+from app.services.jobs import Job, Jobs
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.virtual_protocol import evaluate_run, run_ledger
-from gelpolight_core.export.atomic import make_folder
-from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.io.lock import RunLock
 from gelpolight_core.measurement.evaluation import Evaluation, measure_press
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.presses import picture_reconstruction
+from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.measurement.result import Measurement
@@ -34,7 +34,7 @@ REPORT = "report"
 
 @dataclass(frozen=True, slots=True)
 class Equipped:
-    """A run with what it is measured with.
+    """A run with the objects needed to measure it.
 
     Attributes
     ----------
@@ -43,9 +43,9 @@ class Equipped:
     reconstructor : Reconstructor
         Of its calibration.
     ledger : Ledger
-        What is measured already.
+        The measurements so far.
     lock : RunLock
-        Keeps other programs from writing the run.
+        Prevents other programs from writing the run.
     """
 
     run: ProtocolRun
@@ -60,18 +60,18 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
     Raises
     ------
     InputError
-        If the calibration cannot be read, the run was begun with another one, or another program
+        If the calibration cannot be read, the run was started with another one, or another program
         writes it.
     """
     reconstructor = Reconstructor(read_calibration(calibration))
     made = reconstructor.calibration
     if run.content.calibration != made.identity:
         raise InputError(
-            tr("the run was begun with calibration {old}, this is {new}").format(
+            tr("The run was started with calibration {old}, but this is {new}").format(
                 old=run.content.calibration, new=made.identity
             ),
             where=str(run.folder),
-            advice=tr("Use that calibration, or begin a new run"),
+            advice=tr("Use that calibration, or start a new run"),
         )
     lock = RunLock(run.folder)
     try:
@@ -82,22 +82,22 @@ def equip(run: ProtocolRun, calibration: Path) -> Equipped:
 
 
 class ProtocolWork(QObject):
-    """Keeps and measures the presses of one run.
+    """Saves and measures the presses of one run.
 
     Signals
     -------
     measured(object, object)
         A PressWanted, and its Measurement or the sentence why there is none.
     changed()
-        Another press is next, or another count is measured.
+        The next press or the number of measured ones changed.
     evaluated(object)
-        An Evaluation of all that is pressed.
+        An Evaluation of all presses so far.
     refused(str)
-        A sentence: what could not be done.
+        A sentence: what failed.
     busy(str, float)
-        What runs and its share done; an empty text: nothing.
+        Title and progress (0 to 1) of the running work. An empty title: none.
     gone()
-        It was retired, and nothing runs any more.
+        It was retired, and no work is running any more.
     """
 
     measured = Signal(object, object)
@@ -111,8 +111,8 @@ class ProtocolWork(QObject):
         super().__init__(parent)
         self._equipped = equipped
         self.run = equipped.run
-        self.picture = PictureMap(equipped.reconstructor.calibration)
-        self._reconstruct = picture_reconstruction(equipped.reconstructor)
+        self.image_map = ImageMap(equipped.reconstructor.calibration)
+        self._measure_press = press_measurement(equipped.reconstructor)
         self._outcomes: dict[str, Measurement | str] = {}
         self._jobs = Jobs("protocol", self)
         self._jobs.progressed.connect(self.busy)
@@ -120,22 +120,22 @@ class ProtocolWork(QObject):
 
     @property
     def calibration(self) -> Any:
-        """What is evaluated."""
+        """The settings of the evaluation."""
         return self._equipped.reconstructor.calibration
 
     @property
     def measured_count(self) -> int:
-        """How many presses are measured."""
+        """Number of measured presses."""
         return len(self._outcomes)
 
     def catch_up(self) -> None:
-        """Measure what was pressed before and is not measured, or say what is."""
+        """Measure the presses that are not yet measured, or report why this is not possible."""
         for press in self.run.done:
             if press.file not in self._outcomes:
                 self._measure(press)
 
     def accept(self, press: PressWanted, frames: Sequence[NDArray[Any]]) -> bool:
-        """Keep a press and measure it; return whether the disk took it."""
+        """Save a press and measure it. Return whether it was written to disk."""
         try:
             self.run.accept(press, frames)
         except InputError as refusal:
@@ -146,12 +146,12 @@ class ProtocolWork(QObject):
         return True
 
     def refuse(self, press: PressWanted, reason: str) -> None:
-        """Note that a press was not kept."""
+        """Count a refused press."""
         self._on_disk(lambda: self.run.refuse(press, reason))
         self.changed.emit()
 
     def take_back(self) -> None:
-        """Make the press before the next one again; its picture is kept apart."""
+        """Repeat the previous press. Its old image is kept in another folder."""
         done = self.run.done
         if done:
             self._on_disk(lambda: self.run.take_back(done[-1]))
@@ -159,7 +159,7 @@ class ProtocolWork(QObject):
             self.changed.emit()
 
     def evaluate(self) -> None:
-        """Compare all that is pressed with its truth, after what is still being measured."""
+        """Compare all presses with their true values, after the running measurements."""
         equipped = self._equipped
 
         def work(tell: Callable[[float], None]) -> Evaluation:
@@ -176,18 +176,18 @@ class ProtocolWork(QObject):
         *,
         limits_percent: tuple[float, float],
     ) -> None:
-        """Write every file of the report into a folder, then call `done` with their places.
+        """Write every file of the report into a folder, then call `done` with their paths.
 
         Parameters
         ----------
         evaluation : Evaluation
-            What is reported.
+            Content of the report.
         folder : Path
-            Made where it is missing.
+            Created if it is missing.
         done : callable
-            Given the places of what was written.
+            Called with the paths of the written files.
         limits_percent : (float, float)
-            Largest mean absolute errors, planar and in depth, for it to pass.
+            Maximum mean absolute errors, planar and in depth, for a pass.
         """
 
         def work(tell: Callable[[float], None]) -> tuple[Path, ...]:
@@ -200,7 +200,7 @@ class ProtocolWork(QObject):
         self._jobs.submit(Job(tr("Writing the report"), work, done, self.refused.emit))
 
     def retire(self) -> None:
-        """Stop measuring after the press at hand, and go; the run can be gone on with."""
+        """Stop measuring after the current press, and close. The run can be continued."""
         self._equipped.lock.release()
         self._jobs.cancel()
         if self._jobs.busy:
@@ -209,7 +209,7 @@ class ProtocolWork(QObject):
             self._go_when_done("", 0.0)
 
     def close(self) -> None:
-        """Stop measuring and wait for the press at hand: nothing runs afterwards."""
+        """Stop measuring and wait for the current press. Nothing runs afterwards."""
         self._equipped.lock.release()
         self._jobs.close()
 
@@ -223,10 +223,10 @@ class ProtocolWork(QObject):
 
         def work(tell: Callable[[float], None]) -> Measurement | str:
             tell(0.0)
-            return measure_press(picture, shape, self._reconstruct, ledger)
+            return measure_press(picture, shape, self._measure_press, ledger)
 
         def done(outcome: Measurement | str) -> None:
-            # It may have been taken back meanwhile.
+            # It may have been discarded meanwhile.
             if press in self.run.done:
                 self._outcomes[press.file] = outcome
                 self.measured.emit(press, outcome)

@@ -1,4 +1,4 @@
-"""The lab's records behind the page: read and written beside the window, removals undone."""
+"""The lab's records: read and written in the background, with undo."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from app.shell.context import AppContext
-from app.shell.jobs import Job, Jobs
-from gelpolight_core.calibration.calibration import Calibration
+from app.context.context import AppContext
+from app.services.jobs import Job, Jobs
 from gelpolight_core.errors import InputError
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.evaluation_entry import add_once
 from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 Change = Callable[[Records], object]
@@ -26,18 +26,18 @@ class RecordBook(QObject):
     Attributes
     ----------
     undo : QUndoStack
-        History of what was removed and written on.
+        History of removals and notes.
     records : tuple of MeasurementRecord
-        All that are there, oldest first.
+        All records, oldest first.
 
     Signals
     -------
     changed()
-        `records` are others.
+        `records` changed.
     refused(str)
         A sentence: why something could not be read or written.
     noticed(str)
-        What the person should know of the file.
+        Information about the file for the user.
     """
 
     changed = Signal()
@@ -52,21 +52,21 @@ class RecordBook(QObject):
         self._jobs = Jobs("records", self)
         self._jobs.refused.connect(self.refused)
         self._folder: Path | None = None
-        self._told = ""
+        self._reported = ""
         context.requests.calibrations_changed.connect(self._on_workspace)
 
     @property
     def busy(self) -> bool:
-        """Whether anything is being read or written."""
+        """Whether a job is reading or writing."""
         return self._jobs.busy
 
     def refresh(self) -> None:
-        """Read what is there; of another workspace if that was chosen meanwhile."""
+        """Read the records, of another workspace if one was chosen meanwhile."""
         folder = self._context.workspace.folder
         if folder != self._folder:
             self._folder = folder
             self.undo.clear()
-            self._take(())  # numbers of the other workspace's are others' here
+            self._take(())  # record numbers of the other workspace have another meaning here
         if (folder / NAME).exists():
             self._do(tr("Reading the records"), _nothing)
         else:
@@ -83,9 +83,9 @@ class RecordBook(QObject):
         *,
         calibration: Calibration | None = None,
     ) -> None:
-        """Keep a measurement, and what is known of its calibration.
+        """Save a measurement and the description of its calibration.
 
-        `done` is told its number once it is on the disk.
+        `done` is called with its number when it is on disk.
         """
 
         def keep(records: Records) -> int:
@@ -100,33 +100,33 @@ class RecordBook(QObject):
                 )
             return number
 
-        self._do(tr("Keeping the measurement"), keep, done)
+        self._do(tr("Saving the measurement"), keep, done)
 
     def add_once(self, record: MeasurementRecord, done: Callable[[int], object]) -> None:
-        """Keep an evaluation unless it is there already; `done` is told its number, or 0."""
-        self._do(tr("Keeping the evaluation"), lambda records: add_once(records, record), done)
+        """Save an evaluation unless it is already there. `done` is called with its number, or 0."""
+        self._do(tr("Saving the evaluation"), lambda records: add_once(records, record), done)
 
     def remove(self, numbers: tuple[int, ...]) -> None:
-        """Remove measurements; it can be undone."""
+        """Remove measurements. This can be undone."""
         if numbers:
             self.undo.push(_Removal(self, numbers))
 
     def write_note(self, number: int, note: str) -> None:
-        """Write another note on a measurement; it can be undone."""
+        """Change the note of a measurement. This can be undone."""
         before = next((r.note for r in self.records if r.id == number), "")
         if note != before:
             self.undo.push(_Note(self, number, before, note))
 
     def export(self, path: Path, serial: str | None, done: Callable[[int], object]) -> None:
-        """Write a table of all measurements, or of one sensor's."""
+        """Write a table of all measurements, or of those of one sensor."""
         self._do(tr("Writing the table"), lambda records: records.export_csv(path, serial), done)
 
     def change(self, title: str, change: Change) -> None:
-        """Change the records, beside the window."""
+        """Change the records in the background."""
         self._do(title, change)
 
     def close(self) -> None:
-        """Finish what was begun."""
+        """Finish the work in progress."""
         self._jobs.close()
 
     def _do(self, title: str, change: Change, done: Callable[[int], object] | None = None) -> None:
@@ -137,19 +137,19 @@ class RecordBook(QObject):
             records = workspace.records if workspace.folder == folder else None
             if records is None or records.path != folder / NAME:
                 if change is _nothing:
-                    return None, (), ""  # the other workspace's are read by a job of their own
+                    return None, (), ""  # another job reads those of the other workspace
                 raise InputError(
                     tr("{title}: another workspace was chosen meanwhile").format(title=title),
                     where=str(folder),
-                    advice=tr("Choose that workspace again, and do it again"),
+                    advice=tr("Choose the previous workspace and try again"),
                 )
             result = change(records)
             return result, records.measurements(), records.notice
 
         def finish(found: tuple[int, tuple[MeasurementRecord, ...], str]) -> None:
             result, records, notice = found
-            if notice and notice != self._told:
-                self._told = notice
+            if notice and notice != self._reported:
+                self._reported = notice
                 self.noticed.emit(notice)
             if workspace.folder == folder:
                 self._take(records)
@@ -165,11 +165,11 @@ class RecordBook(QObject):
 
 
 def _nothing(_records: Records) -> None:
-    """Change nothing: the records are read."""
+    """Change nothing. The records are read."""
 
 
 class _Removal(QUndoCommand):
-    """Measurements removed."""
+    """Removal of measurements."""
 
     def __init__(self, book: RecordBook, numbers: tuple[int, ...]) -> None:
         super().__init__(tr("remove {n} measurements").format(n=len(numbers)))
@@ -180,8 +180,8 @@ class _Removal(QUndoCommand):
         self._each(tr("Removing"), Records.remove)
 
     def undo(self) -> None:
-        """Bring them back."""
-        self._each(tr("Bringing back"), Records.restore)
+        """Restore them."""
+        self._each(tr("Restoring"), Records.restore)
 
     def _each(self, title: str, change: Callable[[Records, int], None]) -> None:
         def run(records: Records) -> None:
@@ -192,19 +192,19 @@ class _Removal(QUndoCommand):
 
 
 class _Note(QUndoCommand):
-    """Another note on a measurement."""
+    """Change of a note."""
 
     def __init__(self, book: RecordBook, number: int, before: str, after: str) -> None:
-        super().__init__(tr("write a note"))
+        super().__init__(tr("edit a note"))
         self._book, self._number = book, number
         self._before, self._after = before, after
 
     def redo(self) -> None:
-        """Write it."""
+        """Write the new note."""
         self._write(self._after)
 
     def undo(self) -> None:
-        """Write the old one again."""
+        """Write the old note again."""
         self._write(self._before)
 
     def _write(self, note: str) -> None:

@@ -1,4 +1,4 @@
-"""The records as a table: a line for each measurement, sorted and filtered."""
+"""The records as a table: one row per measurement, sortable and filterable."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from PySide6.QtCore import (
 
 from app.measure.figures_text import unit_behind, unit_of, value_text
 from app.measure.placing import kind_label
-from app.shell import theme
-from app.shell.icons import icon
+from app.theme import theme
+from app.theme.icons import icon
 from app.widgets.label import plain_tip
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, MeasurementRecord, Quantity
 from gelpolight_core.records.evaluation_entry import SHAPE as EVALUATION
@@ -25,39 +25,41 @@ from gelpolight_core.translation import tr
 Index = QModelIndex | QPersistentModelIndex
 NOWHERE = QModelIndex()
 SORT = Qt.ItemDataRole.UserRole
-TIME, SENSOR, WHAT, FIRST, FIRST_ERROR, DEPTH, DEPTH_ERROR, VERDICT, WHO, NOTE, PICTURE = range(11)
+TIME, SENSOR, WHAT, FIRST, FIRST_ERROR, DEPTH, DEPTH_ERROR, VERDICT, OPERATOR, NOTE, IMAGE = range(
+    11
+)
 _RIGHT = (FIRST, FIRST_ERROR, DEPTH, DEPTH_ERROR)
 _VERDICTS = {PASSED: ("pass", "pass"), FAILED: ("fail", "fail"), DOUBTFUL: ("warn", "warn")}
 
 
 def headers() -> tuple[str, ...]:
-    """Return what stands above the columns."""
+    """Return the column headers."""
     return (
-        tr("When"), tr("Sensor"), tr("What"), tr("Size or figure"), tr("Error"),
-        tr("Depth"), tr("Error"), tr("Verdict"), tr("Who"), tr("Note"), tr("Picture"),
+        tr("Date"), tr("Sensor"), tr("Object"), tr("Size or figure"), tr("Error"),
+        tr("Depth"), tr("Error"), tr("Verdict"), tr("Operator"), tr("Note"), tr("Image"),
     )  # fmt: skip
 
 
 def verdict_word(verdict: str) -> str:
-    """Return what people read for a verdict."""
-    words = {PASSED: tr("within"), FAILED: tr("beyond"), DOUBTFUL: tr("doubtful")}
-    return words.get(verdict, tr("no truth"))
+    """Return the text of a verdict."""
+    words = {PASSED: tr("within limit"), FAILED: tr("outside limit"), DOUBTFUL: tr("doubtful")}
+    return words.get(verdict, tr("no true value"))
 
 
 def shape_label(shape: str) -> str:
-    """Return what people call what was measured."""
+    """Return the name of what was measured."""
     if shape == EVALUATION:
         return tr("Evaluation (mean errors)")
     return kind_label(shape.replace("_", "-"))
 
 
 def quantity_text(quantity: Quantity) -> str:
-    """Return a value as people write it."""
+    """Return a value as text."""
     return value_text(quantity.value, quantity.sd, unit_of(quantity.name))
 
 
 def error_text(quantity: Quantity | None) -> str:
-    """Return an error in its unit and in percent; empty where no truth is known."""
+    """Return an error in its unit and in percent. Empty if there is no true value."""
     if quantity is None or quantity.error is None or quantity.error_percent is None:
         return ""
     behind = unit_behind(unit_of(quantity.name))
@@ -136,7 +138,7 @@ class RecordModel(QAbstractTableModel):
 
 
 class RecordFilter(QSortFilterProxyModel):
-    """Shows those of one sensor and shape, or all."""
+    """Shows the records of one sensor and object type, or all."""
 
     def __init__(self, model: RecordModel) -> None:
         super().__init__()
@@ -146,7 +148,7 @@ class RecordFilter(QSortFilterProxyModel):
         self.setSortRole(SORT)
 
     def choose(self, serial: str, shape: str) -> None:
-        """Show those of this sensor and shape; empty: of all."""
+        """Show the records of this sensor and shape. Empty: of all."""
         self.beginFilterChange()
         self.serial, self.shape = serial, shape
         self.endFilterChange()
@@ -157,7 +159,7 @@ class RecordFilter(QSortFilterProxyModel):
 
     @property
     def shown(self) -> tuple[MeasurementRecord, ...]:
-        """The records that are shown, in the order of the table."""
+        """The visible records, in the order of the table."""
         rows = range(self.rowCount())
         return tuple(
             self._model.records[self.mapToSource(self.index(row, 0)).row()] for row in rows

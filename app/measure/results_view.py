@@ -1,4 +1,4 @@
-"""What was measured: the table, its statistics, the error over time, and the way out as CSV."""
+"""The records: table, statistics, error over time, and CSV export."""
 
 from __future__ import annotations
 
@@ -20,27 +20,28 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.measure.drift_plot import DriftPlot
+from app.context.context import AppContext
+from app.measure.error_plot import ErrorPlot
 from app.measure.figures_text import unit_behind, unit_of
 from app.measure.record_book import RecordBook
 from app.measure.record_table import (
+    IMAGE,
     NOTE,
-    PICTURE,
     TIME,
     RecordFilter,
     RecordModel,
     shape_label,
 )
-from app.shell.actions import make_action
-from app.shell.context import AppContext
-from app.shell.icons import icon
+from app.theme.icons import icon
+from app.widgets.actions import make_action
+from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.statistics import Statistics, statistics_of
 from gelpolight_core.translation import tr
 
-PICTURE_WIDTH = 130
+IMAGE_WIDTH = 130
 
 
 class ResultsView(QWidget):
@@ -51,7 +52,7 @@ class ResultsView(QWidget):
     book : RecordBook
         The records.
     context : AppContext
-        The program's.
+        Shared by all pages.
     """
 
     def __init__(self, book: RecordBook, *, context: AppContext) -> None:
@@ -60,17 +61,17 @@ class ResultsView(QWidget):
         self._book, self._context = book, context
         self.model = RecordModel()
         self.filter = RecordFilter(self.model)
-        self.sensor = named(QComboBox(), "measure.results.sensor", tr("Sensor"))
-        self.shape = named(QComboBox(), "measure.results.shape", tr("What was measured"))
+        self.sensor = named(ComboBox(), "measure.results.sensor", tr("Sensor"))
+        self.shape = named(ComboBox(), "measure.results.shape", tr("Object"))
         self.export = _button("export", tr("&Export as CSV…"), "copy")
         self.remove = _button("remove", tr("&Delete"), "remove")
-        self.count = named(PlainLabel(), "measure.results.count", tr("How many are shown"))
+        self.count = named(PlainLabel(), "measure.results.count", tr("Number of records shown"))
         self.table = self._make_table()
         self.statistics = named(MarkupLabel(), "measure.results.statistics", tr("Statistics"))
         self.statistics.setWordWrap(True)
         self.statistics.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.statistics.setAlignment(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft)
-        self.drift = DriftPlot()
+        self.drift = ErrorPlot()
         self.drift_title = named(PlainLabel(), "measure.results.drift_title", tr("Error over time"))
         self._lay_out()
         self._connect()
@@ -90,8 +91,8 @@ class ResultsView(QWidget):
         header = table.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(NOTE, QHeaderView.ResizeMode.Stretch)
-        header.setSectionResizeMode(PICTURE, QHeaderView.ResizeMode.Interactive)
-        header.resizeSection(PICTURE, PICTURE_WIDTH)
+        header.setSectionResizeMode(IMAGE, QHeaderView.ResizeMode.Interactive)
+        header.resizeSection(IMAGE, IMAGE_WIDTH)
         table.setTabKeyNavigation(False)
         return table
 
@@ -100,7 +101,7 @@ class ResultsView(QWidget):
         bar = QHBoxLayout()
         bar.setContentsMargins(8, 6, 8, 6)
         bar.setSpacing(8)
-        for text, box in ((tr("Sensor"), self.sensor), (tr("What"), self.shape)):
+        for text, box in ((tr("Sensor"), self.sensor), (tr("Object"), self.shape)):
             bar.addWidget(PlainLabel(text))
             bar.addWidget(box)
         bar.addWidget(self.count)
@@ -126,7 +127,7 @@ class ResultsView(QWidget):
         self.split.setSizes([420, 260])
         self.split.setChildrenCollapsible(False)
         empty = named(
-            PlainLabel(tr("Nothing is kept yet. Measure a press, then keep it in the records.")),
+            PlainLabel(tr("No records yet. Measure a press and save it to the records.")),
             "measure.results.empty",
             tr("No records"),
         )
@@ -160,13 +161,13 @@ class ResultsView(QWidget):
     # What is shown
 
     def refresh(self) -> None:
-        """Show the records as they are now; what was selected stays so."""
+        """Show the current records. The selection is kept."""
         chosen = {record.id for record in self.selected}
         self.model.show(self._book.records)
         self._fill(self.sensor, tr("All sensors"), {r.serial: r.serial for r in self.model.records})
         self._fill(
             self.shape,
-            tr("Everything"),
+            tr("All objects"),
             {r.shape: shape_label(r.shape) for r in self._book.records},
         )
         self._on_filter()
@@ -193,16 +194,17 @@ class ResultsView(QWidget):
 
     @property
     def selected(self) -> tuple[MeasurementRecord, ...]:
-        """The records whose lines are selected."""
+        """The records of the selected rows."""
         rows = sorted(index.row() for index in self.table.selectionModel().selectedRows())
         shown = self.filter.shown
         return tuple(shown[row] for row in rows if row < len(shown))
 
     def group(self) -> tuple[MeasurementRecord, ...]:
-        """Return what the statistics are of.
+        """Return the records for the statistics.
 
-        Those that are selected, if they are several; else all that are shown of the same sensor,
-        shape and true size as the one that is selected, or as the one at the top.
+        These are the selected ones if there are several. Otherwise all visible ones with the same
+        sensor,
+        shape and true size as the selected one or, if none is selected, as the first row.
         """
         selected, shown = self.selected, self.filter.shown
         if len(selected) > 1:
@@ -220,22 +222,22 @@ class ResultsView(QWidget):
         title = tr("Error of {serial} over time, with the limits").format(serial=serial)
         self.drift_title.setText(title if serial else "")
 
-    # What is done
+    # Actions
 
     def remove_selected(self) -> None:
-        """Remove the selected measurements; Ctrl+Z brings them back."""
+        """Remove the selected measurements. Ctrl+Z restores them."""
         numbers = tuple(r.id for r in self.selected if r.id is not None)
         if not numbers:
             return
         self._book.remove(numbers)
-        text = tr("{n} measurements were removed.").format(n=len(numbers))
+        text = tr("{n} measurements removed.").format(n=len(numbers))
         if len(numbers) == 1:
-            text = tr("The measurement was removed.")
+            text = tr("1 measurement removed.")
         self._context.toasts.show(text, actions=((tr("Undo"), self._book.undo.undo),))
 
     def choose_export(self) -> None:
-        """Let the person choose where the table goes."""
-        folder = self._context.settings.last_folder
+        """Let the user choose the file of the table."""
+        folder = self._context.settings.folder("table")
         chosen, _ = QFileDialog.getSaveFileName(
             self, tr("Export as CSV"), str(folder / "measurements.csv"), tr("Tables (*.csv)")
         )
@@ -243,18 +245,18 @@ class ResultsView(QWidget):
             self.export_to(Path(chosen))
 
     def export_to(self, path: Path) -> None:
-        """Write the table: all measurements, or those of the sensor that is chosen."""
+        """Write the table: all measurements, or those of the selected sensor."""
 
         def done(count: int) -> None:
-            text = tr("{n} measurements written to {path}").format(n=count, path=path)
+            text = tr("{n} measurements saved to {path}").format(n=count, path=path)
             self._context.toasts.show(text, "pass")
 
-        self._context.settings.last_folder = path.parent
+        self._context.settings.keep_folder("table", path.parent)
         self._book.export(path, self.sensor.currentData() or None, done)
 
 
 def _thing(record: MeasurementRecord) -> tuple[str, tuple[object, ...]]:
-    """Return what was measured: measurements of one thing can be compared."""
+    """Return what was measured. Measurements with equal results can be compared."""
     truths = tuple(quantity.truth for quantity in record.quantities)
     return record.serial, (record.shape, *truths)
 
@@ -278,9 +280,14 @@ def _statistics_text(group: tuple[MeasurementRecord, ...]) -> str:
         f"<th align='right' style='padding-left: 12px'>{text}</th>"
         for text in (tr("mean"), tr("sd"), tr("spread"), tr("repeatability"), tr("mean error"))
     )
-    note = tr("Repeatability: two measurements differ by less, 95 times of 100.")
+    note = tr(
+        "Repeatability: the difference of two measurements is below this value in 95 of 100 cases."
+    )
     if len(group) == 1:
-        note = tr("One measurement has no spread: press it again and keep that, too.")
+        note = tr(
+            "Statistics need at least two measurements. Press the object again and save the "
+            "result, too."
+        )
     table = f"<table><tr><th></th>{head}</tr>{''.join(rows)}</table>"
     return f"<b>{escaped(title)}</b><br><br>{table}<br>{note}"
 

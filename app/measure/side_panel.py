@@ -1,4 +1,4 @@
-"""Beside the map: the tools on it, the figures of the chosen one, the truth, and to keep it."""
+"""Panel next to the map: the tools, the figures of the chosen one, true values, and saving."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from app.measure.figures_text import figure_text
 from app.measure.placing import kind_label
 from app.measure.truth_form import TruthForm
 from app.measure.work import Work
-from app.shell.icons import icon
+from app.theme.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
@@ -38,20 +38,20 @@ KEY = Qt.ItemDataRole.UserRole
 
 
 class SidePanel(QScrollArea):
-    """What is known of the tools.
+    """Shows the results of the tools.
 
     Signals
     -------
     propose_wanted()
-        It shall be said what is pressed.
+        The user wants to detect the object.
     tool_chosen(int)
-        A tool of the list: its key.
+        A tool was chosen in the list: its key.
     remove_wanted()
-        The chosen tool shall be taken off.
+        The user wants to remove the chosen tool.
     keep_wanted()
-        The chosen tool's result shall go to the records.
+        The user wants to save the chosen tool's result to the records.
     records_wanted()
-        The records shall be shown.
+        The user wants to see the records.
     """
 
     propose_wanted = Signal()
@@ -67,25 +67,25 @@ class SidePanel(QScrollArea):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setFixedWidth(WIDTH)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.propose = _button("propose", tr("&What is pressed?"), "propose", tr("(Q)"))
+        self.propose = _button("propose", tr("&Detect object"), "propose", tr("(Q)"))
         self.propose.clicked.connect(self.propose_wanted)
-        self.tools = named(QListWidget(), "measure.tools", tr("Tools on the picture"))
+        self.tools = named(QListWidget(), "measure.tools", tr("Tools on the image"))
         self.tools.setMinimumHeight(LIST_HEIGHT)
         self.tools.setMaximumHeight(TALL_LIST)
         self.tools.currentItemChanged.connect(self._on_tool)
         self.remove = _button("remove", tr("Remove the tool"), "remove", tr("(Delete)"))
         self.remove.clicked.connect(self.remove_wanted)
         self.figures = _figures_table()
-        self.reason = named(PlainLabel(), "measure.reason", tr("Why it is doubtful"))
+        self.reason = named(PlainLabel(), "measure.reason", tr("Why the result is doubtful"))
         self.reason.setWordWrap(True)
         self.truth = TruthForm()
-        self.who = named(QLineEdit(), "measure.who", tr("Who measured it"))
+        self.operator = named(QLineEdit(), "measure.who", tr("Operator"))
         self.note = named(QLineEdit(), "measure.note", tr("Note"))
-        self.note.setPlaceholderText(tr("Anything worth remembering"))
-        self.keep = _button("keep", tr("&Keep in the records"), "keep", tr("(Ctrl+Return)"))
+        self.note.setPlaceholderText(tr("Any remark"))
+        self.keep = _button("keep", tr("Sa&ve to records"), "keep", tr("(Ctrl+Return)"))
         self.keep.setMinimumHeight(36)
         self.keep.clicked.connect(self.keep_wanted)
-        self.kept = named(MarkupLabel(), "measure.kept", tr("What was kept last"))
+        self.kept = named(MarkupLabel(), "measure.kept", tr("Last saved result"))
         self.kept.setWordWrap(True)
         self.kept.linkActivated.connect(lambda _link: self.records_wanted.emit())
         self._lay_out()
@@ -95,7 +95,7 @@ class SidePanel(QScrollArea):
         column = QVBoxLayout(inside)
         column.setContentsMargins(10, 8, 10, 8)
         form = QFormLayout()
-        form.addRow(tr("Who"), self.who)
+        form.addRow(tr("Operator"), self.operator)
         form.addRow(tr("Note"), self.note)
         for widget in (
             self.propose,
@@ -118,11 +118,12 @@ class SidePanel(QScrollArea):
         Parameters
         ----------
         work : Work
-            What is measured.
+            Holds the tools and results.
         known : bool
             Whether there is a height map to measure on.
         """
-        self.propose.setEnabled(known)
+        self.propose.setEnabled(known and not work.detecting)
+        self.propose.setText(tr("Detecting…") if work.detecting else tr("&Detect object"))
         self._show_tools(work)
         self.remove.setEnabled(bool(work.chosen))
         found = work.results.get(work.chosen)
@@ -139,8 +140,8 @@ class SidePanel(QScrollArea):
         self.keep.setEnabled(isinstance(found, ToolResult))
 
     def say_kept(self, text: str) -> None:
-        """Say that something is in the records; empty: nothing of this picture is."""
-        link = tr("Show the records")
+        """Show that a result was saved. Empty: nothing of this image was saved."""
+        link = tr("Show records")
         words = f"<span style='color:@pass'>{escaped(text)}</span> <a href='records'>{link}</a>"
         self.kept.setText(words if text else "")
 
@@ -155,7 +156,7 @@ class SidePanel(QScrollArea):
                 if placed.key == work.chosen:
                     self.tools.setCurrentItem(item)
             if not work.sheet.items:
-                item = QListWidgetItem(tr("No tool yet: choose one at the left."))
+                item = QListWidgetItem(tr("No tool yet. Choose one on the left."))
                 item.setFlags(Qt.ItemFlag.NoItemFlags)
                 self.tools.addItem(item)
 
@@ -194,7 +195,8 @@ def _line(name: str, found: ToolResult | str | None) -> str:
     label = kind_label(name)
     if isinstance(found, ToolResult):
         return f"{label}   {figure_text(found.figures[0])}"
-    return f"{label}   {tr('not measured') if isinstance(found, str) else '…'}"
+    value = tr("not measured") if isinstance(found, str) else "…"
+    return f"{label}   {value}"
 
 
 def _button(name: str, text: str, icon_name: str, key: str) -> QPushButton:

@@ -1,4 +1,4 @@
-"""When a press may be held: something is pressed, and its depth has not moved for a while."""
+"""Detects a steady press: something is pressed in, and its depth has not changed for a while."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 
 STRIDE = 12
 PRESSED_MM = 0.08
-"""The bare membrane of a calibrated sensor stays below a third of it."""
+"""On a calibrated sensor the bare membrane stays below a third of it."""
 STILL_MM = 0.008
 STILL_SHARE = 0.01
-"""Of the depth: what a hand that holds still does."""
+"""Relative to the depth: normal variation of a hand that holds still."""
 STILL_S = 0.4
 LEAST_FRAMES = 3
 
 
 class SteadyPress:
-    """Watches depth maps as they come, and says once for each press that it holds still."""
+    """Watches live depth maps, and reports once per press that it is steady."""
 
     def __init__(self) -> None:
         self._before: NDArray[np.float32] | None = None
@@ -27,16 +27,16 @@ class SteadyPress:
         self._armed = True
 
     def update(self, depth_mm: NDArray[np.float32], time_s: float, *, settled: bool = True) -> bool:
-        """Take in the next map; return whether it shows a press that may be held now.
+        """Process the next map. Return whether it shows a press that may be frozen now.
 
         Parameters
         ----------
         depth_mm : (rows, columns)
             Depth.
         time_s : float
-            When its picture was made.
+            Time of its image.
         settled : bool, optional
-            Whether the picture shows what the source was last told.
+            Whether the image already shows the latest commands to the source.
         """
         coarse = depth_mm[::STRIDE, ::STRIDE]
         before, self._before = self._before, coarse
@@ -57,7 +57,7 @@ class SteadyPress:
         return True
 
     def hold_off(self) -> None:
-        """Do not hold what is pressed now, before it has moved."""
+        """Do not report the current press before it has moved."""
         self._armed = False
 
     def _moved(self) -> bool:

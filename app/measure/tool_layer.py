@@ -1,4 +1,4 @@
-"""Tools drawn over a map in mm: their lines, figures, and the grips of the one that is chosen."""
+"""Tools drawn over a map in mm: lines, figures, and the grips of the chosen one."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
     Signals
     -------
     clicked(float, float)
-        A click on the map while tools are being placed.
+        A click on the map during placement.
     chosen(int)
         A click on a tool: its key.
     grip_chosen(str)
-        A grip was taken hold of.
+        A grip was pressed.
     dragged(str, float, float)
         The chosen tool's grip is being dragged to (x, y).
     dropped(str, float, float)
@@ -79,13 +79,13 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
     def show_tools(
         self, tools: tuple[DrawnTool, ...], key: int, grips: tuple[Grip, ...], grip: str
     ) -> None:
-        """Show tools; `key` is the chosen one, with its grips, of which `grip` has the keys."""
+        """Show tools. `key` is the chosen one, with its grips; the keys move `grip`."""
         self._tools, self._key, self._grips, self._grip = tools, key, grips, grip
         self.update()
 
-    def show_begun(self, places: tuple[Point, ...]) -> None:
-        """Show the places that were clicked for a tool that is not whole yet."""
-        self._begun = places
+    def show_begun(self, clicked: tuple[Point, ...]) -> None:
+        """Show the points clicked so far for a tool that needs more."""
+        self._begun = clicked
         self.update()
 
     def boundingRect(self) -> QRectF:  # noqa: D102
@@ -148,7 +148,7 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
         return nearest_grip(self._grips, (at.x(), at.y()), reach_mm=self._reach_mm())
 
     def _tool_at(self, at: Point) -> int:
-        """Return the key of the tool whose line passes a place; 0 where there is none."""
+        """Return the key of the tool whose line passes a point, or 0."""
         reach = self._reach_mm()
         found = [
             (_distance(at, line), tool.key) for tool in self._tools for line in tool.lines if line
@@ -167,14 +167,15 @@ class ToolLayer(pg.GraphicsObject):  # type: ignore[misc]
             colour = QColor(COLOURS["chosen" if tool.key == self._key else tool.state])
             for line in tool.lines:
                 _stroke(painter, to_screen.map(QPolygonF([QPointF(*p) for p in line])), colour)
-        taken: list[QRectF] = []
+        visible = to_screen.mapRect(QRectF(self.viewRect()))
+        occupied: list[QRectF] = []
         for tool in self._tools:
             if tool.text:
-                taken.append(_paint_text(painter, tool, to_screen, taken))
+                occupied.append(_paint_text(painter, tool, to_screen, visible, occupied))
         for grip in self._grips:
             self._paint_grip(painter, to_screen.map(QPointF(*grip.at_mm)), grip.name == self._grip)
-        for place in self._begun:
-            self._paint_grip(painter, to_screen.map(QPointF(*place)), False)
+        for point in self._begun:
+            self._paint_grip(painter, to_screen.map(QPointF(*point)), False)
         painter.restore()
 
     @staticmethod
@@ -193,18 +194,20 @@ def _stroke(painter: QPainter, line: QPolygonF, colour: QColor) -> None:
 
 
 def _paint_text(
-    painter: QPainter, tool: DrawnTool, to_screen: QTransform, taken: list[QRectF]
+    painter: QPainter, tool: DrawnTool, to_screen: QTransform, view: QRectF, occupied: list[QRectF]
 ) -> QRectF:
-    """Write a tool's figure beside its upper right, below those that are there; return where."""
+    """Write a tool's figure near its upper right, below earlier ones. Return its rectangle.
+
+    `view` is the visible part of the map, on the screen.
+    """
     points = [to_screen.map(QPointF(*p)) for line in tool.lines for p in line]
     metrics = QFontMetricsF(painter.font())
     width, height = metrics.horizontalAdvance(tool.text) + 10.0, metrics.height() + 4.0
-    view = QRectF(painter.window())
     left = max((p.x() for p in points), default=0.0) + 10.0
     top = min((p.y() for p in points), default=0.0) - height
-    left = min(max(left, 0.0), max(view.right() - width, 0.0))
-    plate = QRectF(left, min(max(top, 0.0), max(view.bottom() - height, 0.0)), width, height)
-    for other in sorted(taken, key=lambda place: place.top()):
+    left = max(min(left, view.right() - width), view.left())
+    plate = QRectF(left, max(min(top, view.bottom() - height), view.top()), width, height)
+    for other in sorted(occupied, key=lambda point: point.top()):
         if plate.intersects(other):
             plate.moveTop(other.bottom() + 2.0)
     painter.setPen(Qt.PenStyle.NoPen)
@@ -216,7 +219,7 @@ def _paint_text(
 
 
 def _distance(at: Point, line: tuple[Point, ...]) -> float:
-    """Return the distance from a place to a line of several parts."""
+    """Return the distance from a point to a polyline."""
     if len(line) == 1:
         return math.dist(at, line[0])
     return min(_to_part(at, a, b) for a, b in itertools.pairwise(line))

@@ -1,4 +1,4 @@
-"""The height map with its tools: they are placed by clicks, dragged, and moved by keys."""
+"""The height map with measuring tools: placed by clicks, dragged, or moved by keys."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.inspect.height_panel import HeightPanel, extent_of
-from app.inspect.look import Look
-from app.inspect.place import read_at
-from app.inspect.products import Shown
+from app.live.frame_results import Shown
+from app.live.height_panel import HeightPanel
 from app.measure.figures_text import figure_text
 from app.measure.grips import Point, grips_of, outline_of
 from app.measure.palette import Palette
-from app.measure.placing import first_places, kinds, make_tool
+from app.measure.placing import first_points, kinds, make_tool
 from app.measure.sheet import Placed
 from app.measure.tool_layer import DrawnTool, ToolLayer
 from app.measure.work import Work
+from app.view2d.display import Display
+from app.view2d.map_point import read_at
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools import ToolResult
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 NUDGE_MM = 0.02
@@ -37,17 +37,17 @@ _ARROWS = {
 
 
 class ToolMap(QWidget):
-    """The map, the palette beside it and a line of words below.
+    """The map, the palette next to it and a line of text below.
 
     Parameters
     ----------
     work : Work
-        What is measured.
+        Holds the tools and results.
 
     Signals
     -------
     hold_wanted()
-        A tool was chosen: the picture must stand.
+        A tool was chosen: the image must be held.
     refused(str)
         A sentence: why a tool cannot be placed like this.
     drawn(object, int)
@@ -64,7 +64,7 @@ class ToolMap(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._work = work
         self._kind = ""
-        self._places: list[Point] = []
+        self._points: list[Point] = []
         self._live: HeightMap | None = None
         self.panel = HeightPanel()
         self.view = self.panel.map
@@ -72,7 +72,7 @@ class ToolMap(QWidget):
         self.view.box.addItem(self.layer, ignoreBounds=True)
         self.tools = Palette(self)
         self.hint = named(PlainLabel(), "measure.hint", tr("What to do next on the map"))
-        self.readout = named(PlainLabel(), "measure.readout", tr("What is under the pointer"))
+        self.readout = named(PlainLabel(), "measure.readout", tr("Values under the pointer"))
         self._lay_out()
         self._connect()
 
@@ -93,54 +93,53 @@ class ToolMap(QWidget):
 
     def _connect(self) -> None:
         self.tools.chosen.connect(self._on_kind)
-        self.layer.clicked.connect(self._on_place)
+        self.layer.clicked.connect(self._on_point)
         self.layer.chosen.connect(self._work.choose)
         self.layer.grip_chosen.connect(self._on_grip)
         self.layer.dragged.connect(lambda name, x, y: self._work.drag(name, (x, y)))
         self.layer.dropped.connect(lambda name, x, y: self._work.drop(name, (x, y)))
         self.view.pointed.connect(self._on_pointed)
         self._work.changed.connect(self._draw)
-        self._work.picture_changed.connect(self._show_picture)
+        self._work.image_changed.connect(self._show_answer)
 
-    # The picture
+    # The image
 
-    def show_live(self, shown: Shown, look: Look) -> None:
+    def show_live(self, shown: Shown, display: Display) -> None:
         """Show a frame's depth while nothing is held."""
         if shown.heightmap is not None:
             self._live = shown.heightmap
-            self.panel.show_frame(shown, look.colours)
+            self.panel.show_frame(shown, display.colours, still=False)
 
     def say(self, text: str) -> None:
-        """Show words in the place of a map."""
+        """Show a text instead of the map."""
         self._live = None
         self.view.say(text)
 
-    def _show_picture(self) -> None:
+    def _show_answer(self) -> None:
         answer = self._work.answer
         if answer is not None:
-            rgb, shown = answer.picture.rgb, answer.picture.range_mm
-            self.view.show_picture(rgb, extent_of(answer.heightmap))
-            self.panel.bar.show_range(Look().colours, *shown, tr("mm"))
-        elif self._work.taken is None:
-            self.let_go()
+            rgb, shown = answer.map_image.rgb, answer.map_image.range_mm
+            self.panel.show_image(rgb, answer.heightmap, Display().colours, shown)
+        elif self._work.image is None:
+            self.cancel_placing()
 
     @property
     def heightmap(self) -> HeightMap | None:
-        """What is shown."""
-        return self._live if self._work.taken is None else self._work.heightmap
+        """The height map shown."""
+        return self._live if self._work.image is None else self._work.heightmap
 
     # Placing
 
-    def let_go(self) -> None:
-        """Place nothing any more."""
-        self._kind, self._places = "", []
+    def cancel_placing(self) -> None:
+        """Stop placing a tool."""
+        self._kind, self._points = "", []
         self.layer.placing = False
         self.layer.show_begun(())
-        self.tools.let_go()
+        self.tools.deselect()
         self._tell()
 
     def _on_kind(self, name: str) -> None:
-        self._kind, self._places = name, []
+        self._kind, self._points = name, []
         self.layer.placing = bool(name)
         self.layer.show_begun(())
         self._tell()
@@ -148,19 +147,19 @@ class ToolMap(QWidget):
             self.setFocus()
             self.hold_wanted.emit()
 
-    def _on_place(self, x_mm: float, y_mm: float) -> None:
+    def _on_point(self, x_mm: float, y_mm: float) -> None:
         self.setFocus()
-        self._places.append((x_mm, y_mm))
-        self.layer.show_begun(tuple(self._places))
-        if len(self._places) == len(self._asks()):
-            self._place(tuple(self._places))
+        self._points.append((x_mm, y_mm))
+        self.layer.show_begun(tuple(self._points))
+        if len(self._points) == len(self._asks()):
+            self._add_tool(tuple(self._points))
         self._tell()
 
-    def _place(self, places: tuple[Point, ...]) -> None:
+    def _add_tool(self, points: tuple[Point, ...]) -> None:
         kind = self._kind
-        self.let_go()
+        self.cancel_placing()
         try:
-            tool = make_tool(kind, places)
+            tool = make_tool(kind, points)
         except InputError as error:
             self.refused.emit(str(error))
             return
@@ -172,14 +171,14 @@ class ToolMap(QWidget):
     def _tell(self) -> None:
         asks = self._asks()
         text = ""
-        if self._kind and len(self._places) < len(asks):
-            text = tr("{ask}; Return places it in the middle, Escape lets it go.").format(
-                ask=asks[len(self._places)]
+        if self._kind and len(self._points) < len(asks):
+            text = tr("{ask}. Return places the tool in the middle, Escape cancels.").format(
+                ask=asks[len(self._points)]
             )
         elif self._work.chosen:
-            text = tr("Drag the squares, or move them by the arrow keys.")
-        elif self._work.taken is not None:
-            text = tr("Choose a tool at the left, or let the program say what is pressed (Q).")
+            text = tr("Drag the squares, or move them with the arrow keys.")
+        elif self._work.image is not None:
+            text = tr("Choose a tool on the left, or detect the object (Q).")
         self.hint.setText(text)
 
     # Drawing
@@ -209,7 +208,7 @@ class ToolMap(QWidget):
     # Keys
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Move the chosen grip, go on to the next one, place, remove, let go."""
+        """Move the chosen grip, choose the next one, place, remove or cancel."""
         key = Qt.Key(event.key())
         if key in _ARROWS:
             large = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
@@ -221,11 +220,11 @@ class ToolMap(QWidget):
                 self._next_grip(1 if key == Qt.Key.Key_PageDown else -1)
             case Qt.Key.Key_Return | Qt.Key.Key_Enter if self._kind:
                 middle = self.view.box.viewRect().center()
-                self._place(first_places(self._kind, (middle.x(), middle.y())))
+                self._add_tool(first_points(self._kind, (middle.x(), middle.y())))
             case Qt.Key.Key_Delete | Qt.Key.Key_Backspace if self._work.chosen:
                 self._work.remove(self._work.chosen)
             case Qt.Key.Key_Escape if self._kind:
-                self.let_go()
+                self.cancel_placing()
             case Qt.Key.Key_Escape if self._work.chosen:
                 self._work.choose(0)
             case _:
@@ -240,7 +239,7 @@ class ToolMap(QWidget):
 
 
 def _drawn(item: Placed, found: ToolResult | str | None) -> DrawnTool:
-    """Return a tool as it is drawn: as measured, or as it was put there."""
+    """Return a tool as it is drawn: as measured, or as it was placed."""
     if isinstance(found, ToolResult) and found.tool == item.tool:
         lines = tuple(tuple((float(x), float(y)) for x, y in part) for part in found.drawing_mm)
         state = "ok" if found.verdict == "ok" else "doubtful"

@@ -1,11 +1,10 @@
-"""Asks what is true of the tool that is chosen, and says how far the measurement is off."""
+"""Asks for the true values of the chosen tool, and shows the measurement's error."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QDoubleSpinBox,
     QFormLayout,
     QGroupBox,
@@ -18,6 +17,7 @@ from PySide6.QtWidgets import (
 from app.measure.figures_text import UNITS
 from app.measure.judging import Judged, Stated
 from app.measure.placing import INDENTERS
+from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
 from app.workspace.indenters import Indenter
@@ -26,16 +26,16 @@ from gelpolight_core.translation import tr
 
 
 class TruthForm(QGroupBox):
-    """The truth of what is measured: typed, or that of a known indenter.
+    """The true values: typed, or those of a known indenter.
 
     Signals
     -------
     changed()
-        Something else is stated.
+        The true values changed.
     indenters_wanted()
-        The list of indenters shall be edited.
+        The user wants to edit the list of indenters.
     limits_wanted()
-        The limits shall be edited.
+        The user wants to edit the limits.
     """
 
     changed = Signal()
@@ -47,16 +47,25 @@ class TruthForm(QGroupBox):
         named(self, "measure.truth", tr("True size"))
         self._kind = ""
         self._kept: dict[str, Stated] = {}
+        self._before: dict[str, Stated] = {}
         self._indenters: tuple[Indenter, ...] = ()
-        self.known = named(QComboBox(), "measure.truth.known", tr("Known indenter"))
+        self.known = named(ComboBox(), "measure.truth.known", tr("Known indenter"))
         self.size_on = named(
-            QCheckBox(tr("Diameter")), "measure.truth.size_on", tr("The size is known")
+            QCheckBox(tr("Diameter")), "measure.truth.size_on", tr("Use the true size")
         )
         self.size = _spin("measure.truth.size", tr("True size"), 5.0)
         self.height_on = named(
-            QCheckBox(tr("Depth")), "measure.truth.height_on", tr("The depth is known")
+            QCheckBox(tr("Depth")), "measure.truth.height_on", tr("Use the true depth")
         )
         self.height = _spin("measure.truth.height", tr("True depth"), 1.0)
+        self.again = named(
+            QPushButton(tr("Same object as before")),
+            "measure.truth.again",
+            tr("Use the true values of the press before"),
+            tr("The true values of a press are not used for the next one by themselves"),
+        )
+        self.again.setAutoDefault(False)
+        self.again.clicked.connect(self._use_again)
         self.verdict = named(MarkupLabel(), "measure.truth.verdict", tr("Error and verdict"))
         self.verdict.setWordWrap(True)
         self._lay_out()
@@ -88,14 +97,15 @@ class TruthForm(QGroupBox):
         row.addStretch(1)
         column = QVBoxLayout(self)
         column.addLayout(self._form)
+        column.addWidget(self.again)
         column.addLayout(row)
         column.addWidget(self.verdict)
 
-    # What is stated
+    # True values
 
     @property
     def stated(self) -> Stated:
-        """What is said to be true of the tool that is chosen."""
+        """The true values of the chosen tool."""
         name = self.known.currentData() or ""
         return Stated(
             self.size.value() if self.size_on.isChecked() else None,
@@ -117,15 +127,36 @@ class TruthForm(QGroupBox):
         if found is not None:
             self.state(found)
 
+    def new_press(self) -> None:
+        """Forget the true values: another press may be of another object, at another depth.
+
+        A button offers them for this press, too.
+        """
+        if self._kind:
+            self._kept[self._kind] = self.stated
+        self._before |= {kind: stated for kind, stated in self._kept.items() if stated != Stated()}
+        self._kept = {}
+        self._show(Stated())
+        self._offer_again()
+        self.changed.emit()
+
+    def _offer_again(self) -> None:
+        """Offer the values of the press before while none are entered."""
+        before = self._before.get(self._kind)
+        self.again.setVisible(before is not None and self.stated == Stated())
+
+    def _use_again(self) -> None:
+        self.state(self._before[self._kind])
+
     def show_kind(self, kind: str, label: str, unit: str) -> None:
-        """Ask for the truth of a kind of tool; what was stated of it before is still there.
+        """Ask for the true values of a kind of tool. Those of this press are restored.
 
         Parameters
         ----------
         kind : str
-            Name of the tool; empty where none is chosen.
+            Name of the tool. Empty if none is chosen.
         label, unit : str
-            Of the length that is asked for.
+            Of the requested length.
         """
         if kind != self._kind:
             if self._kind:
@@ -138,10 +169,12 @@ class TruthForm(QGroupBox):
         self.size.setSuffix(UNITS.get(unit, unit))
         self.known.setVisible(self._is_indenter)
         self._form.setRowVisible(self.height_on, self._is_indenter)
+        self._offer_again()
 
     def state(self, stated: Stated) -> None:
-        """State something, as by typing it."""
+        """Enter values from code, as if typed."""
         self._show(stated)
+        self._offer_again()
         self.changed.emit()
 
     def _show(self, stated: Stated) -> None:
@@ -169,7 +202,7 @@ class TruthForm(QGroupBox):
             self.known.setCurrentIndex(max(self.known.findData(chosen), 0))
 
     def _listed(self, kind: str, name: str) -> Stated | None:
-        """Return what the list says of an indenter; None where it does not know it."""
+        """Return the listed values of an indenter, or None if it is not in the list."""
         for indenter in self._indenters:
             if (indenter.shape, indenter.name) == (kind, name):
                 return Stated(indenter.mean_size_mm, indenter.height_mm, name)
@@ -179,26 +212,28 @@ class TruthForm(QGroupBox):
         found = self._listed(self._kind, self.known.currentData())
         if found is not None:
             self._show(found)
+        self._offer_again()
         self.changed.emit()
 
     def _on_typed(self) -> None:
-        # What is typed is no longer what the list says.
+        # The typed values no longer match the list.
         with QSignalBlocker(self.known):
             self.known.setCurrentIndex(0)
+        self._offer_again()
         self.changed.emit()
 
-    # How it compares
+    # Comparison
 
     def show_verdict(self, rows: tuple[Judged, ...], result: ToolResult | None) -> None:
-        """Say how far the measurement is off; no rows: what to do to learn it."""
+        """Show the errors of the measurement. No rows: show what to do to see them."""
         if not rows:
-            text = tr("State what is true to see the error.") if result is not None else ""
+            text = tr("Enter the true values to see the error.") if result is not None else ""
             self._say(text, "muted")
             return
         self.verdict.setText("<br>".join(_sentence(row) for row in rows))
 
     def show_refusal(self, sentence: str) -> None:
-        """Say why nothing can be compared."""
+        """Show why no comparison is possible."""
         self._say(sentence, "fail")
 
     def _say(self, text: str, role: str) -> None:
@@ -216,13 +251,13 @@ def _sentence(row: Judged) -> str:
         unit=escaped(UNITS.get(row.unit, row.unit)),
         role=role,
         percent=row.error_percent,
-        word=tr("within") if row.passed else tr("beyond"),
+        word=tr("within") if row.passed else tr("outside"),
         limit=row.limit_percent,
     )
 
 
 def _spin(name: str, accessible: str, value: float) -> QDoubleSpinBox:
-    box = named(QDoubleSpinBox(), name, accessible)
+    box = named(DoubleSpinBox(), name, accessible)
     box.setDecimals(3)
     box.setRange(0.001, 500.0)
     box.setSingleStep(0.1)

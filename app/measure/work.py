@@ -1,4 +1,4 @@
-"""The picture that is measured on, the tools on it with their history, and their figures."""
+"""The image being measured, the tools on it with their history, and their figures."""
 
 from __future__ import annotations
 
@@ -9,53 +9,53 @@ from types import MappingProxyType
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
-from app.calibrate.lut_worker import NewestWins
 from app.measure.grips import grips_of, moved
-from app.measure.measuring import Answer, Measuring, Question, Taken
+from app.measure.measuring import Answer, MeasuredImage, Measuring, Question
 from app.measure.placing import kind_label
 from app.measure.sheet import Sheet
+from app.services.newest_wins import NewestWins
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import Proposal
 from gelpolight_core.measurement.tools import Ball, Cuboid, Cylinder, Tool, ToolResult
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 POLL_MS = 30
 STOP_S = 30.0
-"""The longest that a picture with its uncertainty takes on a slow machine."""
+"""Maximum time of an image with its uncertainty on a slow machine."""
 
 
 class Work(QObject):
-    """What is measured on one picture.
+    """The measurements on one image.
 
     Attributes
     ----------
     undo : QUndoStack
-        History of the tools on the picture.
+        History of the tools on the image.
     answer : Answer or None
-        What is known of the picture; None until it is reconstructed.
+        Results of the image. None until it is reconstructed.
     chosen : int
-        Key of the tool that is chosen; 0 for none.
+        Key of the chosen tool. 0 for none.
     grip : str
-        Which of its grips the keys move; empty for none.
+        Its grip that the keys move. Empty for none.
 
     Signals
     -------
-    picture_changed()
-        Another picture, or another depth of it.
+    image_changed()
+        Another image, or another depth of it.
     changed()
-        Tools, choice or figures are others.
+        Tools, choice or figures changed.
     busy_changed(bool)
-        Whether something is being measured.
+        Whether a measurement is running.
     refused(str)
-        A sentence: why the picture cannot be measured on.
+        A sentence: why the image cannot be measured.
     proposed(object)
-        A Proposal, or None where nothing known is pressed.
+        A Proposal, or None if no known object was detected.
     """
 
-    picture_changed = Signal()
+    image_changed = Signal()
     changed = Signal()
     busy_changed = Signal(bool)
     refused = Signal(str)
@@ -64,7 +64,7 @@ class Work(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.undo = QUndoStack(self)
-        self.taken: Taken | None = None
+        self.image: MeasuredImage | None = None
         self.answer: Answer | None = None
         self.chosen = 0
         self.grip = ""
@@ -72,75 +72,84 @@ class Work(QObject):
         self._preview: Sheet | None = None
         self._reconstructor: Reconstructor | None = None
         self._propose = False
+        self._detected = 0
         self._busy = False
         self._worker: NewestWins[Question | None, Answer | None] | None = None
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._poll)
 
-    # What is known
+    # State
 
     @property
     def sheet(self) -> Sheet:
-        """The tools, as a drag in progress has them."""
+        """The tools, including a drag in progress."""
         return self._sheet if self._preview is None else self._preview
 
     @property
     def heightmap(self) -> HeightMap | None:
-        """Depth of the picture."""
+        """Depth of the image."""
         return None if self.answer is None else self.answer.heightmap
 
     @property
     def results(self) -> Mapping[int, ToolResult | str]:
-        """What the tools say, by their keys; those of tools that were just moved are missing."""
+        """Results of the tools by key. Those of tools that were just moved are missing."""
         return MappingProxyType({}) if self.answer is None else self.answer.results
 
     @property
     def tool(self) -> Tool | None:
-        """The tool that is chosen."""
+        """The chosen tool."""
         return self.sheet.tool(self.chosen)
 
     @property
     def result(self) -> ToolResult | None:
-        """What the chosen tool says, as it is now."""
+        """Current result of the chosen tool."""
         found = self.results.get(self.chosen)
         return found if isinstance(found, ToolResult) and found.tool == self.tool else None
 
     @property
     def busy(self) -> bool:
-        """Whether something is being measured."""
+        """Whether a measurement is running."""
         return self._busy
 
-    # The picture
+    # The image
 
     def use(self, reconstructor: Reconstructor | None) -> None:
         """Measure with this calibration from now on."""
         self._reconstructor = reconstructor
         self.answer = None
-        self.picture_changed.emit()
+        self.image_changed.emit()
         self.changed.emit()
         self._ask()
 
-    def take(self, taken: Taken | None, *, propose: bool = False) -> None:
-        """Measure on another picture, or on none; it begins without tools."""
-        self.taken, self.answer, self._preview = taken, None, None
+    def take(self, image: MeasuredImage | None, *, propose: bool = False) -> None:
+        """Measure on another image, or on none. It starts without tools."""
+        self.image, self.answer, self._preview = image, None, None
         self.undo.clear()
         self._sheet = Sheet()
         self.chosen, self.grip = 0, ""
-        self._propose = propose and taken is not None
-        self.picture_changed.emit()
+        self._propose = propose and image is not None
+        self._detected = 0
+        self.image_changed.emit()
         self.changed.emit()
         self._ask()
 
+    @property
+    def detecting(self) -> bool:
+        """Whether the pressed object is being detected."""
+        return self._propose and self._busy
+
     def propose(self) -> None:
-        """Ask what is pressed."""
-        self._propose = True
-        self._ask()
+        """Detect the pressed object. While this runs, a further request changes nothing."""
+        if not self.detecting:
+            self._propose = True
+            self._ask()
+            self.changed.emit()
 
     # Tools
 
     def add(self, tool: Tool) -> int:
-        """Put a tool on the picture and choose it; return its key."""
+        """Add a tool to the image and choose it. Return its key."""
         self._preview = None
         key = self._sheet.next_key()
         text = tr("add {tool}").format(tool=kind_label(tool.name))
@@ -148,13 +157,13 @@ class Work(QObject):
         return key
 
     def change(self, key: int, tool: Tool, *, nudge: bool = False) -> None:
-        """Put another tool in the place of one; nudges of one grip are one step of the history."""
+        """Replace a tool. Successive key moves of one grip are one undo step."""
         self._preview = None
         text = tr("move {tool}").format(tool=kind_label(tool.name))
         self.undo.push(_Edit(self, self._sheet.changed(key, tool), key, text, nudge=nudge))
 
     def remove(self, key: int) -> None:
-        """Take a tool off the picture."""
+        """Remove a tool from the image."""
         self._preview = None
         tool = self._sheet.tool(key)
         if tool is not None:
@@ -162,7 +171,7 @@ class Work(QObject):
             self.undo.push(_Edit(self, self._sheet.without(key), 0, text))
 
     def drag(self, grip: str, to_mm: tuple[float, float]) -> None:
-        """Show the chosen tool with a grip elsewhere, before it is let go."""
+        """Show the chosen tool with a grip moved, during a drag."""
         tool = self._sheet.tool(self.chosen)
         if tool is not None:
             self._preview = self._sheet.changed(self.chosen, moved(tool, grip, to_mm))
@@ -170,13 +179,13 @@ class Work(QObject):
             self._ask()
 
     def drop(self, grip: str, to_mm: tuple[float, float]) -> None:
-        """Leave the chosen tool's grip there."""
+        """End the drag: leave the chosen tool's grip at its position."""
         tool = self._sheet.tool(self.chosen)
         if tool is not None:
             self.change(self.chosen, moved(tool, grip, to_mm))
 
     def nudge(self, dx_mm: float, dy_mm: float) -> bool:
-        """Move the grip that has the keys; whether there is one."""
+        """Move the grip selected for the keys. Return whether there is one."""
         tool = self._sheet.tool(self.chosen)
         held = next((g for g in grips_of(tool) if g.name == self.grip), None) if tool else None
         if tool is None or held is None:
@@ -186,7 +195,7 @@ class Work(QObject):
         return True
 
     def choose(self, key: int, grip: str = "") -> None:
-        """Choose a tool, and the grip that the keys move: its first where none is named."""
+        """Choose a tool and the grip that the keys move: its first if none is named."""
         tool = self.sheet.tool(key)
         self.chosen = 0 if tool is None else key
         grips = () if tool is None else grips_of(tool)
@@ -194,7 +203,7 @@ class Work(QObject):
         self.changed.emit()
 
     def set_sheet(self, sheet: Sheet, key: int) -> None:
-        """Show another state of the sheet, by the history."""
+        """Show another state of the sheet, from the undo history."""
         self._sheet, self._preview = sheet, None
         self.choose(key, self.grip if key == self.chosen else "")
         self._ask()
@@ -211,15 +220,15 @@ class Work(QObject):
 
     def _ask(self) -> None:
         maker, question = self._reconstructor, None
-        if maker is not None and self.taken is not None:
+        if maker is not None and self.image is not None:
             question = Question(
-                maker.calibration, maker.model, self.taken, self.sheet, self._propose
+                maker.calibration, maker.model, self.image, self.sheet, self._propose
             )
         if self._worker is None:
             if question is None:
                 return
             self._worker = NewestWins(Measuring(), name="measure")
-        self._worker.ask(question)  # without one, it lets go of the last picture
+        self._worker.ask(question)  # an empty question releases the last image
         self._timer.start()
         if question is not None:
             self._say_busy(True)
@@ -239,33 +248,39 @@ class Work(QObject):
         elif answered.error is not None:
             _LOG.error("Measuring failed", exc_info=answered.error)
             kind = type(answered.error).__name__
-            self.refused.emit(tr("A fault of this program: {k}; the log has it.").format(k=kind))
+            self.refused.emit(tr("Internal error: {k}. See the log for details.").format(k=kind))
         elif answered.answer is not None:
             self._show(answered.question, answered.answer)
 
     def _is_of_now(self, question: Question) -> bool:
-        """Return whether a question is of the picture and the calibration that are in use."""
+        """Return whether a question is about the current image and calibration."""
         maker = self._reconstructor
         return (
             maker is not None
             and question.calibration is maker.calibration
             and question.model == maker.model
-            and question.taken is self.taken
+            and question.image is self.image
         )
 
     def _show(self, question: Question, answer: Answer) -> None:
         before, self.answer = self.answer, answer
         if before is None or before.heightmap is not answer.heightmap:
-            self.picture_changed.emit()
+            self.image_changed.emit()
         self.changed.emit()
         if question.propose and self._propose:
             self._propose = False
             self._on_proposal(answer.proposal)
+            self.changed.emit()
 
     def _on_proposal(self, proposal: Proposal | None) -> None:
         if proposal is not None:
             kind = {"ball": Ball, "cylinder": Cylinder, "cuboid": Cuboid}
-            self.add(kind[proposal.candidates[0]](proposal.at_mm))
+            tool = kind[proposal.candidates[0]](proposal.at_mm)
+            if self._sheet.tool(self._detected) is None:
+                self._detected = self.add(tool)
+            else:
+                # The same image has the same object: its tool, perhaps moved meanwhile, stays.
+                self.choose(self._detected)
         self.proposed.emit(proposal)
 
     def _say_busy(self, busy: bool) -> None:
@@ -275,7 +290,7 @@ class Work(QObject):
 
 
 class _Edit(QUndoCommand):
-    """One change of the tools on the picture."""
+    """One change of the tools on the image."""
 
     def __init__(
         self, work: Work, after: Sheet, key: int, text: str, *, nudge: bool = False
@@ -287,19 +302,19 @@ class _Edit(QUndoCommand):
         self._nudged = f"{key}/{work.grip}" if nudge else ""
 
     def redo(self) -> None:
-        """Make the change."""
+        """Apply the change."""
         self._work.set_sheet(self._after, self._key)
 
     def undo(self) -> None:
-        """Take it back."""
+        """Undo the change."""
         self._work.set_sheet(self._before, self._key_before)
 
     def id(self) -> int:
-        """Return the kind of command that may be joined with the one before it."""
+        """Return the kind of command that may be merged with the previous one."""
         return 1 if self._nudged else -1
 
     def mergeWith(self, other: QUndoCommand) -> bool:
-        """Join nudges of one grip."""
+        """Merge successive key moves of one grip."""
         assert isinstance(other, _Edit)
         if other._nudged != self._nudged:
             return False

@@ -1,26 +1,40 @@
-"""What can be done with the calibrations of the library, and what the person is told of it."""
+"""Actions on the calibrations of the library, their messages and their history."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
 
-from app.shell.context import AppContext
+from PySide6.QtGui import QUndoStack
+from PySide6.QtWidgets import QWidget
+
+from app.context.context import AppContext
+from app.sensors.commands import LibraryCommand, RemoveCommand, RestoreCommand, UseCommand
+from app.widgets.question import ask
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
-from app.workspace.workspace import Removal
+from app.workspace.trash import Removal
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 
 class CalibrationActions:
-    """Changes the workspace; every refusal becomes a message."""
+    """Changes the workspace. Every InputError becomes a message.
 
-    def __init__(self, context: AppContext) -> None:
-        self._context = context
+    Attributes
+    ----------
+    undo : QUndoStack
+        History of removals, restorations and choices of the calibration in use.
+    """
+
+    def __init__(self, page: QWidget, *, context: AppContext) -> None:
+        self._page, self._context = page, context
+        self.undo = QUndoStack(page)
+        self._folder = context.workspace.folder
+        context.requests.calibrations_changed.connect(self._on_changed)
 
     def entries(self) -> tuple[Entry, ...]:
-        """Return all calibrations; none where the workspace cannot be read, which is told."""
+        """Return all calibrations. If the workspace cannot be read: none, with a message."""
         try:
             return self._context.workspace.entries()
         except InputError as error:
@@ -28,7 +42,7 @@ class CalibrationActions:
             return ()
 
     def sessions(self) -> tuple[SessionEntry, ...]:
-        """Return all sessions; none where the workspace cannot be read, which is told."""
+        """Return all sessions. If the workspace cannot be read: none, with a message."""
         try:
             return self._context.workspace.sessions()
         except InputError as error:
@@ -36,70 +50,78 @@ class CalibrationActions:
             return ()
 
     def import_files(self, files: Iterable[Path]) -> Path | None:
-        """Copy calibration files into the library; return the last one's place."""
-        place = None
+        """Copy calibration files into the library. Return the path of the last one."""
+        imported = None
         for file in files:
             try:
-                place = self._context.workspace.import_calibration(file)
+                imported = self._context.workspace.import_calibration(file)
             except InputError as error:
                 self._context.toasts.show(str(error), "fail")
                 continue
             self._context.toasts.show(
-                tr("{name} is in the library of sensor {serial}.").format(
-                    name=place.name, serial=place.parent.name
+                tr("{name} is now in the library of sensor {serial}.").format(
+                    name=imported.name, serial=imported.parent.name
                 ),
                 "pass",
             )
-        if place is not None:
+        if imported is not None:
             self._context.requests.calibrations_changed.emit()
-        return place
+        return imported
 
     def use(self, entry: Entry) -> None:
-        """Measure with this calibration from now on."""
-        try:
-            self._context.workspace.use(entry.path)
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
+        """Use this calibration from now on."""
+        if not self._push(UseCommand(entry.path, context=self._context)) or entry.validated:
             return
-        self._context.requests.calibrations_changed.emit()
-        if not entry.validated:
-            self._context.toasts.show(
-                tr(
-                    "This calibration is not validated: a wrong length in its session scales every "
-                    "result. Press an object of known size before you trust it."
-                ),
-                "warn",
-            )
-
-    def remove(self, entry: Entry) -> None:
-        """Move a calibration into the trash, and offer to take that back."""
-        try:
-            removal = self._context.workspace.remove(entry.path)
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-            return
-        self._context.requests.calibrations_changed.emit()
         self._context.toasts.show(
-            tr("{name} was moved to the trash folder.").format(name=entry.path.name),
-            actions=((tr("Undo"), lambda: self._restore(removal)),),
+            tr(
+                "This calibration is not validated. A wrong length in its session "
+                "scales every result. Press an object of known size to validate it."
+            ),
+            "warn",
         )
 
-    def _restore(self, removal: Removal) -> None:
-        try:
-            self._context.workspace.restore(removal)
-        except InputError as error:
-            self._context.toasts.show(str(error), "fail")
-        self._context.requests.calibrations_changed.emit()
+    def remove(self, entry: Entry) -> None:
+        """Move a calibration to the trash. Ask first if it is in use or validated."""
+        reasons = {
+            (True, True): tr("{name} is validated, and it is the calibration in use."),
+            (True, False): tr("{name} is the calibration in use."),
+            (False, True): tr("{name} is validated."),
+        }
+        reason = reasons.get((entry.in_use, entry.validated))
+        if reason is None:
+            self._remove(entry)
+            return
+        text = tr("{reason} Move it to the trash? You can restore it from there.")
+        ask(
+            self._page,
+            tr("Remove calibration"),
+            text.format(reason=reason.format(name=entry.path.name)),
+            (tr("Move to trash"), lambda: self._remove(entry)),
+        )
 
+    def removals(self) -> tuple[Removal, ...]:
+        """Return the calibrations in the trash."""
+        return self._context.workspace.removals()
 
-def show_in_use(context: AppContext, entries: Iterable[Entry]) -> None:
-    """Say in the status bar which calibration is in use."""
-    used = next((entry for entry in entries if entry.in_use), None)
-    if used is None:
-        context.status.update(calibration=None, calibration_note="")
-        return
-    note = tr("validated") if used.validated else tr("not validated")
-    context.status.update(
-        calibration=used.path.stem if used.summary is None else used.summary.identity,
-        calibration_note=tr("broken") if used.broken else note,
-    )
+    def restore(self, removal: Removal) -> None:
+        """Move a calibration from the trash back to its place."""
+        if self._push(RestoreCommand(removal, context=self._context)):
+            text = tr("{name} is in the library again.").format(name=removal.old_path.name)
+            self._context.toasts.show(text, "pass")
+
+    def _remove(self, entry: Entry) -> None:
+        if self._push(RemoveCommand(entry.path, context=self._context)):
+            self._context.toasts.show(
+                tr("{name} was moved to the trash.").format(name=entry.path.name),
+                actions=((tr("Undo"), self.undo.undo),),
+            )
+
+    def _push(self, command: LibraryCommand) -> bool:
+        self.undo.push(command)
+        return command.worked
+
+    def _on_changed(self) -> None:
+        """Forget what was done in another workspace."""
+        if self._context.workspace.folder != self._folder:
+            self._folder = self._context.workspace.folder
+            self.undo.clear()

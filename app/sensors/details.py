@@ -1,4 +1,4 @@
-"""The chosen calibration: where it comes from, how good every stage is, what can be done."""
+"""The selected calibration: origin, quality of all stages, and actions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.sensors.model import made_cell
-from app.shell.icons import icon
+from app.theme.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
@@ -30,20 +30,19 @@ FACT_LINES = 5
 
 
 class Details(QWidget):
-    """Shows one calibration, or what to do when none is chosen."""
+    """Shows one calibration, or what to do if none is selected."""
 
     def __init__(self, actions: tuple[QAction, ...]) -> None:
         super().__init__()
         named(self, "sensors.details", tr("Details of the calibration"))
         self._title = named(MarkupLabel(parent=self), "sensors.details.title", tr("Calibration"))
-        self._facts = named(
-            PlainLabel(parent=self), "sensors.details.facts", tr("Where it comes from")
-        )
+        self._facts = named(PlainLabel(parent=self), "sensors.details.facts", tr("Origin"))
         for label in (self._title, self._facts):
             label.setWordWrap(True)
             label.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        # Room for all that is said of a validated one: the buttons below stay where they are.
+        # Space for the longest text, that of a validated calibration, so that the buttons do not
+        # move.
         self._facts.setMinimumHeight(FACT_LINES * self._facts.fontMetrics().lineSpacing())
         buttons = QHBoxLayout()
         for action in actions:
@@ -61,7 +60,7 @@ class Details(QWidget):
         self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(12, 0, 0, 0)
-        self.busy = named(QProgressBar(self), "sensors.busy", tr("The report is being written"))
+        self.busy = named(QProgressBar(self), "sensors.busy", tr("Writing the report"))
         self.busy.setRange(0, 0)
         self.busy.hide()
         layout.addWidget(self._title)
@@ -74,10 +73,10 @@ class Details(QWidget):
         """Show a calibration, or none."""
         if entry is None:
             self._title.setText("")
-            self._facts.setText(tr("Choose a calibration to see how good it is."))
+            self._facts.setText(tr("Select a calibration to see its quality."))
             self._area.setWidget(QWidget())
             return
-        self._title.setText(f"<h3>{escaped(entry.path.stem)}</h3>")
+        self._title.setText(f"<h3>{escaped(entry.name)}</h3>")
         if entry.summary is None:
             self._facts.setText(
                 tr("This file cannot be read: {reason}").format(reason=entry.broken)
@@ -114,14 +113,14 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
 
 
 def facts(entry: Entry, summary: CalibrationSummary) -> str:
-    """Return where a calibration comes from, and whether it was tried."""
+    """Return the origin of a calibration, and its validation."""
     width, height = summary.picture_size
     lines = [
-        tr("Sensor {serial}, model {model}, pictures of {w} x {h} px").format(
+        tr("Sensor {serial}, model {model}, images of {w} x {h} px").format(
             serial=summary.serial, model=summary.model, w=width, h=height
         ),
         tr("Made {when} {who} from session {session}, program {version}").format(
-            when=made_cell(entry).tip or tr("at an unknown time"),
+            when=made_cell(entry).text,
             who=tr("by {name}").format(name=summary.operator) if summary.operator else "",
             session=summary.session,
             version=summary.program_version,
@@ -131,20 +130,20 @@ def facts(entry: Entry, summary: CalibrationSummary) -> str:
 
 
 def trial_lines(entry: Entry) -> list[str]:
-    """Return whether a calibration was tried on an object of known size, and what came out."""
+    """Return the validation of a calibration on an object of known size, with its results."""
     trial = entry.validation
     if trial is None or entry.validation_note:
-        note = entry.validation_note or tr("press an object of known size before you trust it")
+        note = entry.validation_note or tr("press an object of known size to validate it")
         return [tr("Not validated: {note}").format(note=note)]
     word = tr("Validated") if trial.passed else tr("Validation failed")
     when = parse_time(trial.when)
     day = trial.when if when is None else f"{when.astimezone():%Y-%m-%d %H:%M}"
-    who = tr("by {name}").format(name=trial.who) if trial.who else ""
-    said = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
+    by = tr("by {name}").format(name=trial.who) if trial.who else ""
+    line = tr("{what}: {a:.3f} mm measured, {b:.3f} mm true, {e:+.1f} % (limit {l:g} %)")
     return [
-        f"{word}: {trial.indenter}, {day} {who}".rstrip(),
+        f"{word}: {trial.indenter}, {day} {by}".rstrip(),
         *(
-            said.format(
+            line.format(
                 what=c.quantity,
                 a=c.measured_mm,
                 b=c.true_mm,

@@ -9,8 +9,8 @@ from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
 
-from app.shell import theme
-from app.shell.icons import icon
+from app.theme import theme
+from app.theme.icons import icon
 from app.widgets.label import plain_tip
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
@@ -22,7 +22,7 @@ Index = QModelIndex | QPersistentModelIndex
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """What one place of the table shows."""
+    """Content of one cell."""
 
     text: str
     icon: str = ""
@@ -32,12 +32,17 @@ class Cell:
 
 
 class CellsModel(QAbstractTableModel):
-    """Rows of cells under titles."""
+    """Rows of cells under titles.
 
-    TITLES: tuple[str, ...] = ()
+    Parameters
+    ----------
+    titles : tuple of str
+        Column headers.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, titles: tuple[str, ...]) -> None:
         super().__init__()
+        self._titles = titles
         self._cells: list[tuple[Cell, ...]] = []
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008
@@ -46,18 +51,18 @@ class CellsModel(QAbstractTableModel):
 
     def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008
         """Return the number of columns."""
-        return 0 if parent.isValid() else len(self.TITLES)
+        return 0 if parent.isValid() else len(self._titles)
 
     def headerData(
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> Any:
         """Return a column's title."""
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return self.TITLES[section] and tr(self.TITLES[section])
+            return self._titles[section]
         return None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        """Return what a place shows."""
+        """Return the content of a cell."""
         cell = self._cells[index.row()][index.column()]
         match role:
             case Qt.ItemDataRole.DisplayRole:
@@ -81,13 +86,22 @@ class LibraryModel(CellsModel):
     Parameters
     ----------
     oldest_days : callable
-        Returns the age beyond which a calibration is marked.
+        Returns the maximum age; older calibrations are marked.
     """
 
-    TITLES = ("", "Sensor", "Made", "Age", "Verdict", "Validation", "Model", "Identity")
-
     def __init__(self, oldest_days: Callable[[], float]) -> None:
-        super().__init__()
+        super().__init__(
+            (
+                "",
+                tr("Sensor"),
+                tr("Created"),
+                tr("Age"),
+                tr("Verdict"),
+                tr("Validation"),
+                tr("Model"),
+                tr("Name"),
+            )
+        )
         self._oldest_days = oldest_days
         self._entries: tuple[Entry, ...] = ()
 
@@ -107,10 +121,8 @@ class LibraryModel(CellsModel):
 class SessionsModel(CellsModel):
     """One row for each session."""
 
-    TITLES = ("Sensor", "Session", "Pictures", "Last worked at")
-
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__((tr("Sensor"), tr("Session"), tr("Images"), tr("Last changed")))
         self._entries: tuple[SessionEntry, ...] = ()
 
     def set_entries(self, entries: tuple[SessionEntry, ...]) -> None:
@@ -126,17 +138,17 @@ class SessionsModel(CellsModel):
 
 
 def session_cells(entry: SessionEntry) -> tuple[Cell, ...]:
-    """Return what a session's row shows."""
+    """Return the cells of a session's row."""
     return (
         Cell(entry.serial),
         Cell(entry.folder.name, tip=str(entry.folder)),
-        Cell(str(entry.pictures), key=entry.pictures),
+        Cell(str(entry.images), key=entry.images),
         Cell(f"{entry.changed.astimezone():%Y-%m-%d %H:%M}", key=entry.changed.timestamp()),
     )
 
 
 def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...]:
-    """Return what a calibration's row shows."""
+    """Return the cells of a calibration's row."""
     if entry.summary is None:
         nothing = Cell("")
         return (
@@ -147,7 +159,7 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
             Cell(tr("Broken"), "broken", "fail", entry.broken, key=3),
             nothing,
             nothing,
-            Cell(entry.path.name, tip=str(entry.path)),
+            Cell(entry.name, tip=str(entry.path)),
         )
     verdict = entry.summary.verdict
     return (
@@ -163,21 +175,21 @@ def cells_of(entry: Entry, now: datetime, oldest_days: float) -> tuple[Cell, ...
         ),
         validated_cell(entry),
         Cell(entry.summary.model),
-        Cell(entry.summary.identity, tip=str(entry.path)),
+        Cell(entry.name, tip=f"{entry.path}\n{entry.summary.identity}"),
     )
 
 
 def made_cell(entry: Entry) -> Cell:
-    """Return the day on which a calibration was made, with the local time as a tip."""
+    """Return the local time at which a calibration was made."""
     made = entry.created
     if made is None:
         return Cell(tr("unknown"), key=0.0)
     local = made.astimezone()
-    return Cell(f"{local:%Y-%m-%d}", tip=f"{local:%Y-%m-%d %H:%M}", key=made.timestamp())
+    return Cell(f"{local:%Y-%m-%d %H:%M}", key=made.timestamp())
 
 
 def age_cell(age_days: float | None, oldest_days: float) -> Cell:
-    """Return an age in words, marked when it is beyond the limit."""
+    """Return an age as text, marked if it is above the limit."""
     if age_days is None:
         return Cell("", key=0.0)
     if age_days < 1.0:
@@ -186,12 +198,15 @@ def age_cell(age_days: float | None, oldest_days: float) -> Cell:
         text = tr("{n} d").format(n=int(age_days))
     if age_days <= oldest_days:
         return Cell(text, key=age_days)
-    tip = tr("Older than {n:.0f} days: gel hardens and yellows. Validate it, or calibrate again.")
+    tip = tr(
+        "Older than {n:.0f} days. Gel hardens and yellows: validate this calibration, or "
+        "calibrate again."
+    )
     return Cell(text, "stale", "stale", tip.format(n=oldest_days), key=age_days)
 
 
 def validated_cell(entry: Entry) -> Cell:
-    """Return whether a calibration was tried on an object of known size."""
+    """Return the validation state of a calibration."""
     trial = entry.validation
     if entry.validated and trial is not None:
         tip = tr("{what}, {when}").format(what=trial.indenter, when=trial.when)

@@ -1,4 +1,4 @@
-"""The Sensors page: the library at the left, the chosen calibration at the right."""
+"""The Sensors page: the library on the left, the selected calibration on the right."""
 
 from __future__ import annotations
 
@@ -16,20 +16,22 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.sensors.calibration_actions import CalibrationActions, show_in_use
+from app.context.calibration_status import show_in_use
+from app.context.context import AppContext
+from app.context.pages import all_pages
+from app.sensors.calibration_actions import CalibrationActions
 from app.sensors.details import Details
 from app.sensors.model import LibraryModel
 from app.sensors.report_writer import ReportWriter
 from app.sensors.sessions_box import SessionsBox
 from app.sensors.tables import CellsTable
+from app.sensors.trash_dialog import TrashDialog
 from app.sensors.welcome import Welcome
-from app.shell.actions import make_action
-from app.shell.context import AppContext
-from app.shell.pages import all_pages
+from app.widgets.actions import make_action
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.workspace import ENDING
-from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.translation import tr
 
 
@@ -40,7 +42,8 @@ class SensorsPage(QWidget):
         super().__init__()
         self._context = context
         self._writing = False
-        self._library = CalibrationActions(context)
+        self._library = CalibrationActions(self, context=context)
+        self._trash: TrashDialog | None = None
         named(self, "sensors", tr("Sensors"))
         self._make_actions()
         self._model = LibraryModel(lambda: context.settings.limits.age_days)
@@ -60,9 +63,10 @@ class SensorsPage(QWidget):
         split.addWidget(self._details)
         split.setStretchFactor(0, 3)
         split.setStretchFactor(1, 2)
+        split.setSizes([600, 400])
         split.setChildrenCollapsible(False)
         self._stack = QStackedWidget(self)
-        self._stack.addWidget(Welcome(self._ways_to_begin()))
+        self._stack.addWidget(Welcome(self._first_actions()))
         self._stack.addWidget(self._build_library(split))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -87,7 +91,7 @@ class SensorsPage(QWidget):
             tr("Open &session folder"),
             requests.choose_session.emit,
             icon_name="folder",
-            tip=tr("Calibrate from pictures that were taken before"),
+            tip=tr("Calibrate from existing images"),
         )
         self.import_ = make_action(
             self,
@@ -104,7 +108,7 @@ class SensorsPage(QWidget):
             tr("&Try the virtual sensor"),
             requests.begin_demo.emit,
             icon_name="demo",
-            tip=tr("Everything works as with a camera, without one"),
+            tip=tr("Use all functions without a camera"),
         )
         self.use = make_action(
             self,
@@ -113,7 +117,7 @@ class SensorsPage(QWidget):
             lambda: self._with_chosen(self._library.use),
             keys=("Ctrl+U",),
             icon_name="use",
-            tip=tr("Measure with this calibration"),
+            tip=tr("Use this calibration for measuring"),
         )
         self.report = make_action(
             self,
@@ -121,7 +125,7 @@ class SensorsPage(QWidget):
             tr("Re&port…"),
             self.choose_report,
             icon_name="report",
-            tip=tr("Write all there is to know of this calibration, as web page or PDF"),
+            tip=tr("Write a report of this calibration as web page or PDF"),
         )
         self.reveal = make_action(
             self,
@@ -137,16 +141,27 @@ class SensorsPage(QWidget):
             lambda: self._with_chosen(self._library.remove),
             keys=("Del",),
             icon_name="remove",
-            tip=tr("Move it to the trash folder of the workspace"),
+            tip=tr("Move this calibration to the trash. It can be restored from there."),
         )
+        self.trash = make_action(
+            self,
+            "sensors.trash",
+            tr("&Trash…"),
+            self.show_trash,
+            icon_name="remove",
+            tip=tr("Show removed calibrations, and restore them"),
+        )
+        stack = self._library.undo
+        make_action(self, "sensors.undo", tr("Undo"), stack.undo, keys=("Ctrl+Z",))
+        make_action(self, "sensors.redo", tr("Redo"), stack.redo, keys=("Ctrl+Shift+Z", "Ctrl+Y"))
         there = {entry.name for entry in all_pages()}
         for action in (self.new, self.session, self.demo):
             action.setVisible("calibrate" in there)
             action.setEnabled("calibrate" in there)
 
-    def _ways_to_begin(self) -> tuple[QAction, ...]:
-        ways = (self.demo, self.new, self.session, self.import_)
-        return tuple(action for action in ways if action.isEnabled())
+    def _first_actions(self) -> tuple[QAction, ...]:
+        first = (self.demo, self.new, self.session, self.import_, self.trash)
+        return tuple(action for action in first if action.isVisible())
 
     def _build_lists(self) -> QSplitter:
         lists = QSplitter(Qt.Orientation.Vertical, self)
@@ -160,7 +175,7 @@ class SensorsPage(QWidget):
     def _build_library(self, split: QSplitter) -> QWidget:
         bar = named(QToolBar(self), "sensors.bar", tr("Library"))
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        for action in (self.new, self.session, self.import_):
+        for action in (self.new, self.session, self.import_, self.trash):
             bar.addAction(action)
             bar.widgetForAction(action).setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         library = QWidget(self)
@@ -171,47 +186,55 @@ class SensorsPage(QWidget):
         return library
 
     def enter(self) -> None:
-        """Look at the folder anew: files may have come from elsewhere."""
+        """Read the folder again: files may have been added by other programs."""
         self.refresh()
 
     def open_path(self, path: Path) -> None:
-        """Import a calibration file and choose it."""
-        place = self._library.import_files([path])
-        if place is not None:
-            self._choose(place)
+        """Import a calibration file and select it."""
+        imported = self._library.import_files([path])
+        if imported is not None:
+            self._choose(imported)
+
+    def show_trash(self) -> None:
+        """Show the removed calibrations."""
+        if self._trash is None:
+            self._trash = TrashDialog(self._library.removals, self._library.restore, self)
+        self._trash.refresh()
+        self._trash.show()
+        self._trash.raise_()
 
     def choose_calibrations(self) -> None:
-        """Let the person choose files to import."""
+        """Let the user choose files to import."""
         settings = self._context.settings
         names, _ = QFileDialog.getOpenFileNames(
             self,
             tr("Import calibrations"),
-            str(settings.last_folder),
+            str(settings.folder("calibration")),
             tr("Calibrations ({pattern})").format(pattern=f"*{ENDING}"),
         )
         if names:
-            settings.last_folder = Path(names[0]).parent
-            place = self._library.import_files(Path(name) for name in names)
-            if place is not None:
-                self._choose(place)
+            settings.keep_folder("calibration", Path(names[0]).parent)
+            imported = self._library.import_files(Path(name) for name in names)
+            if imported is not None:
+                self._choose(imported)
 
     def choose_report(self) -> None:
-        """Ask for a place, and write the report of the chosen calibration there."""
+        """Ask for a file, and write the report of the selected calibration to it."""
         entry, settings = self.chosen(), self._context.settings
         if entry is None:
             return
         name, _ = QFileDialog.getSaveFileName(
             self,
-            tr("Write the report"),
-            str(settings.last_folder / f"{entry.path.stem}-report.html"),
+            tr("Save the report"),
+            str(settings.folder("report") / f"{entry.path.stem}-report.html"),
             tr("Web page (*.html);;PDF (*.pdf)"),
         )
         if name:
-            settings.last_folder = Path(name).parent
+            settings.keep_folder("report", Path(name).parent)
             self._reports.write(entry, Path(name))
 
     def may_close(self) -> bool:
-        """Wait a little for a report that is being written."""
+        """Wait a short time for a report that is being written."""
         self._reports.stop()
         return True
 
@@ -222,18 +245,18 @@ class SensorsPage(QWidget):
 
     def _tell_written(self, path: str) -> None:
         self._context.toasts.show(
-            tr("The report is written to {path}.").format(path=path),
+            tr("Report saved to {path}.").format(path=path),
             "pass",
             actions=((tr("Open"), lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(path))),),
         )
 
     def chosen(self) -> Entry | None:
-        """Return the calibration that is chosen."""
+        """Return the selected calibration."""
         row = self._table.chosen_row()
         return None if row is None else self._model.entry(row)
 
     def refresh(self) -> None:
-        """Show what is in the workspace now; what was chosen stays chosen."""
+        """Show the present content of the workspace. The selection is kept."""
         chosen = self.chosen()
         entries = self._library.entries()
         self._model.set_entries(entries)
@@ -241,6 +264,9 @@ class SensorsPage(QWidget):
         self._sessions.set_entries(sessions)
         self._stack.setCurrentIndex(1 if entries or sessions else 0)
         show_in_use(self._context, entries)
+        self.trash.setEnabled(bool(self._library.removals()))
+        if self._trash is not None:
+            self._trash.refresh()
         used = next((entry for entry in entries if entry.in_use), None)
         known = {entry.path for entry in entries}
         if chosen is not None and chosen.path in known:

@@ -1,4 +1,4 @@
-"""Writes a calibration's report beside the window's work."""
+"""Writes a calibration's report in the background."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LOG = logging.getLogger(__name__)
 
 
 class ReportWriter(QObject):
-    """One report at a time, in a thread of its own.
+    """Writes one report at a time, in its own thread.
 
     Signals
     -------
@@ -41,7 +41,7 @@ class ReportWriter(QObject):
         self._ended.connect(self._finish, Qt.ConnectionType.QueuedConnection)
 
     def write(self, entry: Entry, path: Path) -> None:
-        """Begin to write the report of a calibration, HTML or PDF by its name's ending."""
+        """Start writing the report of a calibration, HTML or PDF by the file extension."""
         if self._thread is not None:
             return
         self._thread = threading.Thread(
@@ -61,9 +61,9 @@ class ReportWriter(QObject):
             write_entry_report(entry, path)
         except InputError as error:
             refusal = str(error)
-        except Exception as error:  # told in the window, whole in the log
+        except Exception as error:  # short message in the window, full traceback in the log
             _LOG.exception("The report failed")
-            refusal = tr("A fault of this program ({kind}); the log has it.").format(
+            refusal = tr("Internal error ({kind}). See the log for details.").format(
                 kind=type(error).__name__
             )
         self._ended.emit(str(path), refusal)
@@ -80,19 +80,19 @@ class ReportWriter(QObject):
 
 
 def write_entry_report(entry: Entry, path: Path) -> None:
-    """Write the report of a calibration of the library, with the trial kept beside it.
+    """Write the report of a calibration of the library, with its validation.
 
     Raises
     ------
     InputError
         If the calibration cannot be read or the file cannot be written.
     """
-    from gelpolight_core.calibration.file import read_calibration  # heavy, all of them
+    from gelpolight_core.calibration.file import read_calibration  # slow imports
     from gelpolight_core.report.build import calibration_report
     from gelpolight_core.report.document import Validation
     from gelpolight_core.report.file import refuse_other_endings, write_report
 
     refuse_other_endings(path)
-    said = trial_lines(entry)
-    validation = Validation("; ".join(said)) if entry.validation is not None else None
+    lines = trial_lines(entry)
+    validation = Validation("; ".join(lines)) if entry.validation is not None else None
     write_report(calibration_report(read_calibration(entry.path), validation=validation), path)

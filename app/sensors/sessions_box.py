@@ -1,4 +1,4 @@
-"""The sessions of the library: each can be gone on with."""
+"""The sessions of the library. Each can be continued."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
 from app.sensors.model import SessionsModel
 from app.sensors.tables import CellsTable
-from app.shell.actions import make_action
+from app.widgets.actions import make_action
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
@@ -19,12 +19,12 @@ from gelpolight_core.translation import tr
 
 
 class SessionsBox(QWidget):
-    """A table of sessions, and what can be done with the one that is chosen.
+    """A table of sessions, and the actions on the selected one.
 
     Signals
     -------
     wanted(str)
-        Folder of the session to go on with.
+        Folder of the session to continue.
     """
 
     wanted = Signal(str)
@@ -40,12 +40,12 @@ class SessionsBox(QWidget):
         self.go_on: QAction = make_action(
             self,
             "sensors.go_on",
-            tr("&Go on calibrating"),
+            tr("&Continue calibration"),
             self._go_on,
             icon_name="calibrate",
-            tip=tr("Open the session that is chosen, with all that was captured and decided"),
+            tip=tr("Open the selected session with all its images and decisions"),
         )
-        button = named(QToolButton(self), "sensors.go_on.button", tr("Go on calibrating"))
+        button = named(QToolButton(self), "sensors.go_on.button", tr("Continue calibration"))
         button.setDefaultAction(self.go_on)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -62,7 +62,7 @@ class SessionsBox(QWidget):
         column.addWidget(self.table, 1)
 
     def set_entries(self, entries: tuple[SessionEntry, ...]) -> None:
-        """Show these sessions; the one that was chosen stays so."""
+        """Show these sessions. The selection is kept."""
         before = self._chosen()
         self._model.set_entries(entries)
         self.table.clearSelection()

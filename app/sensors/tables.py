@@ -1,4 +1,4 @@
-"""What the tables of the Sensors page have in common."""
+"""Common parts of the tables on the Sensors page."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ ROW_PX = 30
 
 
 class CellsTable(QTableView):
-    """Shows rows of cells, of which one can be chosen; a click on a title sorts them.
+    """Shows rows of cells, one of which can be selected. A click on a column header sorts them.
 
     Parameters
     ----------
     model : CellsModel
         The rows.
     name, accessible : str
-        As for every control.
+        Object name and text for screen readers.
     parent : QWidget
-        It belongs to it.
+        Parent widget.
     """
 
     def __init__(self, model: CellsModel, name: str, accessible: str, parent: QWidget) -> None:
@@ -37,7 +37,6 @@ class CellsTable(QTableView):
         self.setAlternatingRowColors(True)
         self.setShowGrid(False)
         self.setWordWrap(False)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setTabKeyNavigation(False)
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(ROW_PX)
@@ -47,6 +46,6 @@ class CellsTable(QTableView):
         header.setHighlightSections(False)
 
     def chosen_row(self) -> int | None:
-        """Return the model's row that is chosen."""
+        """Return the model row of the selection."""
         rows = self.selectionModel().selectedRows()
         return self.sorted.mapToSource(rows[0]).row() if rows else None

@@ -1,4 +1,4 @@
-"""What stands on the Sensors page while there is no sensor."""
+"""Content of the Sensors page while there is no sensor."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QToolButton, QVBoxLayout, QWidget
 
-from app.shell.icons import application_icon
+from app.theme.icons import application_icon
 from app.widgets.label import MarkupLabel, PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -15,24 +15,25 @@ WIDTH = 480
 
 
 class Welcome(QWidget):
-    """Says what this is, and offers the ways to begin.
+    """Shows a short introduction and the first actions.
 
     Parameters
     ----------
-    ways : tuple of QAction
-        The first is the one for most people.
+    actions : tuple of QAction
+        The first one is the most common.
     """
 
-    def __init__(self, ways: tuple[QAction, ...]) -> None:
+    def __init__(self, actions: tuple[QAction, ...]) -> None:
         super().__init__()
         named(self, "sensors.welcome", tr("Welcome"))
         sign = PlainLabel(parent=self)
         sign.setPixmap(application_icon().pixmap(96, 96))
-        title = MarkupLabel(f"<h1>{tr('No sensor yet')}</h1>", self)
+        heading = tr("No sensor yet")
+        title = MarkupLabel(f"<h1>{heading}</h1>", self)
         text = PlainLabel(
             tr(
-                "A sensor appears here once it is calibrated. Begin with one of these, or drop a "
-                "session folder or a calibration file onto this window."
+                "Sensors are listed here after calibration. Start with one of these "
+                "actions, or drop a session folder or a calibration file onto this window."
             ),
             self,
         )
@@ -46,17 +47,17 @@ class Welcome(QWidget):
         column.addWidget(title, 0, Qt.AlignmentFlag.AlignHCenter)
         column.addWidget(text)
         column.addSpacing(16)
-        for way in ways:
-            column.addWidget(_button(way), 0, Qt.AlignmentFlag.AlignHCenter)
+        for action in actions:
+            column.addWidget(_button(action), 0, Qt.AlignmentFlag.AlignHCenter)
         column.addStretch(3)
         layout = QHBoxLayout(self)
         layout.addWidget(middle)
 
 
-def _button(way: QAction) -> QToolButton:
+def _button(action: QAction) -> QToolButton:
     button = QToolButton()
-    named(button, f"welcome.{way.objectName()}", way.text().replace("&", ""))
-    button.setDefaultAction(way)
+    named(button, f"welcome.{action.objectName()}", action.text().replace("&", ""))
+    button.setDefaultAction(action)
     button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
     button.setIconSize(QSize(24, 24))
     button.setMinimumSize(320, 44)

@@ -1,4 +1,4 @@
-"""About: what this is, the versions of its parts, its licences."""
+"""About box: the program, the versions of its parts and their licences."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell.icons import application_icon, icon
+from app.theme.icons import application_icon, icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
 from app.widgets.naming import named
 from gelpolight_core import __version__
 from gelpolight_core.translation import tr
 
-# A packaged program brings the licences of all its parts; elsewhere each library brings its own.
+# A packaged program contains the licences of all its parts. In other installations each library has
+# its own.
 LICENCES = Path(__file__).resolve().parents[2] / "LICENCES.txt"
 PARTS = (
     "PySide6-Essentials",
@@ -36,12 +37,14 @@ PARTS = (
     "matplotlib",
     "tifffile",
     "trimesh",
+    "pyvista",
+    "pyvistaqt",
     "vtk",
 )
 
 
 def versions() -> tuple[tuple[str, str], ...]:
-    """Return the name and version of the program and of the parts that are installed."""
+    """Return the name and version of the program and of its installed parts."""
     found = [
         ("GelPoLight Studio", __version__),
         ("Python", platform.python_version()),
@@ -57,7 +60,7 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 class AboutDialog(QDialog):
-    """What a person sends along with a question."""
+    """The information to include in a question or bug report."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -67,7 +70,11 @@ class AboutDialog(QDialog):
         sign.setPixmap(application_icon().pixmap(64, 64))
         title = MarkupLabel(f"<h2>GelPoLight Studio {__version__}</h2>", self)
         what = PlainLabel(
-            tr("Calibrates a point-lit tactile sensor, shows its depth map, and measures."), self
+            tr(
+                "Calibrates a point-lit tactile sensor, shows its depth map and measures "
+                "pressed objects."
+            ),
+            self,
         )
         what.setWordWrap(True)
         words = QVBoxLayout()
@@ -84,14 +91,16 @@ class AboutDialog(QDialog):
         table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         licences = PlainLabel(
             tr(
-                "Licence: BSD 3-Clause. Qt and PySide6 are used under the LGPL 3; the other parts "
-                "under BSD, MIT, Apache and PSF licences of their own."
+                "Licence: BSD 3-Clause. Qt and PySide6 are used under the LGPL 3. The "
+                "other parts have BSD, MIT, Apache and PSF licences."
             ),
             self,
         )
         licences.setWordWrap(True)
         copy = named(
-            QPushButton(icon("copy"), tr("Copy"), self), "about.copy", tr("Copy the versions")
+            QPushButton(icon("copy"), tr("Copy"), self),
+            "about.copy",
+            tr("Copy the version numbers"),
         )
         copy.clicked.connect(self.copy)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close, self)
@@ -110,7 +119,7 @@ class AboutDialog(QDialog):
         layout.addWidget(buttons)
 
     def show_licences(self) -> None:
-        """Show the licences of everything that was packaged with the program."""
+        """Show the licences of all parts that are packaged with the program."""
         dialog = named(QDialog(self), "licences", tr("Licences of all parts"))
         dialog.setWindowTitle(tr("Licences of all parts"))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -127,6 +136,6 @@ class AboutDialog(QDialog):
         dialog.show()
 
     def copy(self) -> None:
-        """Put the versions on the clipboard."""
+        """Copy the versions to the clipboard."""
         text = "\n".join(f"{name} {number}" for name, number in versions())
         QGuiApplication.clipboard().setText(text)

@@ -1,4 +1,4 @@
-"""Faults of the program: each into the log, one message to the person, never a silent death."""
+"""Internal errors: each is logged and shown to the user in one message."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from PySide6.QtCore import (
     qInstallMessageHandler,
 )
 
-from app.shell.toasts import Toasts
+from app.services.toasts import Toasts
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
@@ -33,24 +33,24 @@ QT_LEVELS = {
 
 
 class Faults(QObject):
-    """Takes what nobody caught, in any thread.
+    """Handles exceptions that nothing else caught, in any thread.
 
     Parameters
     ----------
     toasts : Toasts
-        Where the person is told.
+        Shows the message to the user.
     """
 
-    _told = Signal(str, bool)  # from any thread; Qt brings it into the window's
+    _reported = Signal(str, bool)  # from any thread; Qt delivers it in the window's thread
 
     def __init__(self, toasts: Toasts) -> None:
         super().__init__()
         self._toasts = toasts
         self._before: tuple[Any, ...] = ()
-        self._told.connect(self._tell)
+        self._reported.connect(self._tell)
 
     def install(self) -> None:
-        """Take over Python's and Qt's last resorts."""
+        """Install the handlers of Python and Qt for uncaught exceptions and messages."""
         self._before = (sys.excepthook, threading.excepthook, sys.unraisablehook)
         sys.excepthook = self.take
         threading.excepthook = self._take_from_thread
@@ -58,7 +58,7 @@ class Faults(QObject):
         qInstallMessageHandler(_log_qt)
 
     def uninstall(self) -> None:
-        """Give them back."""
+        """Restore the previous handlers."""
         sys.excepthook, threading.excepthook, sys.unraisablehook = self._before
         qInstallMessageHandler(None)
 
@@ -69,16 +69,16 @@ class Faults(QObject):
         trace: TracebackType | None = None,
         where: str = "",
     ) -> None:
-        """Log a fault and tell the person once; an InputError is told as it is."""
+        """Log an error and show it once. The sentence of an InputError is shown unchanged."""
         if isinstance(error, InputError):
             log.warning("%s", error, exc_info=(kind, error, trace))
-            self._told.emit(str(error), False)
+            self._reported.emit(str(error), False)
             return
-        log.critical("Fault%s", where and f" in {where}", exc_info=(kind, error, trace))
+        log.critical("Internal error%s", where and f" in {where}", exc_info=(kind, error, trace))
         lines = str(error).splitlines()
         what = lines[0] if lines else kind.__name__
-        said = tr("A fault of this program ({what}); please report it with the log")
-        self._told.emit(said.format(what=what) + ".", True)
+        message = tr("Internal error ({what}). Please report it and include the log")
+        self._reported.emit(message.format(what=what) + ".", True)
 
     def _take_from_thread(self, given: threading.ExceptHookArgs) -> None:
         name = "" if given.thread is None else given.thread.name

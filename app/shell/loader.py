@@ -1,4 +1,4 @@
-"""Modules that take long to load are loaded beside the window, which answers meanwhile."""
+"""Loads slow modules in the background while the window stays responsive."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LOG = logging.getLogger(__name__)
 
 
 class Loader(QObject):
-    """Imports modules one after the other in a thread of its own, which ends with the last."""
+    """Imports modules one after the other in its own thread, which ends after the last one."""
 
     _loaded = Signal()
 
@@ -26,19 +26,19 @@ class Loader(QObject):
         self._done: set[str] = set()
         self._thread: threading.Thread | None = None
         self._waiting: list[tuple[frozenset[str], Callable[[], object]]] = []
-        self._loaded.connect(self._call_those_who_waited, Qt.ConnectionType.QueuedConnection)
+        self._loaded.connect(self._run_callbacks, Qt.ConnectionType.QueuedConnection)
 
     def load(self, modules: Iterable[str]) -> None:
-        """Load modules after all that were asked for before."""
+        """Load modules after all earlier requests."""
         with self._lock:
             self._queue.extend(modules)
         self._run_thread()
 
     def when_loaded(self, modules: Iterable[str], then: Callable[[], object]) -> None:
-        """Call `then` in this thread once modules are there: now, or when they are loaded.
+        """Call `then` in this thread when the modules are loaded, at once if they already are.
 
-        They are loaded before all others. A module that cannot be loaded counts as loaded:
-        whoever imports it is told why.
+        They are loaded before all others. A module that cannot be loaded counts as loaded: the code
+        that imports it gets the error.
         """
         missing = [name for name in modules if not self._is_there(name)]
         if not missing:
@@ -50,7 +50,7 @@ class Loader(QObject):
         self._run_thread()
 
     def stop(self) -> None:
-        """Leave out what is not begun, call nobody any more, and wait for the module at work."""
+        """Skip modules not yet started, call no callbacks, and wait for the current module."""
         self._waiting.clear()
         with self._lock:
             self._queue.clear()
@@ -59,7 +59,7 @@ class Loader(QObject):
             thread.join()
 
     def _is_there(self, name: str) -> bool:
-        """Whether a module is loaded as a whole; while others load, it may be half of itself."""
+        """Whether a module is completely loaded, not only partly as during its import."""
         with self._lock:
             return name in self._done or (self._thread is None and name in sys.modules)
 
@@ -78,13 +78,13 @@ class Loader(QObject):
                 name = self._queue.popleft()
             try:
                 importlib.import_module(name)
-            except Exception:  # raised again where the module is used, in the window's thread
+            except Exception:  # raised again in the window's thread when the module is used
                 _LOG.exception("The module %s cannot be loaded", name)
             with self._lock:
                 self._done.add(name)
             self._loaded.emit()
 
-    def _call_those_who_waited(self) -> None:
+    def _run_callbacks(self) -> None:
         with self._lock:
             done = frozenset(self._done)
         ready = [then for missing, then in self._waiting if missing <= done]

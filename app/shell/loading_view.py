@@ -1,4 +1,4 @@
-"""What is shown while a page is being loaded."""
+"""The view shown while a page loads."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ WIDTH = 320
 
 
 class LoadingView(QWidget):
-    """A title and a bar that moves."""
+    """A title and a moving progress bar."""
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "main.loading", tr("A page is being loaded"))
-        self._text = named(PlainLabel(), "main.loading.text", tr("What is being loaded"))
+        named(self, "main.loading", tr("Page is loading"))
+        self._text = named(PlainLabel(), "main.loading.text", tr("Page being loaded"))
         self._text.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        bar = named(QProgressBar(), "main.loading.bar", tr("A page is being loaded"))
+        bar = named(QProgressBar(), "main.loading.bar", tr("Page is loading"))
         bar.setRange(0, 0)
         bar.setFixedWidth(WIDTH)
         column = QVBoxLayout(self)
@@ -29,5 +29,5 @@ class LoadingView(QWidget):
         column.addWidget(bar)
 
     def say(self, title: str) -> None:
-        """Say which page it is."""
+        """Show the name of the page."""
         self._text.setText(tr("Loading {page}…").format(page=title))

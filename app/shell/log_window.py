@@ -1,4 +1,4 @@
-"""The log, to be read and copied."""
+"""A window to read and copy the log."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import logging
 from PySide6.QtCore import QTimer, QUrl
 from PySide6.QtGui import QCloseEvent, QDesktopServices, QFontDatabase, QGuiApplication, QShowEvent
 from PySide6.QtWidgets import (
-    QComboBox,
     QDialog,
     QHBoxLayout,
     QPlainTextEdit,
@@ -16,8 +15,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell.icons import icon
-from app.shell.log import KEPT, Log
+from app.services.log import KEPT, Log
+from app.theme.icons import icon
+from app.widgets.inputs import ComboBox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -35,17 +35,17 @@ class LogWindow(QDialog):
         named(self, "log", tr("Log"))
         self.setWindowTitle(tr("Log"))
         self.resize(900, 480)
-        self._levels = named(QComboBox(self), "log.level", tr("Show from this level on"))
+        self._levels = named(ComboBox(self), "log.level", tr("Minimum level"))
         for label, level in (
-            (tr("Everything"), logging.DEBUG),
-            (tr("Notes and worse"), logging.INFO),
-            (tr("Warnings and worse"), logging.WARNING),
+            (tr("All"), logging.DEBUG),
+            (tr("Information and above"), logging.INFO),
+            (tr("Warnings and errors"), logging.WARNING),
             (tr("Errors only"), logging.ERROR),
         ):
             self._levels.addItem(label, level)
         self._levels.setCurrentIndex(1)
-        self._levels.currentIndexChanged.connect(self._show_anew)
-        self._text = named(QPlainTextEdit(self), "log.text", tr("Records of the log"))
+        self._levels.currentIndexChanged.connect(self._show_all)
+        self._text = named(QPlainTextEdit(self), "log.text", tr("Log records"))
         self._text.setReadOnly(True)
         self._text.setMaximumBlockCount(KEPT)
         self._text.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
@@ -75,21 +75,21 @@ class LogWindow(QDialog):
         self._timer.timeout.connect(self._show_new)
 
     def copy(self) -> None:
-        """Put what is shown on the clipboard."""
+        """Copy the shown records to the clipboard."""
         QGuiApplication.clipboard().setText(self._text.toPlainText())
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Begin to follow the log."""
+        """Start following the log."""
         self._show_new()
         self._timer.start()
         super().showEvent(event)
 
     def hideEvent(self, event: QCloseEvent) -> None:
-        """Follow it no longer."""
+        """Stop following the log."""
         self._timer.stop()
         super().hideEvent(event)
 
-    def _show_anew(self) -> None:
+    def _show_all(self) -> None:
         self._seen = 0
         self._text.clear()
         self._show_new()

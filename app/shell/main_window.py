@@ -1,11 +1,11 @@
-"""The one window: navigation at the left, pages, status bar."""
+"""The main window: navigation on the left, pages, status bar."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QSize, Qt, QTimer, QUrl
 from PySide6.QtGui import (
@@ -28,33 +28,41 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell import theme
+from app.context.context import AppContext
+from app.context.pages import PageEntry, all_pages
+from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
+from app.services.status import StatusLine
 from app.shell.about import AboutDialog
-from app.shell.context import AppContext
 from app.shell.documentation import find_documentation
-from app.shell.dropping import dropped_paths, is_session, sort_dropped
-from app.shell.icons import icon
 from app.shell.loader import Loader
 from app.shell.loading_view import LoadingView
 from app.shell.log_window import LogWindow
 from app.shell.memory import give_back
 from app.shell.menus import Menus
-from app.shell.pages import PageEntry, all_pages
+from app.shell.notifications import NotificationsButton
 from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet
-from app.shell.status import StatusLine
+from app.theme import theme
+from app.theme.icons import icon
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
+from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
+from gelpolight_core.recording.recording import ENDING as RECORDING_ENDING
 from gelpolight_core.translation import tr
 
+if TYPE_CHECKING:
+    from app.shell.guide_window import GuideWindow
+
 BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
-# What the sources are made with.
+# Image sizes for which the kernels of the sources are compiled.
 SOURCES = ("app.sources.listing", "app.sources.bench")
 FIRST_SIZE = QSize(1280, 800)
-# Raised when toolbars change, so that an older layout is not forced onto a newer window.
+# Every control of every page can be reached from this size on.
+SMALLEST = QSize(1024, 700)
+# Raised when toolbars change, so that an old saved layout is not applied to a newer window.
 LAYOUT_VERSION = 1
-# How long after another page was shown memory is given back, and how often from then on.
+# Delay from a page change to the release of unused memory, and the interval from then on.
 TIDY_MS, TIDY_AGAIN_MS = 3_000, 60_000
 
 
@@ -64,16 +72,16 @@ class MainWindow(QMainWindow):
     Parameters
     ----------
     context : AppContext
-        What all pages are given.
+        Passed to all pages.
     pages : tuple of PageEntry, optional
-        The pages; those of the program without it.
+        The pages. Default: those of the program.
     """
 
     def __init__(self, *, context: AppContext, pages: tuple[PageEntry, ...] | None = None) -> None:
         super().__init__()
         named(self, "main", tr("GelPoLight Studio"))
         self.setWindowTitle(tr("GelPoLight Studio"))
-        self.setMinimumSize(800, 560)
+        self.setMinimumSize(SMALLEST.boundedTo(self.screen().availableSize()))
         self.setAcceptDrops(True)
         self.context = context
         self.entries = {entry.name: entry for entry in pages or all_pages()}
@@ -81,7 +89,8 @@ class MainWindow(QMainWindow):
         self._made: dict[str, QWidget] = {}
         self._asked_for = ""
         self._log_window: LogWindow | None = None
-        self._precision: QDialog | None = None
+        self._tools: dict[str, QDialog] = {}
+        self._guide: GuideWindow | None = None
         self._stack = named(QStackedWidget(self), "main.pages", tr("Page"))
         self.setCentralWidget(self._stack)
         self._loading = LoadingView()
@@ -89,12 +98,16 @@ class MainWindow(QMainWindow):
         self.page_actions = self._build_navigation()
         self.menus = Menus(self)
         self.setStatusBar(StatusLine(context.status))
-        context.toasts.attach(self._stack, self.show_log)
+        self._notifications = NotificationsButton(context.toasts, self.show_log, self)
+        self.statusBar().addPermanentWidget(self._notifications)
+        context.toasts.attach(self, self.show_log, over=self._stack)
         requests = context.requests
         requests.page.connect(self.show_page)
         requests.path.connect(self.open_path_in)
         requests.session.connect(self.open_session)
         requests.choose_session.connect(self.choose_session)
+        requests.open_files.connect(self.choose_files)
+        requests.guide.connect(self.show_guide)
         requests.new_sensor.connect(self.begin_new_sensor)
         requests.demo.connect(context.source.choose_virtual_sensor)
         requests.begin_demo.connect(self.begin_demo)
@@ -113,13 +126,15 @@ class MainWindow(QMainWindow):
         bar.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
         group = QActionGroup(self)
         actions = {}
-        for number, entry in enumerate(self.entries.values(), start=1):
+        steps = [name for name in self.entries if name != "start"]
+        for name, entry in self.entries.items():
+            key = f"Ctrl+{steps.index(name) + 1}" if name in steps else "Ctrl+Home"
             action = QAction(icon(entry.icon), entry.title, self)
             action.setObjectName(f"navigation.{entry.name}")
             action.setCheckable(True)
-            action.setShortcut(f"Ctrl+{number}")
-            action.setToolTip(plain_tip(f"{entry.title} (Ctrl+{number})"))
-            action.triggered.connect(lambda _=False, name=entry.name: self.show_page(name))
+            action.setShortcut(key)
+            action.setToolTip(plain_tip(f"{entry.title} ({key})"))
+            action.triggered.connect(lambda _=False, name=name: self.show_page(name))
             group.addAction(action)
             bar.addAction(action)
             button = bar.widgetForAction(action)
@@ -136,7 +151,7 @@ class MainWindow(QMainWindow):
             room = self.screen().availableSize()
             self.resize(FIRST_SIZE.boundedTo(room * 0.9))
             if self.size() != FIRST_SIZE:
-                # Its frame would reach over the screen's edge, and the status bar with it.
+                # The frame would extend beyond the edge of the screen and hide the status bar.
                 self.setWindowState(Qt.WindowState.WindowMaximized)
         self.restoreState(state, LAYOUT_VERSION)
 
@@ -144,12 +159,17 @@ class MainWindow(QMainWindow):
 
     @property
     def page_name(self) -> str:
-        """Name of the page that is shown; empty before the first."""
+        """Name of the visible page. Empty before the first one."""
         shown = self._stack.currentWidget()
         return next((name for name, page in self._made.items() if page is shown), "")
 
+    @property
+    def shown_page(self) -> QWidget:
+        """The visible page."""
+        return self._stack.currentWidget()
+
     def page(self, name: str) -> QWidget:
-        """Return a page, made now if it is asked for the first time."""
+        """Return a page, and create it at the first request."""
         if name not in self._made:
             page = self.entries[name].make(self.context)
             self._made[name] = page
@@ -157,14 +177,14 @@ class MainWindow(QMainWindow):
         return self._made[name]
 
     def show_page(self, name: str) -> None:
-        """Show a page; a name that is not registered is the first page's.
+        """Show a page. An unknown name shows the first page.
 
-        One whose modules are not loaded yet is shown as soon as they are.
+        If the page's modules are still loading, it appears when they are loaded.
         """
         self._with_page(name if name in self.entries else next(iter(self.entries)), lambda _: None)
 
     def _with_page(self, name: str, act: Callable[[QWidget], object]) -> None:
-        """Show a page and do something with it, unless another is asked for meanwhile."""
+        """Show a page and run a function on it, unless another page is requested meanwhile."""
         self._asked_for = name
         self.page_actions[name].setChecked(True)
 
@@ -190,7 +210,7 @@ class MainWindow(QMainWindow):
         _call(before, "leave")
         self._stack.setCurrentWidget(after)
         _call(after, "enter")
-        # Not put off by those who go from page to page.
+        # Changing pages often does not postpone it.
         if not 0 <= self._tidy.remainingTime() <= TIDY_MS:
             self._tidy.start(TIDY_MS)
 
@@ -199,7 +219,7 @@ class MainWindow(QMainWindow):
         self._tidy.start(TIDY_AGAIN_MS)
 
     def open_path_in(self, name: str, path: str) -> None:
-        """Show a page and let it open a folder or file."""
+        """Show a page and open a folder or file in it."""
         if name in self.entries:
             self._with_page(name, lambda page: self._open_path(page, Path(path)))
 
@@ -210,14 +230,14 @@ class MainWindow(QMainWindow):
             self.context.toasts.show(str(error), "fail")
 
     def begin_new_sensor(self) -> None:
-        """Begin to calibrate a sensor, where that is there."""
+        """Start calibrating a sensor, if there is a page for it."""
         if "calibrate" in self.entries:
             self._with_page("calibrate", lambda page: _call(page, "begin"))
 
     def begin_demo(self) -> None:
-        """Put the virtual sensor in as the source, and begin to calibrate it where that is there.
+        """Select the virtual sensor, and start calibrating it if there is a page for it.
 
-        A page that knows how to begin on it (``begin_demo``) is asked to.
+        A page with its own start for it (``begin_demo``) is used.
         """
         if "calibrate" not in self.entries:
             self.context.source.choose_virtual_sensor()
@@ -229,8 +249,16 @@ class MainWindow(QMainWindow):
 
         self._with_page("calibrate", begin)
 
+    def start_demo(self) -> None:
+        """Start the program with the virtual sensor: on the Start page if something can go on."""
+        workspace = self.context.workspace
+        if self.page_name == "start" and (workspace.entries() or workspace.sessions()):
+            self.loader.when_loaded(SOURCES, self.context.source.choose_virtual_sensor)
+        else:
+            self.begin_demo()
+
     def choose_source_again(self) -> None:
-        """Choose the source of last time, once what it needs is loaded."""
+        """Select the source of the last run as soon as its modules are loaded."""
         kind, file = self.context.settings.source
         if kind:
             again = partial(self.context.source.choose_again, kind, file)
@@ -238,35 +266,54 @@ class MainWindow(QMainWindow):
 
     def _remember_source(self) -> None:
         self.context.settings.source = self.context.source.remembered
+        # A visible page that uses the source says so when it has opened it.
+        self.context.status.update(camera=self.context.source.idle_name)
 
     # Sessions and files
 
     def choose_session(self) -> None:
-        """Let the person choose a session folder, and open it."""
+        """Let the user choose a session folder, and open it."""
         settings = self.context.settings
         chosen = QFileDialog.getExistingDirectory(
-            self, tr("Open a session folder"), str(settings.last_folder)
+            self, tr("Open a session folder"), str(settings.folder("session"))
         )
         if chosen:
             self.open_session(Path(chosen))
 
+    def choose_files(self) -> None:
+        """Let the user choose calibrations, recordings or the description of a session."""
+        settings = self.context.settings
+        patterns = f"*{ENDING} *{RECORDING_ENDING} {DESCRIPTION}"
+        names, _ = QFileDialog.getOpenFileNames(
+            self,
+            tr("Open"),
+            str(settings.folder("session")),
+            tr("Calibrations, recordings and sessions ({patterns})").format(patterns=patterns),
+        )
+        if names:
+            settings.keep_folder("session", Path(names[0]).parent)
+            self.open_dropped(tuple(map(Path, names)))
+
     def open_session(self, folder: Path | str) -> None:
-        """Calibrate from a session folder, and remember it."""
+        """Calibrate from a session folder and remember it."""
         folder = Path(folder)
         if not is_session(folder):
             error = InputError(
-                tr("this is no session folder: it holds no session.toml"),
+                tr("The folder is not a session folder: it contains no session.toml"),
                 where=str(folder),
-                advice=tr("Choose the folder that holds session.toml and the stages' pictures"),
+                advice=tr(
+                    "Choose the folder that contains session.toml and the image folders of "
+                    "the stages"
+                ),
             )
             self.context.toasts.show(str(error), "fail")
             return
-        self.context.settings.last_folder = folder.parent
+        self.context.settings.keep_folder("session", folder.parent)
         self.context.settings.add_recent_session(folder)
         self.open_path_in("calibrate", str(folder))
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Take session folders, calibration files and recordings."""
+        """Accept session folders, calibration files and recordings."""
         if sort_dropped(dropped_paths(event.mimeData())):
             event.acceptProposedAction()
 
@@ -276,7 +323,7 @@ class MainWindow(QMainWindow):
         event.acceptProposedAction()
 
     def open_dropped(self, paths: tuple[Path, ...]) -> None:
-        """Open what was dropped."""
+        """Open the dropped items."""
         dropped = sort_dropped(paths)
         for path in dropped.calibrations:
             self.open_path_in("sensors", str(path))
@@ -287,6 +334,8 @@ class MainWindow(QMainWindow):
         for file in dropped.recordings[:1]:
             self.context.source.choose_recording(file)
             self.context.toasts.show(tr("The camera is now {name}.").format(name=file.name))
+            if self.page_name == "start":
+                self.show_page("inspect")
 
     # Dialogs
 
@@ -310,38 +359,68 @@ class MainWindow(QMainWindow):
         _show(ShortcutSheet(self))
 
     def show_about(self) -> None:
-        """Show what this program is made of."""
+        """Show the program's version and parts."""
         _show(AboutDialog(self))
 
     def show_precision(self) -> None:
-        """Show what accuracy costs on this machine."""
-        from app.inspect.precision_dialog import PrecisionDialog  # heavy: it knows every method
+        """Show accuracy against run time on this machine."""
+        from app.inspect.precision_dialog import PrecisionDialog  # slow import: loads every method
 
-        if self._precision is None:
-            self._precision = PrecisionDialog(context=self.context, parent=self)
-        self._precision.show()
-        self._precision.raise_()
+        self._show_tool("precision", lambda: PrecisionDialog(context=self.context, parent=self))
 
-    def show_guide(self) -> None:
-        """Show the documentation, in what the desktop shows web pages with."""
-        page = find_documentation()
-        if page is None:
-            text = tr("This installation came without the documentation: see docs in the sources.")
+    def show_stability(self) -> None:
+        """Show the stability report."""
+        from app.tools.report_dialog import ReportDialog  # slow import: loads every case
+        from app.tools.stability_report import StabilityReport
+
+        self._show_tool(
+            "stability", lambda: ReportDialog(StabilityReport(), context=self.context, parent=self)
+        )
+
+    def show_design(self) -> None:
+        """Show the check of the virtual sensor's design."""
+        from app.tools.design_report import DesignReport  # slow import, as above
+        from app.tools.report_dialog import ReportDialog
+        from gelpolight_core.design.sensor_design import SensorDesign
+
+        bench = self.context.source.bench
+        report = DesignReport(SensorDesign() if bench is None else bench.design)
+        self._show_tool("design", lambda: ReportDialog(report, context=self.context, parent=self))
+
+    def _show_tool(self, name: str, make: Callable[[], QDialog]) -> None:
+        """Show a dialog that keeps its results while the program runs."""
+        if name not in self._tools:
+            self._tools[name] = make()
+        self._tools[name].show()
+        self._tools[name].raise_()
+
+    def show_guide(self, page: str = "", heading: str = "") -> None:
+        """Show the guide: what it says about the visible page, or another page and heading."""
+        from app.shell.guide_window import OF_PAGE, GuideWindow  # made at first use
+
+        folder = find_documentation()
+        if folder is None:
+            text = tr(
+                "The documentation is not installed. Read the docs folder of the source code."
+            )
             self.context.toasts.show(text, "warn")
-        elif not QDesktopServices.openUrl(QUrl.fromLocalFile(str(page))):
-            text = tr("Nothing here shows web pages; the documentation is at {path}")
-            self.context.toasts.show(text.format(path=page), "warn")
+            return
+        if self._guide is None:
+            self._guide = GuideWindow(folder, self)
+        self._guide.show()
+        self._guide.raise_()
+        self._guide.show_page(page or OF_PAGE.get(self.page_name, "index"), heading)
 
     def open_board(self, square_mm: int) -> None:
-        """Show a checkerboard to print, in what the desktop shows PDF with."""
+        """Show a printable checkerboard in the PDF viewer of the desktop."""
         path = BOARDS / f"checkerboard-9x6-{square_mm}mm.pdf"
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(path))):
             self.context.toasts.show(
-                tr("Nothing here shows PDF; print this file: {path}").format(path=path), "warn"
+                tr("No PDF viewer was found. Print this file: {path}").format(path=path), "warn"
             )
 
     def set_theme(self, choice: str) -> None:
-        """Show a theme and remember it."""
+        """Apply a theme and remember it."""
         self.context.settings.theme = choice
         self.menus.themes[choice].setChecked(True)
         application = QApplication.instance()
@@ -357,11 +436,11 @@ class MainWindow(QMainWindow):
         self.context.requests.calibrations_changed.emit()
 
     def toggle_full_screen(self) -> None:
-        """Fill the screen, or go back."""
+        """Switch full screen on or off."""
         self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Ask the pages, then leave the one that is shown and remember the window."""
+        """Ask all pages, then leave the visible one and save the window layout."""
         if not all(_call(page, "may_close", default=True) for page in self._made.values()):
             event.ignore()
             return
@@ -378,18 +457,20 @@ class MainWindow(QMainWindow):
             page.close()
         if self._log_window is not None:
             self._log_window.close()
-        if self._precision is not None:
-            self._precision.close()
+        for dialog in self._tools.values():
+            dialog.close()
+        if self._guide is not None:
+            self._guide.close()
         super().closeEvent(event)
 
 
 def _show(dialog: QDialog) -> None:
-    """Show a dialog beside the work, not in its way."""
+    """Show a dialog next to the window without blocking it."""
     dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     dialog.show()
 
 
 def _call(page: QWidget, method: str, *arguments: Any, default: Any = None) -> Any:
-    """Call a method that a page may have."""
+    """Call a method if the page has it."""
     function = getattr(page, method, None)
     return default if function is None else function(*arguments)

@@ -1,4 +1,4 @@
-"""How much memory the C library keeps for itself."""
+"""Limits the memory that the C library keeps for itself."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import sys
 ARENAS_OPTION, LARGE_OPTION = -8, -3
 ARENAS = 2
 LARGE_BYTES = 8 << 20
-"""Above a picture of 1280 x 960 and a map of it; fetching every frame anew costs time."""
+"""Larger than an image of 1280 x 960 and its depth map. Allocating every frame again costs time."""
 
 
 def keep_little() -> None:
-    """Let the C library keep little of freed memory; to be called before there are threads.
+    """Make the C library keep little freed memory. Call this before any thread starts.
 
-    The GNU C library gives each thread a store of its own, up to eight for each core, and each
-    keeps the room of the pictures that went through it: half a gigabyte more within minutes. Two
-    are shared from now on. And whatever is larger than :data:`LARGE_BYTES` comes from the system
-    and goes back there at once; by itself the library raises that bound to 32 MB as such blocks
-    are freed, and what is left between others then stays: 0.2 GB more within minutes.
+    The GNU C library gives each thread its own arena, up to eight per core, and each arena keeps
+    the memory of the images that it handled: half a gigabyte more within minutes. This function
+    limits the arenas to two. It also lets every block above :data:`LARGE_BYTES` come directly from
+    the system and return there at once. By default the library raises this limit to 32 MB when such
+    blocks are freed, and the gaps between other blocks then stay: 0.2 GB more within minutes.
     """
     if sys.platform.startswith("linux"):
         option = getattr(ctypes.CDLL(None), "mallopt", None)
@@ -29,11 +29,11 @@ def keep_little() -> None:
 
 
 def give_back() -> None:
-    """Return to the system what the C library keeps of memory that was given back to it.
+    """Return freed memory that the C library keeps to the system.
 
-    Every thread that handles pictures leaves it some; after some changes of the page these are
-    gigabytes, and half a gigabyte within an hour of live pictures alone. It takes milliseconds,
-    tens of them where much is kept. Only the GNU C library has a call for that; others keep less.
+    Every thread that handles images leaves some. After several page changes this is gigabytes, and
+    half a gigabyte within an hour of live images alone. The call takes milliseconds, tens of them
+    if much is kept. Only the GNU C library has such a call; others keep less.
     """
     if sys.platform.startswith("linux"):
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu
 
-from app.shell.actions import make_action
+from app.shell.edit_menu import EditMenu
 from app.shell.preferences import THEME_NAMES
+from app.widgets.actions import make_action
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Menus:
-    """Builds the menu bar of a window and keeps what changes in it up to date."""
+    """Builds the menu bar of a window and keeps its changing parts up to date."""
 
     def __init__(self, window: MainWindow) -> None:
         self._window = window
@@ -27,6 +28,8 @@ class Menus:
         self._recent.aboutToShow.connect(self._fill_recent)
         self.themes = self._build_themes()
         self._build_file()
+        self.edit = EditMenu(window)
+        window.menuBar().addMenu(self.edit)
         self._build_view()
         self._build_tools()
         self._build_help()
@@ -43,6 +46,15 @@ class Menus:
                     window.choose_session,
                     keys=("Ctrl+O",),
                     icon_name="folder",
+                )
+            )
+            menu.addAction(
+                make_action(
+                    window,
+                    "file.open",
+                    tr("Open &files…"),
+                    window.choose_files,
+                    keys=("Ctrl+Alt+O",),
                 )
             )
             menu.addMenu(self._recent)
@@ -93,6 +105,14 @@ class Menus:
                 tr("&Error against run time…"),
                 window.show_precision,
             )
+        )
+        menu.addAction(
+            make_action(
+                window, "tools.stability", tr("Numerical &stability…"), window.show_stability
+            )
+        )
+        menu.addAction(
+            make_action(window, "tools.design", tr("&Design check…"), window.show_design)
         )
 
     def _build_help(self) -> None:
@@ -146,12 +166,12 @@ class Menus:
             )
         if sessions:
             self._recent.addSeparator()
-            forget = self._recent.addAction(tr("Forget these"))
+            forget = self._recent.addAction(tr("Clear this list"))
             forget.triggered.connect(self._window.context.settings.forget_recent_sessions)
         else:
-            self._recent.addAction(tr("None yet")).setEnabled(False)
+            self._recent.addAction(tr("No recent sessions")).setEnabled(False)
 
 
 def _short(folder: Path) -> str:
-    """Return a folder's name and its parent's; an ampersand is no mnemonic."""
+    """Return the names of a folder and its parent. An ampersand does not become a mnemonic."""
     return f"{folder.name}  ({folder.parent})".replace("&", "&&")

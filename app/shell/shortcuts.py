@@ -1,4 +1,4 @@
-"""The sheet of shortcuts, made from the actions themselves."""
+"""The sheet of keyboard shortcuts, built from the actions."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from app.widgets.qt_tree import below
 from app.widgets.tool_key import PURPOSE
 from gelpolight_core.translation import tr
 
-# What a group is called where its part of the program has another name than people know.
-TITLES = {"lut": tr("Reflectance curves"), "live": tr("Live picture"), "navigation": tr("Pages")}
-# Of the window's height.
+# Titles of groups whose internal name differs from the name in the user interface.
+TITLES = {"lut": tr("Reflectance curves"), "live": tr("Live image"), "navigation": tr("Pages")}
+# As a share of the window's height.
 TALL = 0.8
 
 
@@ -30,9 +30,9 @@ class Shortcut:
 
 
 def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
-    """Return the shortcuts in a window that can be used, in the order of their groups.
+    """Return the shortcuts of a window that can be used, in the order of their groups.
 
-    They are those of named actions and of tools. The group is the first part of the object name
+    They come from named actions and from tools. The group is the first part of the object name
     (``sensors.import``).
     """
     found = []
@@ -53,7 +53,7 @@ def shortcuts_of(window: QWidget) -> tuple[Shortcut, ...]:
 
 
 class ShortcutSheet(QDialog):
-    """All shortcuts of the window as it is now."""
+    """All shortcuts of the window in its current state."""
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)

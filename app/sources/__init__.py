@@ -1,1 +1,1 @@
-"""Where pictures come from: the virtual sensor, folders of pictures, and the threads between."""
+"""Image sources: cameras, the virtual sensor, folders and recordings, and their threads."""

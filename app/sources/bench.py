@@ -1,4 +1,4 @@
-"""What lies on the virtual sensor, as a technician arranges it; safe to use from any thread."""
+"""The scene on the virtual sensor, as a technician arranges it; safe to use from any thread."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ PRESSED = ("ball", "cylinder", "cuboid", "coin", "nut")
 ITEMS = (*BOARDS, *FLAT, *PRESSED)
 
 FAULTS = ("camera_stops", "room_light", "membrane_on", "too_bright")
-"""What can be made to go wrong: the camera gives no more pictures; light from the room falls in;
-the membrane was left on under the mirror; three times too much light."""
+"""Faults that can be switched on: the camera stops delivering images; light from the room falls in;
+the membrane is still mounted under the mirror; three times too much light.
+"""
 
 STAGES = {
     "checkerboard": "checkerboard",
@@ -34,29 +35,29 @@ STAGES = {
     "balls": "ball",
     "presses": "",
 }
-"""Stage of a session -> what lies on the sensor; each press has its own shape."""
+"""Stage of a session -> object on the sensor; each press has its own shape."""
 
 NOMINAL_EXPOSURE_MS = 10.0
-"""At this exposure and gain 0 the pictures are as bright as the design says."""
+"""At this exposure and gain 0 dB the images are as bright as the design specifies."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What the camera has before it.
+    """What the camera sees.
 
     Attributes
     ----------
     item : str
         One of ITEMS.
     pose : int
-        Which of the scripted poses of a hand-held checkerboard.
+        Index of the scripted pose of a hand-held checkerboard.
     x_mm, y_mm, yaw_deg : float
-        Place on the top surface, sensor frame; for the hand-held checkerboard what it is moved
-        by in the camera frame, and turned by in its plane.
+        Position on the top surface, sensor frame; for the hand-held checkerboard its shift in the
+        camera frame, and its rotation in the board plane.
     size_mm : float
         Diameter of a ball, cylinder or coin, side of a cuboid, width across flats of a nut.
     depth_mm : float
-        How deep its foremost point goes.
+        Depth of its foremost point.
     """
 
     item: str = "bare"
@@ -70,16 +71,16 @@ class Scene:
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """How the picture is taken.
+    """Camera settings and faults.
 
     Attributes
     ----------
     exposure_ms, gain_db, rate_hz : float
         Settings of the camera.
     noise : float
-        Times the noise of the design; 0 is none.
+        Factor on the noise of the design; 0 is no noise.
     faults : frozenset of str
-        Those of FAULTS that are switched on.
+        Names of FAULTS that are switched on.
     """
 
     exposure_ms: float = NOMINAL_EXPOSURE_MS
@@ -96,12 +97,12 @@ CONDITION_RANGES = {
     "noise": (0.0, 5.0),
 }
 
-# A coin that is solved in seconds; the board before the lens may be anywhere in the picture.
+# A coin that can be solved in seconds; the board in front of the lens may be anywhere in view.
 _LARGEST_MM = 12.0
 _DEEPEST_MM = 3.0
 _BOARD_REACH_MM = 100.0
 
-_FIRST_PLACES: dict[str, dict[str, Any]] = {
+_FIRST_POSITIONS: dict[str, dict[str, Any]] = {
     "board_on_top": {"x_mm": 0.35, "y_mm": -0.25, "yaw_deg": 14.0},
     "ball": {"size_mm": 8.0, "depth_mm": 1.0},
     "cylinder": {"size_mm": 5.0, "depth_mm": 1.0},
@@ -112,19 +113,19 @@ _FIRST_PLACES: dict[str, dict[str, Any]] = {
 
 
 class Bench:
-    """The state of the virtual bench; values beyond a range are brought to its end.
+    """The state of the virtual bench; values beyond a range are clipped.
 
     Parameters
     ----------
     design : SensorDesign, optional
         The sensor on the bench.
     seed : int, optional
-        Of the membrane's pattern and of the checkerboard's poses, as in a simulated session.
+        Seed of the membrane pattern and of the checkerboard poses, as in a simulated session.
 
     Raises
     ------
     InputError
-        If the design does not hold together.
+        If the design is not consistent.
     """
 
     def __init__(self, design: SensorDesign | None = None, *, seed: int = 0) -> None:
@@ -138,27 +139,27 @@ class Bench:
 
     @property
     def scene(self) -> Scene:
-        """What is laid on the sensor."""
+        """The scene on the sensor."""
         with self._lock:
             return self._scene
 
     @property
     def seen(self) -> Scene:
-        """What the camera sees: a membrane that was left on hides what should be below it."""
+        """The scene that the camera sees: a mounted membrane hides what is behind it."""
         with self._lock:
             hidden = self._scene.item == "mirror" and "membrane_on" in self._conditions.faults
             return Scene() if hidden else self._scene
 
     @property
     def conditions(self) -> Conditions:
-        """How the picture is taken."""
+        """Camera settings and faults."""
         with self._lock:
             return self._conditions
 
     @property
     def poses(self) -> tuple[BoardPose, ...]:
-        """The scripted poses of the hand-held checkerboard, those of a simulated session."""
-        from gelpolight_core.simulation.session import checkerboard_poses  # heavy
+        """The scripted poses of the hand-held checkerboard, as in a simulated session."""
+        from gelpolight_core.simulation.session import checkerboard_poses  # slow to import
 
         with self._lock:
             if self._poses is None:
@@ -166,12 +167,12 @@ class Bench:
             return self._poses
 
     def watch(self, watcher: Callable[[], None]) -> Callable[[], None]:
-        """Have `watcher` called after each change, by the thread that made it.
+        """Call `watcher` after each change, in the thread that made it.
 
         Returns
         -------
         callable
-            Ends the watch.
+            Removes the watcher.
         """
         with self._lock:
             self._watchers.append(watcher)
@@ -183,17 +184,17 @@ class Bench:
         return forget
 
     def lay(self, item: str) -> Scene:
-        """Lay something on the sensor, at the place and in the size it first has."""
+        """Put an object on the sensor, at its default position and size."""
         if item not in ITEMS:
             raise ValueError(f"the bench has no {item!r}")
-        return self._set_scene(lambda _: Scene(item, **_FIRST_PLACES.get(item, {})))
+        return self._set_scene(lambda _: Scene(item, **_FIRST_POSITIONS.get(item, {})))
 
     def arrange(self, **values: float) -> Scene:
-        """Change fields of the scene other than `item`; return what it is now."""
+        """Change fields of the scene other than `item`; return the new scene."""
         return self._set_scene(lambda scene: replace(scene, **_finite(values)))
 
     def adjust(self, **values: float) -> Conditions:
-        """Change exposure_ms, gain_db, rate_hz or noise; return what the conditions are now."""
+        """Change exposure_ms, gain_db, rate_hz or noise; return the new conditions."""
         within = {
             key: min(max(value, CONDITION_RANGES[key][0]), CONDITION_RANGES[key][1])
             for key, value in _finite(values).items()
@@ -205,7 +206,7 @@ class Bench:
         return conditions
 
     def switch(self, fault: str, on: bool) -> None:
-        """Make something go wrong, or right again."""
+        """Switch a fault on or off."""
         if fault not in FAULTS:
             raise ValueError(f"the bench has no fault {fault!r}")
         with self._lock:
@@ -214,12 +215,12 @@ class Bench:
         self._tell()
 
     def steps(self, stage: str) -> int:
-        """Return how many pictures a stage of a simulated session has."""
+        """Return the number of images of a stage of a simulated session."""
         counts = {"balls": len(self.design.balls), "presses": len(self.design.presses)}
         return len(self.poses) if stage == "checkerboard" else counts.get(stage, 1)
 
     def show(self, stage: str, number: int = 0) -> Scene:
-        """Arrange what picture `number` of a stage of a simulated session shows."""
+        """Arrange the scene of image `number` of a stage of a simulated session."""
         if stage not in STAGES or not 0 <= number < self.steps(stage):
             raise ValueError(f"a session has no {stage!r} number {number}")
         if stage == "balls":
@@ -232,44 +233,44 @@ class Bench:
             )
         else:
             name = STAGES[stage]
-            scene = Scene(name, number, **_FIRST_PLACES.get(name, {}))
+            scene = Scene(name, number, **_FIRST_POSITIONS.get(name, {}))
         return self._set_scene(lambda _: scene)
 
     def drag_to(self, u: float, v: float) -> Scene:
-        """Bring the middle of what lies there under a point of the picture (pixels)."""
-        place = self.place_mm(u, v)
-        return self.scene if place is None else self.arrange(x_mm=place[0], y_mm=place[1])
+        """Move the centre of the object to a point of the image (pixels)."""
+        position = self.position_mm(u, v)
+        return self.scene if position is None else self.arrange(x_mm=position[0], y_mm=position[1])
 
-    def place_mm(self, u: float, v: float) -> tuple[float, float] | None:
-        """Return the place (x, y) of a scene whose middle is under a point of the picture.
+    def position_mm(self, u: float, v: float) -> tuple[float, float] | None:
+        """Return the position (x, y) at which a scene's centre is seen at a point of the image.
 
-        None where nothing can be moved there.
+        None if nothing can be moved there.
         """
         scene = self.scene
         camera, layers = self.design.camera, self.design.layers
-        place = np.array(float(u)), np.array(float(v))
+        pixel = np.array(float(u)), np.array(float(v))
         if scene.item == "checkerboard":
             centre = self.poses[scene.pose].centre_mm
-            there = pixel_directions(camera, *place) * centre[2] - centre
+            there = pixel_directions(camera, *pixel) * centre[2] - centre
             return float(there[0]), float(there[1])
         if scene.item in FLAT:
             return None
-        ray = trace_points(camera, layers, *place)
+        ray = trace_points(camera, layers, *pixel)
         x, y = float(ray.x_mm), float(ray.y_mm)
         return (x, y) if math.isfinite(x) and math.isfinite(y) else None
 
     def depth_range_mm(self, scene: Scene) -> tuple[float, float]:
-        """Return how deep the object of a scene can go: a ball no deeper than its middle."""
+        """Return the largest depth of the object of a scene: for a ball its radius."""
         deepest = min(_DEEPEST_MM, 0.25 * self.design.layers.elastomer_thickness_mm)
         return 0.0, min(deepest, 0.5 * scene.size_mm) if scene.item == "ball" else deepest
 
     def size_range_mm(self) -> tuple[float, float]:
-        """Return how small and large an object can be."""
+        """Return the range of sizes of an object."""
         diameter = self.design.membrane.working_diameter_mm
         return min(0.5, 0.1 * diameter), min(_LARGEST_MM, 0.5 * diameter)
 
     def reach_mm(self, scene: Scene) -> float:
-        """Return how far from the middle the object of a scene can be moved."""
+        """Return how far from the centre the object of a scene can be moved."""
         if scene.item == "checkerboard":
             return _BOARD_REACH_MM
         return 0.5 * self.design.membrane.working_diameter_mm

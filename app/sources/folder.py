@@ -1,4 +1,4 @@
-"""A folder of pictures as a source: replays what was captured."""
+"""A folder of images as a source: replays captured images."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import numpy as np
 
 from app.sources.source import Frame, Rgb, Setting, SourceLost
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.session import SUFFIXES, read_picture
+from gelpolight_core.session.images import SUFFIXES, read_picture
 from gelpolight_core.translation import tr
 
-# Decoding takes longer than a frame at 30 Hz; what fits in here is decoded once.
+# Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
 _KEPT_BYTES = 256 * 2**20
 
 
 class FolderSource:
-    """PNG and TIFF pictures of a folder, in the order of their names.
+    """PNG and TIFF images of a folder, in the order of their names.
 
     Parameters
     ----------
     folder : Path
-        Where they are.
+        Folder with the images.
     loop : bool, optional
-        Whether to begin again after the last one; otherwise the source is lost then.
+        Whether to restart after the last image; otherwise the source ends there.
     rate_hz : float, optional
-        Pictures per second.
+        Images per second.
     """
 
     kind = "folder"
@@ -44,7 +44,7 @@ class FolderSource:
         self._number, self._due_s = 0, math.nan
 
     def open(self) -> None:
-        """List the pictures and read the first one, whose size all must have."""
+        """List the images and read the first one; all must have its size."""
         if self._files:
             return
         self._closed.clear()
@@ -53,18 +53,20 @@ class FolderSource:
         files = tuple(sorted(path for path in found if path.suffix.lower() in SUFFIXES))
         if not files:
             raise InputError(
-                tr("there are no PNG or TIFF pictures"),
+                tr("there are no PNG or TIFF images"),
                 where=str(self.folder),
-                advice=tr("Choose a folder that holds pictures"),
+                advice=tr("Choose a folder that contains images"),
             )
         self.size = read_picture(files[0]).size
         self._files = files
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the next picture; None if its time has not come."""
+        """Wait for the next image; None if it is not due yet."""
         if not self._files:
             raise SourceLost(
-                tr("it is closed"), where=str(self.folder), advice=tr("Open the folder again")
+                tr("the folder is closed"),
+                where=str(self.folder),
+                advice=tr("Open the folder again"),
             )
         now = time.monotonic()
         due_s = now if math.isnan(self._due_s) else self._due_s
@@ -74,19 +76,19 @@ class FolderSource:
             return None
         if self._number >= len(self._files) and not self._loop:
             raise SourceLost(
-                tr("the last picture was shown"),
+                tr("the last image was shown"),
                 where=str(self.folder),
-                advice=tr("Open the folder again to begin anew"),
+                advice=tr("Open the folder again to restart"),
             )
         rgb = self._picture(self._number % len(self._files))
-        # A folder waits for its reader: nothing is ever lost.
+        # A folder waits for its reader, so no frame is ever lost.
         now = time.monotonic()
         self._due_s = max(due_s + 1.0 / self._rate_hz, now)
         self._number += 1
         return Frame(rgb, self._number - 1, now)
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return the one setting, the rate."""
+        """Return the only setting, the rate."""
         return (Setting("rate_hz", tr("Frame rate"), "Hz", 0.5, 60.0, 0.5, self._rate_hz),)
 
     def set(self, key: str, value: float) -> float:
@@ -94,7 +96,7 @@ class FolderSource:
         (rate,) = self.settings()
         if key != rate.key:
             raise InputError(
-                tr("it has no setting {key}").format(key=key),
+                tr("a folder has no setting {key}").format(key=key),
                 where=self.name,
                 advice=tr("Use {key}").format(key=rate.key),
             )
@@ -102,7 +104,7 @@ class FolderSource:
         return self._rate_hz
 
     def close(self) -> None:
-        """Forget the pictures."""
+        """Discard the images."""
         self._closed.set()
         self._files = ()
         self._kept.clear()
@@ -113,11 +115,11 @@ class FolderSource:
         picture = read_picture(self._files[index])
         if picture.size != self.size:
             raise InputError(
-                tr("the picture is {a} pixels and the first one of the folder {b}").format(
+                tr("the image has {a} pixels, but the first image of the folder has {b}").format(
                     a="x".join(map(str, picture.size)), b="x".join(map(str, self.size))
                 ),
                 where=str(self._files[index]),
-                advice=tr("Keep pictures of one size in a folder"),
+                advice=tr("Use a folder with images of one size"),
             )
         full = 2**picture.bit_depth - 1
         kind = np.uint8 if picture.bit_depth == 8 else np.uint16

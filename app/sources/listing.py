@@ -1,4 +1,4 @@
-"""Which sources can be chosen."""
+"""Lists the sources that can be selected."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from app.sources.source import Source, SourceInfo
 from gelpolight_core.translation import tr
 
 Finder = Callable[[], Iterable[SourceInfo]]
-"""Looks for sources of one kind, such as the cameras that are plugged in now."""
+"""Finds sources of one kind, such as the connected cameras."""
 
 
 def list_sources(finders: Sequence[Finder]) -> tuple[SourceInfo, ...]:
-    """Return what the finders find now, in their order."""
+    """Return the sources that all finders find now, in order."""
     return tuple(info for find in finders for info in find())
 
 
@@ -25,7 +25,7 @@ def virtual_sensor(bench: Bench) -> Finder:
     camera = bench.design.camera
 
     def make() -> Source:
-        from app.sources.virtual import VirtualSource  # heavy
+        from app.sources.virtual import VirtualSource  # slow to import
 
         return VirtualSource(bench)
 
@@ -38,8 +38,8 @@ def virtual_sensor(bench: Bench) -> Finder:
     return lambda: (info,)
 
 
-def picture_folders(folders: Sequence[Path]) -> Finder:
-    """Return the finder of folders of pictures; a folder that is gone is left out."""
+def image_folders(folders: Sequence[Path]) -> Finder:
+    """Return the finder of image folders; deleted folders are skipped."""
 
     def find() -> Iterable[SourceInfo]:
         for folder in folders:
@@ -52,7 +52,7 @@ def picture_folders(folders: Sequence[Path]) -> Finder:
 
 
 def recordings(files: Sequence[Path]) -> Finder:
-    """Return the finder of recordings; a file that is gone is left out."""
+    """Return the finder of recordings; deleted files are skipped."""
 
     def find() -> Iterable[SourceInfo]:
         for file in files:
@@ -64,6 +64,6 @@ def recordings(files: Sequence[Path]) -> Finder:
 
 
 def _play(file: Path) -> Source:
-    from app.sources.recording import RecordingSource  # heavy
+    from app.sources.recording import RecordingSource  # slow to import
 
     return RecordingSource(file)

@@ -1,4 +1,4 @@
-"""A place for one item between two threads: the newest wins."""
+"""A slot for one item between two threads: a newer item replaces an older one."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ T = TypeVar("T")
 
 
 class Mailbox(Generic[T]):
-    """Holds the newest item until it is taken; never a queue, so it cannot run full."""
+    """Holds the newest item until it is taken; it is not a queue and cannot overflow."""
 
     def __init__(self) -> None:
         self._filled = threading.Condition()
         self._item: T | None = None
 
     def put(self, item: T) -> bool:
-        """Leave an item in the place of an older one; return whether one was lost."""
+        """Store an item in place of an older one; return whether an older one was lost."""
         with self._filled:
             lost = self._item is not None
             self._item = item
@@ -24,7 +24,7 @@ class Mailbox(Generic[T]):
         return lost
 
     def take(self, timeout_s: float = 0.0) -> T | None:
-        """Take the item, waiting for it if need be; None if there is none in time."""
+        """Return and remove the item, waiting for it if necessary; None if none arrives in time."""
         with self._filled:
             if self._item is None and timeout_s > 0.0:
                 self._filled.wait_for(lambda: self._item is not None, timeout_s)

@@ -1,4 +1,4 @@
-"""Fresh camera noise for thirty pictures a second."""
+"""New camera noise for thirty images per second."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from gelpolight_core.simulation.compiled import compiled
 
 Floats = NDArray[np.float32]
 
-# Twelve random bits choose among the middles of 4096 equally likely slices of the normal
-# distribution, so that one 64-bit number serves five values.
+# Twelve random bits choose one of the midpoints of 4096 equally probable slices of the normal
+# distribution, so that one 64-bit number gives five values.
 _BITS = 12
 
 
@@ -31,7 +31,7 @@ _SLICES = _normal_slices()
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevel:
-    """Variance of a camera's numbers: ``shot * level + read``, all in the camera's own counts."""
+    """Variance of a camera's counts: ``shot * level + read``, all in the camera's own counts."""
 
     shot: float
     read: float
@@ -40,9 +40,9 @@ class NoiseLevel:
     def of_camera(
         cls, camera: CameraDesign, *, gain: float = 1.0, scale: float = 1.0
     ) -> NoiseLevel:
-        """Return the noise behind an amplifier.
+        """Return the noise after an amplifier.
 
-        Light and read noise are amplified alike: of a signal s behind the gain g the variance is
+        Light and read noise are amplified alike: with gain g, a signal s has the variance
         ``g shot_variance s + (g read_sd)^2``.
 
         Parameters
@@ -50,9 +50,9 @@ class NoiseLevel:
         camera : CameraDesign
             Noise and bit depth.
         gain : float, optional
-            Of the amplifier.
+            Gain of the amplifier.
         scale : float, optional
-            Times this standard deviation; 0 is no noise.
+            Factor on the standard deviation; 0 is no noise.
         """
         full = 2.0**camera.bit_depth - 1.0
         shot = full * gain * scale**2 * camera.shot_variance
@@ -89,17 +89,17 @@ def _noisy(
 
 
 def noisy(level: Floats, noise: NoiseLevel, *, seed: int, bit_depth: int) -> Rgb:
-    """Return the camera's numbers for a level without noise.
+    """Return the camera's counts for a noise-free level.
 
     Parameters
     ----------
     level : (rows, columns[, 3]) float32
-        In counts, never negative; what exceeds full scale saturates. A grey level gives three
+        In counts, not negative; values above full scale saturate. A grey level gives three
         channels with the same noise.
     noise : NoiseLevel
-        How strong.
+        Strength of the noise.
     seed : int
-        One seed gives one noise.
+        The same seed gives the same noise.
     bit_depth : int
         8 or 16.
     """
@@ -113,6 +113,6 @@ def noisy(level: Floats, noise: NoiseLevel, *, seed: int, bit_depth: int) -> Rgb
 
 
 def rgb_of(numbers: NDArray[Any]) -> Rgb:
-    """Return three channels, like ones where the numbers (rows, columns) are grey."""
+    """Return three channels; they are equal if the counts (rows, columns) are grey."""
     rgb = np.repeat(numbers[..., None], 3, axis=2) if numbers.ndim == 2 else numbers
     return cast(Rgb, rgb)

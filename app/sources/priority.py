@@ -1,4 +1,4 @@
-"""Who goes first where the processor is short: the window, then capture, then what is computed."""
+"""Thread priorities for a busy processor: first the window, then capture, then computation."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import sys
 import threading
 
 PROCESSING = 5
-"""Of threads that make what is shown; the window and capture give way to nothing."""
+"""For threads that compute what is shown; the window and capture keep their priority."""
 RENDERING = 10
-"""Of the virtual sensor's pictures, which no camera would have to compute."""
+"""For the images of the virtual sensor, which a real camera would not have to compute."""
 
 
-def give_way(steps: int) -> None:
-    """Lower the priority of the calling thread, and of those that it starts from now on.
+def lower_priority(steps: int) -> None:
+    """Lower the priority of the calling thread, and of threads that it starts from now on.
 
     Parameters
     ----------
     steps : int
-        Of POSIX niceness; elsewhere than on Linux a thread has none of its own, and nothing is
-        changed.
+        Steps of POSIX niceness; only Linux has it for single threads, other systems change
+        nothing.
     """
     if sys.platform == "linux":
         thread = threading.get_native_id()

@@ -1,4 +1,4 @@
-"""The processing thread: a function over the newest frame, again and again."""
+"""The processing thread: runs a function on the newest frame, again and again."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from app.sources.mailbox import Mailbox
-from app.sources.priority import PROCESSING, give_way
+from app.sources.priority import PROCESSING, lower_priority
 from app.sources.source import Frame
 from app.sources.stopping import join
 from gelpolight_core.errors import InputError
@@ -28,16 +28,16 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Outcome(Generic[T]):
-    """What the function made of a frame.
+    """The result of the function for a frame.
 
     Attributes
     ----------
     generation : int
-        Of the function that made it.
+        Generation of the function that made it.
     frame : Frame
-        What it was made of.
+        The frame that it belongs to.
     value : object
-        What the function returned.
+        Return value of the function.
     """
 
     generation: int
@@ -47,16 +47,16 @@ class Outcome(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A frame of which the function made nothing.
+    """A frame for which the function failed.
 
     Attributes
     ----------
     generation : int
-        Of the function that failed.
+        Generation of the function that failed.
     frame : Frame
-        What it failed on.
+        The frame on which it failed.
     sentence : str
-        What people read.
+        Error message for the user.
     """
 
     generation: int
@@ -66,7 +66,7 @@ class Failure:
 
 @dataclass(frozen=True, slots=True)
 class ProcessorFigures:
-    """How a processor fares; times in ms are those of the function alone, last 60 frames."""
+    """Statistics of the function in use, over its last 60 frames; times in ms."""
 
     rate_hz: float = 0.0
     last_ms: float = 0.0
@@ -74,18 +74,18 @@ class ProcessorFigures:
 
 
 class Processor(Generic[T]):
-    """Runs a function over the newest frame in one thread; failures are items, not ends.
+    """Runs a function on the newest frame in one thread; a failure is a result, not an end.
 
     Parameters
     ----------
     inbox : Mailbox of Frame
-        Where frames come from; no other reader takes from it.
+        Source of frames; it must have no other reader.
     function : callable
         Frame -> value.
     outbox : Mailbox of Outcome or Failure
-        Where results go; a result of a function that was replaced meanwhile is dropped.
+        Receives the results; a result of a function that was replaced meanwhile is dropped.
     name : str, optional
-        Of the thread.
+        Name of the thread.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class Processor(Generic[T]):
 
     @property
     def generation(self) -> int:
-        """Number of the function in use, from 0."""
+        """Generation number of the function in use, from 0."""
         with self._lock:
             return self._generation
 
@@ -115,12 +115,13 @@ class Processor(Generic[T]):
         with self._lock:
             self._function = function
             self._generation += 1
+            self._done.clear()
             return self._generation
 
     def start(self) -> None:
-        """Begin to process."""
+        """Start processing."""
         if self._thread is not None and self._thread.is_alive():
-            raise RuntimeError("the processor runs already")
+            raise RuntimeError("the processor is already running")
         self._end = threading.Event()
         self._thread = threading.Thread(
             target=self._run, args=(self._end,), name=self._name, daemon=True
@@ -128,14 +129,14 @@ class Processor(Generic[T]):
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the frame that is being processed; harmless when it is stopped."""
+        """Stop after the present frame; may be called twice."""
         self._end.set()
         if self._thread is not None:
             join(self._thread)
             self._thread = None
 
     def figures(self) -> ProcessorFigures:
-        """Return how it fares."""
+        """Return the statistics."""
         with self._lock:
             done = tuple(self._done)
         if not done:
@@ -146,7 +147,7 @@ class Processor(Generic[T]):
         return ProcessorFigures(rate, spent[-1], statistics.median(spent))
 
     def _run(self, end: threading.Event) -> None:
-        give_way(PROCESSING)
+        lower_priority(PROCESSING)
         while not end.is_set():
             frame = self._inbox.take(_POLL_S)
             if frame is not None:
@@ -159,8 +160,9 @@ class Processor(Generic[T]):
         item = self._apply(function, generation, frame)
         now = time.perf_counter()
         with self._lock:
-            self._done.append((now, 1e3 * (now - began)))
             stale = generation != self._generation
+            if not stale:
+                self._done.append((now, 1e3 * (now - began)))
         if not stale and not end.is_set():
             self._outbox.put(item)
 
@@ -172,14 +174,12 @@ class Processor(Generic[T]):
         except InputError as error:
             return Failure(generation, frame, str(error))
         except Exception as error:
-            # Once per function: thirty tracebacks a second would bury the log.
+            # Once per function: thirty tracebacks per second would flood the log.
             if generation != self._reported:
                 self._reported = generation
                 _LOG.exception("Processing a frame failed")
             return Failure(
                 generation,
                 frame,
-                tr("A fault of this program: {kind}; the log has it.").format(
-                    kind=type(error).__name__
-                ),
+                tr("Internal error: {kind}; see the log.").format(kind=type(error).__name__),
             )

@@ -1,4 +1,4 @@
-"""Recording what a stream delivers, in a thread of its own, without a frame lost in silence."""
+"""Records the frames of a stream in a separate thread; every lost frame is counted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
 
-# Two seconds of a fast camera: a disk that pauses for longer cannot keep up at all.
+# Two seconds of a fast camera: a disk that is slower than this can never keep up.
 QUEUE_BYTES = 256 * 2**20
 LEAST_QUEUE = 4
 FINISH_S = 20.0
@@ -26,24 +26,24 @@ FINISH_S = 20.0
 
 @dataclass(frozen=True, slots=True)
 class RecorderFigures:
-    """How a recording fares.
+    """Statistics of a recording.
 
     Attributes
     ----------
     frames : int
         Frames in the file.
     waiting : int
-        Frames that are still to be written.
+        Frames that wait to be written.
     missed : int
-        Frames that the source made and that never arrived here.
+        Frames that the source made but that did not arrive.
     overrun : int
-        Frames that arrived while the queue was full, as the disk or the processor was too slow.
+        Frames that arrived while the queue was full, because the disk or processor was too slow.
     size_bytes : int
-        What the file takes.
+        Size of the file.
     seconds : float
         Time from the first frame to the last one that arrived.
     failure : str or None
-        Why it ended by itself, as a sentence; None while all is well.
+        Why the recording stopped by itself, as a sentence; None if there is no error.
     finished : bool
         Whether the file is closed.
     """
@@ -59,23 +59,23 @@ class RecorderFigures:
 
     @property
     def lost(self) -> int:
-        """Frames that are not in the recording, for either reason."""
+        """Frames missing in the recording, for either reason."""
         return self.missed + self.overrun
 
 
 def header_for(
     source: Source, *, serial: str = "", calibration_id: str = "", note: str = ""
 ) -> RecordingHeader:
-    """Return what a recording of a source says of itself.
+    """Return the header for a recording of a source.
 
     Parameters
     ----------
     source : Source
-        Open, so that its settings are those of now.
+        Must be open, so that its present settings can be read.
     serial, calibration_id : str, optional
         Sensor and calibration in use.
     note : str, optional
-        What the person wrote.
+        Note entered by the user.
     """
     return RecordingHeader(
         serial=serial,
@@ -93,13 +93,13 @@ class Recorder:
     Parameters
     ----------
     stream : Stream
-        Where the frames come from; it runs, or is started later.
+        Source of the frames; running, or started later.
     path : Path
-        A new file.
+        Path of the new file.
     header : RecordingHeader
-        What the recording says of itself.
+        Description of the recording.
     queue_bytes : int, optional
-        How much may wait for the disk.
+        Largest amount of data that may wait for the disk.
     """
 
     def __init__(
@@ -123,30 +123,30 @@ class Recorder:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Begin to record; returns at once. What goes wrong is said by :meth:`figures`."""
+        """Start to record; returns at once. Errors are reported by :meth:`figures`."""
         if self._thread is not None:
-            raise RuntimeError("a recorder makes one recording")
+            raise RuntimeError("a recorder makes only one recording")
         self._thread = threading.Thread(target=self._run, name=f"recording {self.path.name}")
         self._thread.daemon = True
         self._thread.start()
         self.stream.add_tap(self._take)
 
     def finish(self) -> None:
-        """Take no more frames; those that wait are still written, while the caller goes on."""
+        """Accept no more frames; waiting frames are still written in the background."""
         self.stream.remove_tap(self._take)
         with self._changed:
             self._ending = True
             self._changed.notify_all()
 
     def stop(self) -> RecorderFigures:
-        """Take no more frames, wait until all are written and the file is closed."""
+        """Accept no more frames; wait until all are written and the file is closed."""
         self.finish()
         if self._thread is not None:
             join(self._thread, FINISH_S)
         return self.figures()
 
     def figures(self) -> RecorderFigures:
-        """Return how the recording fares."""
+        """Return the statistics of the recording."""
         with self._changed:
             return RecorderFigures(
                 frames=self._frames,
@@ -160,7 +160,7 @@ class Recorder:
             )
 
     def _take(self, frame: Frame) -> None:
-        """Put a frame into the queue, in the capture thread."""
+        """Put a frame into the queue; called in the capture thread."""
         with self._changed:
             if self._ending:
                 return
@@ -168,8 +168,8 @@ class Recorder:
                 step, self._first_s = 1, frame.time_s
                 self._number = frame.number - 1
             else:
-                # A source that was opened anew counts from 0 again: what it made meanwhile, if
-                # anything, is not known.
+                # A reopened source counts from 0 again; how many frames it made meanwhile is not
+                # known.
                 step = max(frame.number - self._raw_number, 1)
             self._missed += step - 1
             self._number += step
@@ -197,14 +197,12 @@ class Recorder:
             _LOG.error("Recording ended: %s", error)
         except Exception as error:
             _LOG.exception("Recording %s failed", self.path)
-            failure = tr("A fault of this program: {kind}; the log has it.").format(
-                kind=type(error).__name__
-            )
+            failure = tr("Internal error: {kind}; see the log.").format(kind=type(error).__name__)
         self.stream.remove_tap(self._take)
         with self._changed:
             self._ending = self._finished = True
             self._failure = failure
-            self._overrun += len(self._queue)  # what waits now is never written
+            self._overrun += len(self._queue)  # frames that wait now are never written
             self._queue.clear()
 
     def _write_all(self, writer: RecordingWriter) -> None:
@@ -218,9 +216,9 @@ class Recorder:
             shape = shape or (frame.rgb.shape, frame.rgb.dtype)
             if (frame.rgb.shape, frame.rgb.dtype) != shape:
                 raise InputError(
-                    tr("the size or the depth of the pictures has changed"),
+                    tr("the size or bit depth of the images has changed"),
                     where=str(self.path),
-                    advice=tr("What came before is kept; begin a new recording"),
+                    advice=tr("The earlier images are kept; start a new recording"),
                 )
             writer.append(frame.rgb, number, frame.time_s)
             with self._changed:

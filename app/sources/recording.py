@@ -1,4 +1,4 @@
-"""A recording as a source: plays what was recorded, in its own time or as the person likes."""
+"""A recording as a source: plays it at its own speed or under the user's control."""
 
 from __future__ import annotations
 
@@ -19,39 +19,39 @@ from gelpolight_core.translation import tr
 _LOG = logging.getLogger(__name__)
 
 SLOWEST, FASTEST = 0.1, 4.0
-# A picture that stands still is shown again so often: captures of it do not wait for ever, and
-# nobody takes the source for lost.
+# A paused image is sent this often, so that captures do not wait forever and the source does not
+# count as lost.
 REPEAT_S = 0.2
 LONE_FRAME_S = 0.1
 SHORTEST_S = 1e-3
-# So much of being late is made up for; more shifts what follows.
+# Delays up to this limit are caught up; longer ones shift the following frames.
 CATCH_UP_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Playback:
-    """Where a player is.
+    """The state of a player.
 
     Attributes
     ----------
     position : int
-        Index of the frame that is shown.
+        Index of the shown frame.
     count : int
-        Frames of the recording; 0 while it is closed.
+        Number of frames in the recording; 0 while it is closed.
     time_s, duration_s : float
-        From the first frame.
+        Time from the first frame.
     number : int
-        The frame's number as recorded.
+        Frame number from the source that was recorded.
     playing, loop : bool
-        Whether it plays now, and whether it begins again at the end.
+        Whether it is playing, and whether it restarts at the end.
     speed : float
-        1 is the recording's own time.
+        1 is the original speed.
     damaged : int
-        Frames met so far that cannot be read, and are passed over.
+        Unreadable frames skipped so far.
     lost : int
-        Frames that the source made while it was recorded, and that are not in the recording.
+        Frames of the source that are missing in the recording.
     truncated : bool
-        Whether the recording was cut short or is damaged.
+        Whether the recording is incomplete or damaged.
     """
 
     position: int = 0
@@ -68,21 +68,21 @@ class Playback:
 
 
 class RecordingSource:
-    """The frames of a recording.
+    """Plays the frames of a recording.
 
-    Every frame is delivered, late if need be; only faster than in its own time are frames passed
-    over, and counted as dropped. While the picture stands, the same frame comes again and again.
+    Every frame is delivered, late if necessary; frames are skipped, and counted as dropped, only
+    above the original speed. While paused, the same frame is sent repeatedly.
 
     Parameters
     ----------
     path : Path
-        The recording.
+        Path of the recording.
     loop : bool, optional
-        Whether to begin again after the last frame; otherwise it stops there.
+        Whether to restart after the last frame; otherwise it pauses there.
     speed : float, optional
-        0.1 to 4; 1 is the recording's own time.
+        0.1 to 4; 1 is the original speed.
     playing : bool, optional
-        Whether to play at once.
+        Whether to start playing at once.
     """
 
     kind = "recording"
@@ -105,12 +105,12 @@ class RecordingSource:
 
     @property
     def header(self) -> RecordingHeader | None:
-        """What the recording says of itself; None while it is closed."""
+        """Header of the recording; None while it is closed."""
         with self._changed:
             return None if self._recording is None else self._recording.header
 
     def open(self) -> None:
-        """Open the file and go to its beginning."""
+        """Open the file and go to its start."""
         with self._changed:
             if self._recording is not None:
                 return
@@ -118,22 +118,22 @@ class RecordingSource:
             if not len(recording):
                 recording.close()
                 raise InputError(
-                    tr("the recording holds no frames"),
+                    tr("the recording contains no frames"),
                     where=str(self.path),
-                    advice=tr("Choose another one"),
+                    advice=tr("Choose another recording"),
                 )
             self._recording, self.size = recording, recording.size
             self._pending, self._number, self._shown = 0, -1, None
             self._damaged.clear()
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the next frame; None if its time has not come."""
+        """Wait for the next frame; None if it is not due yet."""
         end_s = time.monotonic() + timeout_s
         with self._changed:
             while True:
                 if self._recording is None:
                     raise SourceLost(
-                        tr("it is closed"),
+                        tr("the recording is closed"),
                         where=str(self.path),
                         advice=tr("Open the recording again"),
                     )
@@ -142,16 +142,16 @@ class RecordingSource:
                 if due_s <= now_s:
                     self._number += 1 if index is None else self._move_to(index, due_s, now_s)
                     self._delivered_s = now_s
-                    recording, index, number = self._recording, self._position, self._number
+                    recording, at, number = self._recording, self._position, self._number
                     break
                 if now_s >= end_s:
                     return None
                 self._changed.wait(min(due_s, end_s) - now_s)
-        rgb = self._read(recording, index)
-        return None if rgb is None else Frame(rgb, number, time.monotonic())
+        rgb = self._read(recording, at)
+        return None if rgb is None else Frame(rgb, number, time.monotonic(), index=at)
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return the one setting, the speed."""
+        """Return the only setting, the speed."""
         return (Setting("speed", tr("Speed"), "x", SLOWEST, FASTEST, 0.1, self._speed),)
 
     def set(self, key: str, value: float) -> float:
@@ -159,7 +159,7 @@ class RecordingSource:
         (speed,) = self.settings()
         if key != speed.key:
             raise InputError(
-                tr("it has no setting {key}").format(key=key),
+                tr("a recording has no setting {key}").format(key=key),
                 where=self.name,
                 advice=tr("Use {key}").format(key=speed.key),
             )
@@ -169,7 +169,7 @@ class RecordingSource:
         return self._speed
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         with self._changed:
             recording, self._recording = self._recording, None
             self._shown = None
@@ -178,7 +178,7 @@ class RecordingSource:
             recording.close()
 
     def playback(self) -> Playback:
-        """Return where the player is; any thread may ask."""
+        """Return the state of the player; may be called by any thread."""
         with self._changed:
             recording = self._recording
             if recording is None:
@@ -199,7 +199,7 @@ class RecordingSource:
             )
 
     def play(self) -> None:
-        """Go on; from the beginning where the end was reached."""
+        """Continue to play; from the start if the end was reached."""
         with self._changed:
             if not self._playing and self._following() is None:
                 self._pending = 0
@@ -207,20 +207,20 @@ class RecordingSource:
             self._changed.notify_all()
 
     def pause(self) -> None:
-        """Stand still on the frame that is shown."""
+        """Pause at the shown frame."""
         with self._changed:
             self._playing = False
             self._changed.notify_all()
 
     def seek(self, index: int) -> None:
-        """Show a frame, the nearest one where there is none of this index; then go on as before."""
+        """Go to a frame, or the nearest one if the index does not exist; keep playing or paused."""
         with self._changed:
             if self._recording is not None:
                 self._pending = min(max(index, 0), len(self._recording) - 1)
                 self._changed.notify_all()
 
     def step(self, count: int = 1) -> None:
-        """Stand still, so many frames on (or back)."""
+        """Pause, and move forward by so many frames (back if negative)."""
         with self._changed:
             self._playing = False
             self._direction = 1 if count > 0 else -1
@@ -228,20 +228,20 @@ class RecordingSource:
         self.seek(at + count)
 
     def set_loop(self, loop: bool) -> None:
-        """Choose whether to begin again after the last frame."""
+        """Set whether to restart after the last frame."""
         with self._changed:
             self._loop = loop
             self._changed.notify_all()
 
     def _following(self) -> int | None:
-        """Return the frame after the one that is shown; None at the end."""
+        """Return the frame after the shown one; None at the end."""
         assert self._recording is not None
         if self._position + 1 < len(self._recording):
             return self._position + 1
         return 0 if self._loop else None
 
     def _next(self, now_s: float) -> tuple[int | None, float]:
-        """Return which frame comes next, None for the same again, and when."""
+        """Return when and which frame is due next; None means the same frame again."""
         if self._pending is not None:
             return self._pending, now_s
         again_s = self._delivered_s + REPEAT_S
@@ -253,7 +253,7 @@ class RecordingSource:
         return (following, due_s) if due_s <= again_s else (None, again_s)
 
     def _interval_s(self, index: int) -> float:
-        """Return how long a frame is shown."""
+        """Return how long a frame is shown, in seconds."""
         assert self._recording is not None
         times_s, own_s = self._recording.times_s, LONE_FRAME_S
         if index + 1 < len(times_s):
@@ -263,7 +263,7 @@ class RecordingSource:
         return max(own_s, SHORTEST_S) / self._speed
 
     def _move_to(self, index: int, due_s: float, now_s: float) -> int:
-        """Make a frame the one that is shown, or a later one if hurried; return how many on."""
+        """Show a frame, or a later one when behind schedule; return how many were advanced."""
         self._pending, self._position, counted = None, index, 1
         while self._speed > 1.0:
             following, next_s = self._following(), due_s + self._interval_s(self._position)
@@ -274,7 +274,7 @@ class RecordingSource:
         return counted
 
     def _read(self, recording: Recording, index: int) -> Rgb | None:
-        """Return a frame's picture; None for one that is damaged."""
+        """Return the image of a frame; None if it is damaged."""
         if self._shown is not None and self._shown[0] == index:
             return self._shown[1]
         try:

@@ -1,4 +1,4 @@
-"""The virtual sensor's pictures without noise, made in the background; the newest scene wins."""
+"""Noise-free images of the virtual sensor, rendered in the background; the newest scene wins."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sources.bench import BOARDS, PRESSED, Bench, Scene
-from app.sources.priority import RENDERING, give_way
+from app.sources.priority import RENDERING, lower_priority
 from app.sources.stopping import join
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.simulation.boards import BoardPose, board_on_top
@@ -37,16 +37,16 @@ _DARK = 1e-6  # far below one count of any camera
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rendering:
-    """A picture without noise.
+    """A noise-free image.
 
     Attributes
     ----------
     scene : Scene
-        What it shows.
+        The scene that it shows.
     signal : (rows, columns) or (rows, columns, 3)
         Linear light at the nominal exposure, 1 is full scale; grey for boards.
     exact : bool
-        False for the coarse picture that is shown while the exact one is being made.
+        False for the coarse image that is shown until the exact one is ready.
     """
 
     scene: Scene
@@ -55,16 +55,16 @@ class Rendering:
 
 
 class _Superseded(Exception):
-    """A newer scene is wanted, or none any more."""
+    """A newer scene is requested, or none is needed any more."""
 
 
 class Renderer:
-    """Renders the scenes that it is asked for in a thread of its own.
+    """Renders requested scenes in a separate thread.
 
     Parameters
     ----------
     bench : Bench
-        Its design and its checkerboard's poses.
+        Gives the design and the checkerboard poses.
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -78,16 +78,16 @@ class Renderer:
         self._thread.start()
 
     def request(self, scene: Scene) -> None:
-        """Ask for a scene in the place of all asked for before."""
+        """Request a scene; it replaces all earlier requests."""
         with self._changed:
             if scene != self._wanted:
                 self._wanted = scene
                 self._changed.notify_all()
 
     def newest(self, timeout_s: float) -> Rendering | None:
-        """Return the newest picture, waiting for the first one; None if it is not there in time.
+        """Return the newest image, waiting for the first one; None if there is none in time.
 
-        What went wrong in the thread is raised here.
+        Errors of the thread are raised here.
         """
         with self._changed:
             self._changed.wait_for(
@@ -98,14 +98,14 @@ class Renderer:
             return self._newest
 
     def close(self) -> None:
-        """Stop rendering; harmless when it is stopped."""
+        """Stop rendering; may be called twice."""
         with self._changed:
             self._closing = True
             self._changed.notify_all()
         join(self._thread)
 
     def _run(self) -> None:
-        give_way(RENDERING)
+        lower_priority(RENDERING)
         try:
             makers = _Makers(self._bench)
             done: Scene | None = None
@@ -117,7 +117,7 @@ class Renderer:
                 except _Superseded:
                     continue
                 done = scene
-        except Exception as error:  # raised again in the thread that waits for pictures
+        except Exception as error:  # raised again in the thread that waits for images
             with self._changed:
                 self._failure = error
                 self._changed.notify_all()
@@ -144,7 +144,7 @@ class Renderer:
 
 
 class _Makers:
-    """The virtual sensor in the picture's own size, and in a small one for previews."""
+    """The virtual sensor at full image size, and at a small size for previews."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
@@ -156,20 +156,20 @@ class _Makers:
         self._shape: tuple[Scene, State] | None = None
 
     def get_ready(self, interrupt: Interrupt) -> None:
-        """Make the sensor of the picture's own size, once."""
+        """Create the full-size sensor, once."""
         if self._large is None:
             design, seed = self._bench.design, self._bench.seed
             self._large = VirtualSensor(design, seed, interrupt=interrupt)
 
     def exact(self, scene: Scene, interrupt: Interrupt) -> Rendering:
-        """Return the exact picture."""
+        """Return the exact image."""
         assert self._large is not None
         interrupt()
         state = state_of(self._bench, self._bench.design, scene, interrupt)
         return Rendering(scene, _light(self._large, state, scene, interrupt), True)
 
     def preview(self, scene: Scene, interrupt: Interrupt) -> Rendering | None:
-        """Return a coarse picture, soon; None where the exact one is as soon."""
+        """Return a quick coarse image; None if the exact one is as quick."""
         if self._small_design is None:
             return None
         if self._small is None:
@@ -179,7 +179,7 @@ class _Makers:
         return Rendering(scene, self._full_size(small, scene), False)
 
     def _coarse_state(self, design: SensorDesign, scene: Scene, interrupt: Interrupt) -> State:
-        """Return the state for a preview: while an object is dragged its shape is solved once."""
+        """Return the state for a preview: during a drag, an object's shape is solved only once."""
         if scene.item not in PRESSED:
             return state_of(self._bench, design, scene, interrupt)
         middle = replace(scene, x_mm=0.0, y_mm=0.0)
@@ -196,8 +196,8 @@ class _Makers:
     def _full_size(self, small: Array, scene: Scene) -> Array:
         if scene.item in BOARDS or self._small is None or self._large is None:
             return self._enlarged(small)
-        # What is pressed changes the bare membrane's picture by a smooth factor, beside which the
-        # membrane's own fine pattern stays sharp; so does its rim, where nothing is divided.
+        # A press changes the bare membrane's image by a smooth factor, so that the membrane's fine
+        # pattern stays sharp; the same holds at its rim, where nothing is divided.
         if self._bare is None:
             self._bare = self._large.brightness(BareMembrane())
         bare = self._small.brightness(BareMembrane())
@@ -207,10 +207,10 @@ class _Makers:
         np.divide(small, np.maximum(bare, _DARK), out=factor, where=inside[..., None])
         return self._bare * self._enlarged(factor)
 
-    def _enlarged(self, picture: Array) -> Array:
+    def _enlarged(self, image: Array) -> Array:
         camera = self._bench.design.camera
         return np.asarray(
-            cv2.resize(picture, (camera.width_px, camera.height_px), interpolation=cv2.INTER_LINEAR)
+            cv2.resize(image, (camera.width_px, camera.height_px), interpolation=cv2.INTER_LINEAR)
         )
 
 
@@ -224,18 +224,18 @@ def _light(
 def state_of(
     bench: Bench, design: SensorDesign, scene: Scene, interrupt: Interrupt = never
 ) -> State:
-    """Return what the virtual sensor of a design is to show for a scene of the bench.
+    """Return the sensor state that a design shows for a scene of the bench.
 
     Parameters
     ----------
     bench : Bench
-        Its checkerboard's poses.
+        Gives the checkerboard poses.
     design : SensorDesign
-        The bench's own, or a scaled one.
+        Design of the bench, or a scaled one.
     scene : Scene
-        What lies there.
+        The scene on the sensor.
     interrupt : callable, optional
-        Called now and then; what it raises stops the work.
+        Called repeatedly; raises an exception to stop the work.
     """
     if scene.item == "checkerboard":
         return Checkerboard(_held(bench.poses[scene.pose], scene))
@@ -264,7 +264,7 @@ def state_of(
 
 
 def _held(pose: BoardPose, scene: Scene) -> BoardPose:
-    """Return a scripted pose moved in the camera frame and turned in the board's plane."""
+    """Return a scripted pose, moved in the camera frame and rotated in the board's plane."""
     yaw = math.radians(scene.yaw_deg)
     cos, sin = math.cos(yaw), math.sin(yaw)
     turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""What every source of pictures offers, be it a camera, the virtual sensor or a folder."""
+"""The interface of image sources: cameras, the virtual sensor, folders and recordings."""
 
 from __future__ import annotations
 
@@ -17,49 +17,54 @@ Rgb = NDArray[np.uint8] | NDArray[np.uint16]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One picture of a source. Its memory is never written again.
+    """One image of a source. Its memory is never changed.
 
     Attributes
     ----------
     rgb : (rows, columns, 3) uint8 or uint16
         Red, green, blue; full scale is 255 or 65535. Made read-only.
     number : int
-        From 0; counts every frame that the source made, so that gaps are frames lost.
+        From 0; counts every frame that the source made, so that gaps are lost frames.
     time_s : float
-        When it was made, on the clock of ``time.monotonic``.
+        Capture time, on the clock of ``time.monotonic``.
     settled : bool
-        False while the picture does not yet show what the source was last told (a setting that has
-        not taken effect, a picture that is still being rendered).
+        False while the image does not yet show the last change of the source (a setting that has
+        no effect yet, an image that is still being rendered).
+    index : int or None
+        Index in the recording that is played, which begins again in a loop. None for a live image.
     """
 
     rgb: Rgb
     number: int
     time_s: float
     settled: bool = True
+    index: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no colour picture, and lock its memory."""
+        """Reject arrays that are not colour images, and make the memory read-only."""
         if self.rgb.ndim != 3 or self.rgb.shape[2] != 3:
-            raise ValueError(f"a frame has the shape (rows, columns, 3), not {self.rgb.shape}")
+            raise ValueError(
+                f"a frame must have the shape (rows, columns, 3), not {self.rgb.shape}"
+            )
         if self.rgb.dtype not in (np.uint8, np.uint16):
-            raise ValueError(f"a frame holds uint8 or uint16, not {self.rgb.dtype}")
+            raise ValueError(f"a frame must be uint8 or uint16, not {self.rgb.dtype}")
         self.rgb.flags.writeable = False
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One thing that can be set on a source.
+    """One setting of a source.
 
     Attributes
     ----------
     key : str
         Name in files and calls, such as ``exposure_ms``.
     label, unit : str
-        What people read.
+        Label and unit shown to the user.
     low, high, step : float
-        Range, and the step that the source can make.
+        Range and step size of the source.
     value : float
-        As read back from the source.
+        Value as read back from the source.
     writable : bool
         Whether :meth:`Source.set` may change it now.
     """
@@ -77,20 +82,20 @@ class Setting:
         """Return the nearest value that can be set."""
         steps = round((value - self.low) / self.step) if self.step > 0.0 else 0
         wanted = self.low + steps * self.step if self.step > 0.0 else value
-        # Ten digits hide the binary tail of a step such as 0.1.
+        # Ten digits hide the binary rounding error of a step such as 0.1.
         return round(min(max(wanted, self.low), self.high), 10)
 
 
 class SourceLost(InputError):
-    """A source that gives no more pictures: it stopped, was unplugged, or came to its end."""
+    """The source gives no more images: it stopped, was unplugged, or reached its end."""
 
 
 class SourceAway(Exception):
-    """No pictures for now: the source tries by itself to go on. Its text is a whole sentence."""
+    """No images for now: the source tries to reconnect. Its text is a complete sentence."""
 
 
 class Source(Protocol):
-    """A source of pictures.
+    """An image source.
 
     `open`, `frame` and `close` are called by one thread, that of the stream; `settings` and `set`
     may be called by any thread while the source is open.
@@ -98,7 +103,7 @@ class Source(Protocol):
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """Name shown to the user."""
 
     @property
     def kind(self) -> str:
@@ -109,32 +114,33 @@ class Source(Protocol):
         """(width, height) in pixels; valid once open."""
 
     def open(self) -> None:
-        """Get ready to deliver, from the beginning; harmless when it is open.
+        """Prepare to deliver from the start; no effect if open.
 
         Raises
         ------
         InputError
-            If it cannot be opened.
+            If the source cannot be opened.
         """
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the next frame; None if there is none in time.
+        """Wait for the next frame; None if none arrives in time.
 
         Raises
         ------
         SourceAway
-            If there are none for now; after `timeout_s`, so that it can be asked at once again.
+            If there are none for now; raised after `timeout_s`, so that the caller can retry at
+            once.
         SourceLost
             If there will be no more frames.
         InputError
-            If a picture cannot be used.
+            If an image cannot be used.
         """
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return what can be set, with the values of now."""
+        """Return the settings with their present values."""
 
     def set(self, key: str, value: float) -> float:
-        """Change a setting; return what the source has really set.
+        """Change a setting; return the value that the source really uses.
 
         Raises
         ------
@@ -143,21 +149,21 @@ class Source(Protocol):
         """
 
     def close(self) -> None:
-        """Give everything back, within a second; harmless when it is closed."""
+        """Release all resources within a second; no effect if closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class SourceInfo:
-    """A source that can be chosen.
+    """A source that can be selected.
 
     Attributes
     ----------
     kind, name, detail : str
-        What is shown; `detail` says what tells it from others of its kind.
+        Texts for the list; `detail` distinguishes sources of the same kind.
     open : callable
-        Returns the source, quick and not yet open: the stream's own thread opens it.
+        Creates the source quickly, not yet open: the stream's own thread opens it.
     file : Path or None
-        The folder or recording that plays it; None of what is no file.
+        Its folder or recording; None if it is not a file.
     """
 
     kind: str

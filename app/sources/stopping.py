@@ -1,4 +1,4 @@
-"""Threads that are told to stop: waited for a while, and once more before the program ends."""
+"""Waits for threads that were asked to stop, and again before the program ends."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import time
 _LOG = logging.getLogger(__name__)
 
 STOP_S = 1.0
-"""How long a thread is waited for before it is left behind."""
+"""Time to wait for a thread before it is left behind."""
 
 _left_behind: list[threading.Thread] = []
 
 
 def join(thread: threading.Thread, timeout_s: float = STOP_S) -> bool:
-    """Wait for a thread that was told to stop; return whether it has.
+    """Wait for a thread that was asked to stop; return whether it has stopped.
 
-    One that has not is left behind: it is a daemon, so that a hanging driver cannot keep the
-    program from ending, and ends with the call that it is in.
+    Otherwise it is left behind. It is a daemon thread, so a hanging driver cannot keep the program
+    from ending, and it stops when its present call returns.
     """
     thread.join(timeout_s)
     if not thread.is_alive():
@@ -29,10 +29,10 @@ def join(thread: threading.Thread, timeout_s: float = STOP_S) -> bool:
 
 
 def join_left_behind(timeout_s: float) -> bool:
-    """Wait for all threads that were left behind; return whether they have ended.
+    """Wait for all threads that were left behind; return whether they have stopped.
 
-    Where one has not, the interpreter must not be torn down under it: a library's native thread
-    that comes back to nothing aborts the process.
+    While one is running the interpreter must not shut down: a native library thread that then
+    returns would abort the process.
     """
     end = time.monotonic() + timeout_s
     for thread in _left_behind:

@@ -1,4 +1,4 @@
-"""The capture thread: takes every frame of a source and hands it on."""
+"""The capture thread: reads every frame of a source and passes it on."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Tap = Callable[[Frame], object]
 
 @dataclass(frozen=True, slots=True)
 class StreamFigures:
-    """How a stream fares.
+    """Statistics of a stream.
 
     Attributes
     ----------
@@ -35,12 +35,12 @@ class StreamFigures:
     made : int
         Frames that the source made since it was opened.
     dropped : int
-        Those among them that never arrived.
+        Frames among them that did not arrive.
     unseen : int
-        Those that arrived and were replaced in `Stream.newest` before anybody took them.
+        Frames that arrived but were replaced in `Stream.newest` before they were read.
     lost : str or None
-        Why there are no frames, as a sentence; None while all is well, and again when a source
-        that was away is back.
+        Why there are no frames, as a sentence; None if frames arrive, also after a lost source
+        is back.
     """
 
     rate_hz: float = 0.0
@@ -59,19 +59,19 @@ class _Capture:
 
 
 class Stream:
-    """Frames of a source, taken by a thread of its own, which also opens and closes the source.
+    """Frames of a source, read by a separate thread, which also opens and closes the source.
 
     Parameters
     ----------
     source : Source
-        Need not be open. It belongs to the stream from now on.
+        Need not be open. The stream owns it from now on.
     silence_s : float, optional
-        A source that has delivered and then is silent for so long counts as lost.
+        A source without frames for this long, after it has delivered some, counts as lost.
 
     Attributes
     ----------
     source : Source
-        Where the frames come from; its settings may be used by any thread.
+        The source; any thread may use its settings.
     newest : Mailbox of Frame
         The newest frame, for one reader; further readers add the `put` of their own mailbox as a
         tap.
@@ -86,21 +86,21 @@ class Stream:
         self._captures: list[_Capture] = []
         self._thread: threading.Thread | None = None
         self._end = threading.Event()
-        self._begin_anew()
+        self._restart()
 
     def start(self) -> None:
-        """Begin to capture; returns at once. What goes wrong is said by :meth:`figures`."""
+        """Start to capture; returns at once. Errors are reported by :meth:`figures`."""
         if self._thread is not None and self._thread.is_alive():
-            raise RuntimeError("the stream runs already")
+            raise RuntimeError("the stream is already running")
         self._end = threading.Event()
-        self._begin_anew()
+        self._restart()
         self._thread = threading.Thread(
             target=self._run, args=(self._end,), name=f"capture {self.source.name}", daemon=True
         )
         self._thread.start()
 
     def stop(self) -> None:
-        """End capturing and close the source; harmless when it is stopped."""
+        """Stop capturing and close the source; may be called twice."""
         self._end.set()
         if self._thread is not None:
             join(self._thread)
@@ -112,12 +112,12 @@ class Stream:
         self.start()
 
     def add_tap(self, tap: Tap) -> None:
-        """Have every frame handed to `tap`, in the capture thread; it must return quickly."""
+        """Pass every frame to `tap`, in the capture thread; it must return quickly."""
         with self._lock:
             self._taps.append(tap)
 
     def remove_tap(self, tap: Tap) -> None:
-        """Hand no more frames to `tap`; harmless when it is not there."""
+        """Pass no more frames to `tap`; no effect if it is not connected."""
         with self._lock:
             self._taps = [other for other in self._taps if other != tap]
 
@@ -141,7 +141,7 @@ class Stream:
         return wanted.future
 
     def figures(self) -> StreamFigures:
-        """Return how the stream fares."""
+        """Return the statistics of the stream."""
         now = time.monotonic()
         with self._lock:
             times = [t for t in self._times if now - t < _RATE_WINDOW_S]
@@ -150,7 +150,7 @@ class Stream:
             made = self._last_number + 1
             return StreamFigures(rate, made, made - self._received, self._unseen, lost)
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         with self._lock:
             self._times: deque[float] = deque(maxlen=1000)
             self._last_number = -1
@@ -164,14 +164,14 @@ class Stream:
             self.source.open()
             self._deliver(end)
         except InputError as error:
-            # What it keeps must not refer to it by the stack of where it was raised.
+            # The kept exception must not hold references through its traceback.
             reason = error.with_traceback(None)
             with self._lock:
                 self._lost = reason
         except Exception as error:
             _LOG.exception("The source %s failed", self.source.name)
             reason = SourceLost(
-                tr("a fault of this program stopped the pictures ({kind}); the log has it").format(
+                tr("an internal error ({kind}) stopped the images; see the log").format(
                     kind=type(error).__name__
                 ),
                 where=self.source.name,
@@ -198,13 +198,13 @@ class Stream:
                 self._hand_on(frame)
             elif heard_s is not None and now - heard_s > self._silence_s:
                 raise SourceLost(
-                    tr("no picture has come for {s:.0f} seconds").format(s=self._silence_s),
+                    tr("no image has arrived for {s:.0f} seconds").format(s=self._silence_s),
                     where=self.source.name,
                     advice=tr("Check the camera and its cable, then open it again"),
                 )
 
     def _wait_for_return(self, away: SourceAway) -> None:
-        """Say that the source is away, and let nobody wait for frames that may never come."""
+        """Mark the source as away, and cancel captures whose frames may never arrive."""
         reason = _Away(str(away), where=self.source.name, advice="")
         with self._lock:
             self._lost = reason
@@ -224,7 +224,7 @@ class Stream:
             try:
                 tap(frame)
             except Exception:
-                # What somebody does with frames must not stop them for everybody else.
+                # An error in one reader must not stop the frames for all others.
                 _LOG.exception("A reader of %s failed and gets no more frames", self.source.name)
                 self.remove_tap(tap)
         for capture in captures:
@@ -247,14 +247,14 @@ class Stream:
 
     def _stopped(self) -> SourceLost:
         return SourceLost(
-            tr("the pictures were stopped"),
+            tr("the images were stopped"),
             where=self.source.name,
-            advice=tr("Start them and capture again"),
+            advice=tr("Start them again, then capture again"),
         )
 
 
 class _Away(SourceLost):
-    """A loss that the source has put into a whole sentence already."""
+    """A loss for which the source already gives a complete sentence."""
 
     def __str__(self) -> str:
         return self.found

@@ -1,4 +1,4 @@
-"""The virtual sensor as a live source: what lies on the bench, as its camera would deliver it."""
+"""The virtual sensor as a live source: the scene on the bench as its camera would deliver it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
 ROOM_LIGHT = (0.066, 0.060, 0.050)
-"""What a lit room adds to the three channels at the nominal exposure, 1 is full scale."""
+"""Light of a lit room in the three channels at the nominal exposure; 1 is full scale."""
 TOO_BRIGHT = 3.0
 
 _SETTINGS: dict[str, tuple[Callable[[], str], str, float]] = {
@@ -37,7 +37,7 @@ _SETTINGS: dict[str, tuple[Callable[[], str], str, float]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Developed:
-    """A rendering as exposed: how to make a frame of it."""
+    """A rendering as exposed: everything needed to make a frame from it."""
 
     rendering: Rendering
     conditions: Conditions
@@ -45,9 +45,9 @@ class _Developed:
 
 
 class VirtualSource:
-    """Frames of what lies on a bench, at the rate of a camera.
+    """Frames of the scene on a bench, at the rate of a camera.
 
-    While a new scene is being rendered the pictures go on, with ``settled`` False.
+    While a new scene is being rendered, frames continue with ``settled`` False.
 
     Parameters
     ----------
@@ -69,28 +69,30 @@ class VirtualSource:
         self._noise_seed = 0
 
     def open(self) -> None:
-        """Begin to render; the first frame comes when the first picture is there."""
+        """Start to render; the first frame arrives when the first image is ready."""
         self._refuse_if_stopped(self.bench.conditions)
         if self._renderer is None:
             self._closed.clear()
             self._renderer = Renderer(self.bench)
-            # As with a camera, no two captures are alike, however often it is opened.
+            # As with a camera, no two captures are identical, however often it is opened.
             self._noise_seed = time.monotonic_ns()
             self._next_number, self._due_s = 0, math.nan
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Wait for the camera's next frame; None if there is none in time."""
+        """Wait for the camera's next frame; None if none arrives in time."""
         limit_s = time.monotonic() + timeout_s
         renderer = self._renderer
         if renderer is None:
             raise SourceLost(
-                tr("it is closed"), where=self.name, advice=tr("Open the virtual sensor again")
+                tr("the virtual sensor is closed"),
+                where=self.name,
+                advice=tr("Open the virtual sensor again"),
             )
         renderer.request(self.bench.seen)
         rendering = renderer.newest(timeout_s)
         if rendering is None or not self._wait_until_due(limit_s):
             return None
-        # Before the bench is looked at: what is changed later, this frame does not show.
+        # Before the scene is read: later changes are not in this frame.
         now = time.monotonic()
         conditions, wanted = self.bench.conditions, self.bench.seen
         self._refuse_if_stopped(conditions)
@@ -109,12 +111,12 @@ class VirtualSource:
         )
 
     def set(self, key: str, value: float) -> float:
-        """Change a setting of the bench; return what was really set."""
+        """Change a setting of the bench; return the value that was really set."""
         for setting in self.settings():
             if setting.key == key:
                 return float(getattr(self.bench.adjust(**{key: setting.nearest(value)}), key))
         raise InputError(
-            tr("it has no setting {key}").format(key=key),
+            tr("the virtual sensor has no setting {key}").format(key=key),
             where=self.name,
             advice=tr("Use one of {keys}").format(keys=", ".join(_SETTINGS)),
         )
@@ -144,7 +146,7 @@ class VirtualSource:
         return self._due_s <= limit_s and not self._closed.is_set()
 
     def _advance(self, period_s: float) -> int:
-        """Return the number of the frame that is due; those nobody came for in time are lost."""
+        """Return the number of the frame that is due; frames not read in time are lost."""
         missed = max(0, math.floor((time.monotonic() - self._due_s) / period_s))
         number = self._next_number + missed
         self._next_number = number + 1
@@ -167,7 +169,7 @@ class VirtualSource:
         if conditions.noise == 0.0:
             whole = np.rint(full * np.clip(signal, 0.0, 1.0))
             quiet = rgb_of(whole.astype(np.uint8 if depth == 8 else np.uint16))
-            # Every frame has memory of its own, as a camera's has.
+            # Every frame has its own memory, as with a camera.
             return lambda number: quiet.copy()
         noise = NoiseLevel.of_camera(
             camera, gain=_amplification(conditions), scale=conditions.noise
@@ -186,7 +188,7 @@ def _period_s(conditions: Conditions) -> float:
 
 
 def _exposed(rendering: Rendering, conditions: Conditions) -> NDArray[np.float64]:
-    """Return the signal at the camera's exposure and gain, 1 is full scale."""
+    """Return the signal at the camera's exposure and gain; 1 is full scale."""
     factor = conditions.exposure_ms / NOMINAL_EXPOSURE_MS * _amplification(conditions)
     if "too_bright" in conditions.faults:
         factor *= TOO_BRIGHT

@@ -1,8 +1,8 @@
-"""Labels: plain ones, for texts that others may have written, and those with markup of our own.
+"""Labels: plain text for content from outside, and markup for our own.
 
-Names, notes and messages come from files, cameras and people. Qt takes a text that looks like
-HTML for HTML, and would load pictures that it names; here only what the program itself has put
-into markup is read as such.
+Names, notes and messages come from files, cameras and people. Qt interprets text that looks like
+HTML as HTML and would load images that it refers to. Here only markup that the program itself wrote
+is interpreted.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import Qt
 from PySide6.QtWidgets import QLabel, QWidget
 
-from app.shell import theme
+from app.theme import theme
 
 _COLOUR = re.compile(rf"@({'|'.join(theme.MEANINGS)})\b")
 
 
 class PlainLabel(QLabel):
-    """Shows a text as it is written, whatever it looks like.
+    """Shows a text literally, even if it looks like HTML.
 
     Parameters
     ----------
     text : str, optional
-        What is shown.
+        The text to show.
     parent : QWidget, optional
-        Of the label.
+        Parent of the label.
     """
 
     def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
@@ -37,17 +37,17 @@ class PlainLabel(QLabel):
 
 
 class MarkupLabel(QLabel):
-    """Shows HTML that the program made; what others wrote goes into it by :func:`escaped`.
+    """Shows HTML of the program. Insert text from outside with :func:`escaped`.
 
-    ``@pass`` and the other meanings of :data:`app.shell.theme.MEANINGS` stand for their colours,
+    ``@pass`` and the other names of :data:`app.theme.theme.MEANINGS` are replaced by their colours,
     as in ``<span style='color:@pass'>``, and follow the theme.
 
     Parameters
     ----------
     markup : str, optional
-        What is shown.
+        The markup to show.
     parent : QWidget, optional
-        Of the label.
+        Parent of the label.
     """
 
     def __init__(self, markup: str = "", parent: QWidget | None = None) -> None:
@@ -62,17 +62,17 @@ class MarkupLabel(QLabel):
         super().setText(_COLOUR.sub(lambda found: theme.colour(found[1]).name(), markup))
 
     def changeEvent(self, event: QEvent) -> None:
-        """Take the colours of another theme, those of links among them."""
+        """Apply the colours of a new theme, also to hyperlinks."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_markup"):
             self.setText(self._markup)
 
 
 def escaped(text: str) -> str:
-    """Return a text such that markup shows it as it is written."""
+    """Return a text escaped so that markup shows it literally."""
     return html.escape(text).replace("@", "&#64;").replace("\n", "<br>")
 
 
 def plain_tip(text: str) -> str:
-    """Return a text such that a tool tip, which has no format, shows it as it is written."""
+    """Return a text such that a tooltip, which has no format property, shows it literally."""
     return Qt.convertFromPlainText(text) if Qt.mightBeRichText(text) else text

@@ -1,22 +1,22 @@
-"""Texts in the colour of what they mean; they follow the theme by themselves."""
+"""Text coloured by its meaning. It follows the theme."""
 
 from __future__ import annotations
 
 from PySide6.QtWidgets import QWidget
 
 PROPERTY = "meaning"
-"""The property by which the program's style sheet chooses the colour."""
+"""The property by which the program's style sheet selects the colour."""
 
 
 def show_meaning(widget: QWidget, meaning: str) -> None:
-    """Colour a widget's text.
+    """Set the colour of a widget's text.
 
     Parameters
     ----------
     widget : QWidget
-        A label, mostly.
+        Usually a label.
     meaning : str
-        One of :data:`app.shell.theme.MEANINGS`; empty: the colour of all other text.
+        One of :data:`app.theme.theme.MEANINGS`. Empty: the colour of normal text.
     """
     if widget.property(PROPERTY) != meaning:
         widget.setProperty(PROPERTY, meaning)
@@ -26,7 +26,7 @@ def show_meaning(widget: QWidget, meaning: str) -> None:
 
 
 def make_bold(widget: QWidget, *, size: float = 1.0) -> None:
-    """Show a widget's text bold, and larger by a factor."""
+    """Make a widget's text bold, and larger by a factor."""
     font = widget.font()
     font.setPointSizeF(font.pointSizeF() * size)
     font.setBold(True)

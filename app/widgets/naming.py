@@ -1,4 +1,4 @@
-"""Names for widgets: one for tests and scripts, one for screen readers, a tip for everybody."""
+"""Sets the names of widgets: object name for tests, accessible name for screen readers, tooltip."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def named(widget: W, name: str, accessible: str, tip: str = "") -> W:
     Parameters
     ----------
     widget : QWidget
-        To be named.
+        The widget.
     name : str
-        A dotted path such as ``calibrate.capture``.
+        Object name, a dotted path such as ``calibrate.capture``.
     accessible : str
-        What a screen reader says.
+        Text for screen readers.
     tip : str, optional
-        What the pointer shows, where a word is not enough.
+        Tooltip, if the visible text is not enough.
     """
     widget.setObjectName(name)
     widget.setAccessibleName(accessible)

@@ -1,4 +1,4 @@
-"""What every pyqtgraph plot of this program needs."""
+"""Functions that every pyqtgraph plot of this program needs."""
 
 from __future__ import annotations
 
@@ -8,32 +8,37 @@ from PySide6.QtWidgets import QWidget
 
 
 def without_menus(plot: pg.PlotWidget) -> pg.PlotWidget:
-    """Switch a plot's own context menus off, and let it own what is left of them.
+    """Switch off a plot's own context menus, and make the plot own what remains of them.
 
-    pyqtgraph makes them without a parent: they would outlive the plot, as windows that nobody
+    pyqtgraph creates the menus without a parent: they would outlive the plot, as windows that
+    nothing
     closes.
 
     Parameters
     ----------
     plot : PlotWidget
-        Made with a view box whose menu is off.
+        A plot whose view box has no menu.
     """
-    item = plot.getPlotItem()
-    item.setMenuEnabled(False)
-    # With its flags: without them it would lie on the plot as a part of it.
-    item.ctrlMenu.setParent(plot, item.ctrlMenu.windowFlags())
+    own_plot_menus(plot.getPlotItem(), plot)
     return plot
 
 
+def own_plot_menus(item: pg.PlotItem, owner: QWidget) -> None:
+    """Switch off the context menus of a plot item, and make a widget own what remains of them."""
+    item.setMenuEnabled(False)
+    # Keep the window flags: without them the menu would lie on the widget as a part of it.
+    item.ctrlMenu.setParent(owner, item.ctrlMenu.windowFlags())
+
+
 def own_handle_menus(item: pg.ROI, owner: QWidget) -> None:
-    """Let a widget own the context menus that pyqtgraph makes for the handles of an item.
+    """Make a widget own the context menus that pyqtgraph creates for the handles of an item.
 
     Parameters
     ----------
     item : pyqtgraph.ROI
         With all its handles.
     owner : QWidget
-        Is deleted with the item.
+        Deleted together with the item.
     """
     for handle in item.getHandles():
         handle.menu.setParent(owner, handle.menu.windowFlags())

@@ -1,7 +1,7 @@
-"""The objects below one, without PySide6 keeping what has gone.
+"""Find the objects below a Qt object without keeping deleted ones alive.
 
-``findChildren`` makes everything that it returns a child of the object that was asked. Where that
-is the main window, the Python halves of closed dialogs' widgets stay until the program ends.
+``findChildren`` makes everything that it returns a child of the object that was asked. If that is
+the main window, the Python objects of closed dialogs' widgets stay until the program ends.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ Kind = TypeVar("Kind", bound=QObject)
 
 
 def below(root: QObject, kind: type[Kind], name: str = "") -> Iterator[Kind]:
-    """Find the objects of a kind below one, each before what is below it.
+    """Find the objects of a kind below a root, each before its own children.
 
     Parameters
     ----------
     root : QObject
-        Where to look; it is not among what is found.
+        Start of the search. It is not among the results.
     kind : type
-        Of what is looked for.
+        Type of the objects.
     name : str, optional
-        Its object name; all where empty.
+        Object name. Empty: any.
 
     Yields
     ------
     QObject
-        The next of them.
+        The next object found.
     """
     for child in root.children():
         if isinstance(child, kind) and name in ("", child.objectName()):

@@ -1,4 +1,4 @@
-"""A stage's quality figures: verdict, value, limit, and what to do where one does not pass."""
+"""A stage's quality figures: verdict, value, limit, and advice for those that do not pass."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.shell import theme
-from app.shell.actions import make_action
-from app.shell.icons import icon
+from app.theme import theme
+from app.theme.icons import icon
+from app.widgets.actions import make_action
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.quality import Figure, QualityTable, Verdict, verdict_word
@@ -27,13 +27,13 @@ from gelpolight_core.translation import tr
 VERDICT_COLUMN, LABEL_COLUMN, VALUE_COLUMN, LIMIT_COLUMN = range(4)
 COLUMNS = 4
 ROW_HEIGHT = 24
-# Rounding alone; no figure's limit is near.
+# Rounding error only. No figure's limit is this close.
 TINY = 1e-9
 MARGIN = 6
 
 
 def value_text(figure: Figure) -> str:
-    """Return a figure's value with its unit; counts without decimals."""
+    """Return a figure's value with its unit. Counts have no decimals."""
     if not math.isfinite(figure.value):
         return tr("unknown")
     if abs(figure.value) < TINY:
@@ -46,7 +46,7 @@ def value_text(figure: Figure) -> str:
 
 
 def limit_text(figure: Figure) -> str:
-    """Return the limit of a figure for passing, such as "≤ 0.3 px"; empty where it has none."""
+    """Return the pass limit of a figure, such as "≤ 0.3 px". Empty if it has none."""
     limit = figure.warn_limit if figure.warn_limit is not None else figure.fail_limit
     if limit is None:
         return ""
@@ -55,12 +55,12 @@ def limit_text(figure: Figure) -> str:
 
 
 class _Grid(QTableWidget):
-    """A table whose copy key copies rows; the view's own copies a single cell."""
+    """A table whose copy shortcut copies whole rows instead of a single cell."""
 
     copy_asked = Signal()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Copy, or do what a table does."""
+        """Copy the rows, or handle the key as usual."""
         if event.matches(QKeySequence.StandardKey.Copy):
             self.copy_asked.emit()
         else:
@@ -68,16 +68,16 @@ class _Grid(QTableWidget):
 
 
 class QualityTableWidget(QWidget):
-    """Shows a QualityTable as high as it is; rows are updated in place.
+    """Shows a QualityTable without scrolling. Rows are updated in place.
 
     Parameters
     ----------
     name : str
         Object name, a dotted path.
     accessible : str
-        What a screen reader says, such as "Quality of the lens".
+        Text for screen readers, such as "Quality of the lens".
     narrow : bool, optional
-        For a side panel: verdicts as signs without their word, long labels wrapped.
+        For a side panel: verdicts as icons without text, long labels wrapped.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class QualityTableWidget(QWidget):
         self._shown: tuple[tuple[str, bool], ...] = ()
         self._table = QualityTable()
         self._grid = named(_Grid(0, COLUMNS, self), f"{name}.table", accessible)
-        # Verdict, figure, value and limit say themselves what they are.
+        # The columns verdict, figure, value and limit need no header.
         self._grid.horizontalHeader().hide()
         self._grid.verticalHeader().hide()
         self._grid.setShowGrid(False)
@@ -115,7 +115,7 @@ class QualityTableWidget(QWidget):
         layout.addWidget(self._grid)
 
     def set_table(self, table: QualityTable) -> None:
-        """Show a table; the same figures stay on their rows, with what was selected."""
+        """Show a table. The same figures keep their rows and the selection."""
         self._table = table
         wanted = tuple((f.key, _has_advice(f)) for f in table.figures)
         if wanted != self._shown:
@@ -133,11 +133,11 @@ class QualityTableWidget(QWidget):
         self._fit()
 
     def texts(self) -> list[list[str]]:
-        """Return what the rows say, for copies and tests."""
+        """Return the text of the rows, for copies and tests."""
         return [self._row_texts(row) for row in range(self._grid.rowCount())]
 
     def copy(self) -> None:
-        """Put the selected rows, or all of them, on the clipboard."""
+        """Copy the selected rows, or all rows, to the clipboard."""
         chosen = sorted({index.row() for index in self._grid.selectedIndexes()})
         rows = chosen or range(self._grid.rowCount())
         text = "\n".join("\t".join(self._row_texts(row)).rstrip() for row in rows)
@@ -181,7 +181,7 @@ class QualityTableWidget(QWidget):
         return item
 
     def _fit(self, *_: int) -> None:
-        """Wrap the advice to the width, and be as high as all rows."""
+        """Wrap the advice to the width, and set the height to that of all rows."""
         columns = range(LABEL_COLUMN, COLUMNS)
         whole = sum(self._grid.columnWidth(column) for column in columns) - 2 * MARGIN
         metrics = self._grid.fontMetrics()
@@ -201,13 +201,13 @@ class QualityTableWidget(QWidget):
         self._grid.setFixedHeight(self._grid.verticalHeader().length())
 
     def changeEvent(self, event: QEvent) -> None:
-        """Take the colours of a new theme."""
+        """Apply the colours of a new theme."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_grid"):
             self.set_table(self._table)
 
     def minimumSizeHint(self) -> QSize:
-        """Return a width at which the label can still be read."""
+        """Return a width at which the label is readable."""
         return QSize(260 if self._narrow else 360, super().minimumSizeHint().height())
 
 

@@ -11,12 +11,12 @@ HIGH = 10_000
 
 
 class RoomyLabel(PlainLabel):
-    """Plain text, wrapped, with room for the longest of the texts that it may show.
+    """Plain text, wrapped, with space for the longest of several texts.
 
     Parameters
     ----------
     *texts : str
-        Those texts; without any, one line is kept.
+        The texts that it may show. Default: space for one line.
     """
 
     def __init__(self, *texts: str, parent: QWidget | None = None) -> None:
@@ -26,16 +26,16 @@ class RoomyLabel(PlainLabel):
         self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
 
     def hasHeightForWidth(self) -> bool:
-        """Whether the height follows from the width: also while there is no text."""
+        """Whether the height depends on the width, also while there is no text."""
         return True
 
     def heightForWidth(self, width: int) -> int:
-        """Return the height of the longest text, or of the present one where that is higher."""
+        """Return the height of the longest text, or of the current one if that is higher."""
         metrics, wrap = self.fontMetrics(), Qt.TextFlag.TextWordWrap
         area = QRect(0, 0, width, HIGH)
         texts = (*self._texts, self.text())
         return max(metrics.boundingRect(area, wrap, text).height() for text in texts)
 
     def minimumSizeHint(self) -> QSize:
-        """Return a size that leaves the width to others."""
+        """Return a size that leaves the width to other widgets."""
         return QSize(0, self.fontMetrics().lineSpacing())

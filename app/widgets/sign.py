@@ -1,4 +1,4 @@
-"""A small sign beside words; it follows the theme by itself."""
+"""A small icon next to a text. It follows the theme."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ SIDE = 18
 
 
 class Sign(QWidget):
-    """Shows an icon; the words beside it say the same.
+    """Shows an icon. The text next to it has the same meaning.
 
     Parameters
     ----------
     icon : QIcon, optional
-        One of :func:`app.shell.icons.icon` is drawn anew in every theme.
+        An icon of :func:`app.theme.icons.icon` is redrawn when the theme changes.
     """
 
     def __init__(self, icon: QIcon | None = None, parent: QWidget | None = None) -> None:
@@ -28,7 +28,7 @@ class Sign(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the icon in the theme of now."""
+        """Draw the icon in the current theme."""
         painter = QPainter(self)
         self._icon.paint(painter, self.rect())
         painter.end()

@@ -1,4 +1,4 @@
-"""Keys of tools that have a button and no action."""
+"""Shortcuts of tools that have a button but no action."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QWidget
 
 PURPOSE = "purpose"
-"""Property of a shortcut: what it is for, on the sheet of shortcuts."""
+"""Property of a shortcut: its purpose, for the sheet of shortcuts."""
 
 
 def add_tool_key(
     owner: QWidget, key: str, press: Callable[[], object], *, name: str, purpose: str
 ) -> QShortcut:
-    """Have a key press a tool's button while the focus is inside a widget.
+    """Make a key click a tool's button while the focus is inside a widget.
 
     Parameters
     ----------
     owner : QWidget
         The widget.
     key : str
-        As Qt writes it.
+        Key sequence as Qt writes it.
     press : callable
         The button's ``click``.
     name : str
-        Object name; its first part is the group on the sheet of shortcuts.
+        Object name. Its first part is the group on the sheet of shortcuts.
     purpose : str
-        What it is for, there.
+        Text for the sheet of shortcuts.
     """
     shortcut = QShortcut(QKeySequence(key), owner)
     shortcut.setObjectName(name)

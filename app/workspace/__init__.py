@@ -1,1 +1,1 @@
-"""The folder in which sensors, their calibrations and their sessions are kept; no Qt."""
+"""The folder that contains sensors, their calibrations and their sessions. Without Qt."""

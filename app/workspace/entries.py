@@ -1,4 +1,4 @@
-"""What the library knows of a calibration file: what it says of itself, and whether to trust it."""
+"""Library entry of a calibration file: its own description and its validation."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class Entry:
     path : Path
         The file.
     summary : CalibrationSummary or None
-        What it says of itself; None where it cannot be read.
+        Its description. None if it cannot be read.
     broken : str
-        Why it cannot be read; empty for a good file.
+        Why it cannot be read. Empty for a good file.
     validation : Validation or None
-        The trial beside it, passed or not.
+        Its validation, passed or not.
     validation_note : str
-        Why the file beside it does not count: damaged, or of another calibration.
+        Why the validation file is ignored: damaged, or of another calibration.
     in_use : bool
-        Whether it is the one that the program measures with.
+        Whether it is the calibration in use.
     """
 
     path: Path
@@ -40,13 +40,18 @@ class Entry:
     in_use: bool = False
 
     @property
+    def name(self) -> str:
+        """Name of the calibration in the program: that of its file."""
+        return self.path.stem
+
+    @property
     def serial(self) -> str:
-        """The sensor's serial; of a broken file, the name of its folder."""
+        """The sensor's serial. For a broken file, the name of its folder."""
         return self.path.parent.name if self.summary is None else self.summary.serial
 
     @property
     def validated(self) -> bool:
-        """Whether this very calibration passed on an object of known size."""
+        """Whether this calibration passed validation on an object of known size."""
         return (
             self.summary is not None
             and self.validation is not None
@@ -56,17 +61,17 @@ class Entry:
 
     @property
     def created(self) -> datetime | None:
-        """When it was made; None where that is not known."""
+        """Time of the calibration. None if unknown."""
         return None if self.summary is None else parse_time(self.summary.created)
 
     def age_days(self, now: datetime) -> float | None:
-        """Return its age; None where it is not known, never negative."""
+        """Return its age. None if unknown, never negative."""
         made = self.created
         return None if made is None else max(0.0, (now - made).total_seconds() / 86400.0)
 
 
 def parse_time(text: str) -> datetime | None:
-    """Read an ISO 8601 time; one without a zone counts as UTC, one that is none as None."""
+    """Read an ISO 8601 time. Without a time zone it counts as UTC. Invalid text gives None."""
     try:
         time = datetime.fromisoformat(text)
     except ValueError:
@@ -75,7 +80,7 @@ def parse_time(text: str) -> datetime | None:
 
 
 def read_entry(path: Path, *, in_use: bool = False) -> Entry:
-    """Return what is known of a calibration file; a broken one is an entry too."""
+    """Return the library entry of a calibration file, including broken ones."""
     try:
         summary = read_summary(path)
     except InputError as error:
@@ -86,5 +91,5 @@ def read_entry(path: Path, *, in_use: bool = False) -> Entry:
         return Entry(path, summary, validation_note=error.found, in_use=in_use)
     note = ""
     if validation is not None and validation.identity != summary.identity:
-        note = tr("the validation beside it is of another calibration")
+        note = tr("the validation next to it belongs to another calibration")
     return Entry(path, summary, "", validation, note, in_use)

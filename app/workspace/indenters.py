@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.io.atomic import make_folder, write_atomically
+from gelpolight_core.io.reading import NAME_LIMIT, NEWEST, brief, parse_json, plain_text, read_file
 from gelpolight_core.measurement.measure import SHAPES
-from gelpolight_core.reading import NAME_LIMIT, NEWEST, brief, parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 FILE = "indenters.json"
@@ -29,7 +29,7 @@ class Indenter:
     Attributes
     ----------
     name : str
-        What the lab calls it.
+        Its name in the lab.
     shape : str
         ``ball``, ``cylinder`` or ``cuboid``.
     size_mm : float
@@ -37,12 +37,12 @@ class Indenter:
     second_mm : float or None
         The other side of a cuboid that is not square.
     height_mm : float or None
-        How deep it goes in until its base touches; None where that is not fixed.
+        Indentation depth when its base touches. None if it has no such base.
 
     Raises
     ------
     InputError
-        If it has no name, the shape is not known, or a length is not greater than zero.
+        If it has no name, the shape is unknown, or a length is not greater than zero.
     """
 
     name: str
@@ -52,24 +52,22 @@ class Indenter:
     height_mm: float | None = None
 
     def __post_init__(self) -> None:
-        """Check it."""
+        """Check the values."""
         where = tr("indenter {name}").format(name=self.name or tr("without a name"))
         if not self.name.strip():
-            raise InputError(
-                tr("an indenter has no name"), where=where, advice=tr("Give it a name")
-            )
+            raise InputError(tr("An indenter has no name"), where=where, advice=tr("Enter a name"))
         if self.shape not in SHAPES:
             raise InputError(
-                tr("unknown shape '{shape}'").format(shape=self.shape),
+                tr("Unknown shape '{shape}'").format(shape=self.shape),
                 where=where,
                 advice=tr("Choose one of {shapes}").format(shapes=", ".join(SHAPES)),
             )
         for length in (self.size_mm, self.second_mm, self.height_mm):
             if length is not None and not (math.isfinite(length) and length > 0.0):
                 raise InputError(
-                    tr("a length of {value} mm").format(value=length),
+                    tr("The length {value} mm is not valid").format(value=length),
                     where=where,
-                    advice=tr("Give lengths greater than zero"),
+                    advice=tr("Enter lengths greater than zero"),
                 )
 
     @property
@@ -80,7 +78,7 @@ class Indenter:
 
 
 def first_indenters() -> tuple[Indenter, ...]:
-    """Return the list that a lab begins with: the indenters of the paper's evaluation."""
+    """Return the default list: the indenters of the paper's evaluation."""
     rows = [
         Indenter(
             tr("{shape} {size:g} mm, {height:g} mm high").format(
@@ -100,12 +98,12 @@ def first_indenters() -> tuple[Indenter, ...]:
 
 
 def read_indenters(folder: Path) -> tuple[Indenter, ...]:
-    """Read the list of a workspace; the first one where there is none yet.
+    """Read the list of a workspace. Default: the list of the paper's indenters.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is damaged, or of a newer version.
+        If the file cannot be read, is damaged, or has a newer version.
     """
     path = folder / FILE
     try:
@@ -115,30 +113,30 @@ def read_indenters(folder: Path) -> tuple[Indenter, ...]:
         return first_indenters()
     except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("the list of indenters cannot be read ({error})").format(
+            tr("The list of indenters cannot be read ({error})").format(
                 error=brief(str(error), 200)
             ),
             where=str(path),
-            advice=tr("Repair the file, or remove it to begin with the first list again"),
+            advice=tr("Repair the file, or delete it to start with the default list"),
         ) from error
 
 
 def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
-    """Keep the list, whole or not at all.
+    """Write the list, completely or not at all.
 
     Raises
     ------
     InputError
-        If two indenters have one name, or the file cannot be written.
+        If two indenters have the same name, or the file cannot be written.
     """
     rows = list(indenters)
     names = [row.name for row in rows]
     for name in names:
         if names.count(name) > 1:
             raise InputError(
-                tr("two indenters are called {name}").format(name=name),
-                where=tr("list of indenters"),
-                advice=tr("Give each a name of its own"),
+                tr("Two indenters have the name {name}").format(name=name),
+                where=tr("List of indenters"),
+                advice=tr("Give each indenter a different name"),
             )
     content = {"format": FORMAT, "version": VERSION, "indenters": [asdict(row) for row in rows]}
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -152,13 +150,13 @@ def write_indenters(indenters: Iterable[Indenter], folder: Path) -> None:
 
 def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise ValueError("it is no list of indenters")
+        raise ValueError("it is not a list of indenters")
     version = content["version"]
     if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
-            tr("the list of indenters has version {v} and this program knows version {k}").format(
-                v=version, k=VERSION
-            ),
+            tr(
+                "The list of indenters has version {v}, but this program supports only version {k}"
+            ).format(v=version, k=VERSION),
             where=str(path),
             advice=tr("Use a newer version of GelPoLight Studio"),
         )
@@ -176,5 +174,5 @@ def _parse(content: Any, path: Path) -> tuple[Indenter, ...]:
 
 def _length(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{brief(value)} is no length")
+        raise ValueError(f"{brief(value)} is not a length")
     return float(value) if abs(value) < MOST_MM else math.inf

@@ -1,7 +1,8 @@
-"""Whether a calibration was tried on an object of known size: a small file beside it.
+"""Validation of a calibration on an object of known size: a small file next to it.
 
-``<name>.validation.json`` says when and by whom, what was pressed in, what was measured and what is
-true, and the limits. It counts for one calibration only, whose identity it names.
+``<name>.validation.json`` contains time, operator, object, measured and true lengths, and the
+limits.
+It belongs to one calibration only, given by its identity.
 """
 
 from __future__ import annotations
@@ -13,21 +14,21 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.reading import NEWEST, brief, parse_json, plain_text, read_file
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.reading import NEWEST, brief, parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-validation"
 VERSION = 1
 ENDING = ".validation.json"
 SIZE_LIMIT = 1_000_000
-# Percents of it are numbers still.
+# Small enough that percentages of it are still finite.
 MOST = 1e15
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One length of the object: measured, true, and how far apart they may be.
+    """One length of the object: measured value, true value and limit.
 
     Attributes
     ----------
@@ -36,7 +37,7 @@ class Comparison:
     measured_mm, true_mm : float
         The two lengths.
     limit_percent : float
-        Largest error for it to pass, in percent of the true length.
+        Maximum error to pass, in percent of the true length.
     """
 
     quantity: str
@@ -51,24 +52,24 @@ class Comparison:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is within the limit; never for a number that is not finite."""
+        """Whether the error is within the limit. False for values that are not finite."""
         return abs(self.error_percent) <= self.limit_percent
 
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """A trial of a calibration on an object of known size.
+    """Validation of a calibration on an object of known size.
 
     Attributes
     ----------
     identity : str
-        Of the calibration that was tried.
+        Identity of the calibration.
     when : str
         ISO 8601 time with zone.
     who : str
-        Who did it.
+        The operator.
     indenter : str
-        What was pressed in, for people.
+        Description of the object for the user.
     comparisons : tuple of Comparison
         At least one.
     """
@@ -81,17 +82,17 @@ class Validation:
 
     @property
     def passed(self) -> bool:
-        """Whether every length is within its limit, and there is one."""
+        """Whether there is at least one length and all are within their limits."""
         return bool(self.comparisons) and all(c.passed for c in self.comparisons)
 
 
 def validation_path(calibration: Path) -> Path:
-    """Return where the validation of a calibration file is kept."""
+    """Return the path of the validation of a calibration file."""
     return calibration.with_name(calibration.stem + ENDING)
 
 
 def write_validation(validation: Validation, calibration: Path) -> Path:
-    """Write a validation beside its calibration file, whole or not at all; return its place.
+    """Write a validation next to its calibration file, completely or not at all. Return its path.
 
     Raises
     ------
@@ -115,12 +116,12 @@ def write_validation(validation: Validation, calibration: Path) -> Path:
 
 
 def read_validation(calibration: Path) -> Validation | None:
-    """Read the validation beside a calibration file; None where there is none.
+    """Read the validation next to a calibration file. None if there is none.
 
     Raises
     ------
     InputError
-        If it is damaged, of a newer version, or says "passed" of lengths that do not.
+        If it is damaged, has a newer version, or its verdict does not match its lengths.
     """
     path = validation_path(calibration)
     try:
@@ -130,7 +131,7 @@ def read_validation(calibration: Path) -> Validation | None:
         return None
     except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("the validation cannot be read ({error})").format(error=brief(str(error), 200)),
+            tr("The validation cannot be read ({error})").format(error=brief(str(error), 200)),
             where=str(path),
             advice=tr("Validate the calibration again"),
         ) from error
@@ -142,7 +143,7 @@ def _parse(content: Any, path: Path) -> Validation:
     version = content["version"]
     if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
-            tr("the validation has version {v} and this program knows version {k}").format(
+            tr("The validation has version {v}, but this program supports only version {k}").format(
                 v=version, k=VERSION
             ),
             where=str(path),
@@ -166,7 +167,7 @@ def _parse(content: Any, path: Path) -> Validation:
         ),
     )
     if content["passed"] is not validation.passed:
-        raise ValueError("its verdict does not agree with its lengths")
+        raise ValueError("its verdict does not match its lengths")
     return validation
 
 
@@ -176,7 +177,7 @@ def _text(value: Any) -> str:
 
 def _positive(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{brief(value)} is no number")
+        raise ValueError(f"{brief(value)} is not a number")
     if not 0.0 < value < MOST:
-        raise ValueError(f"{brief(value)} is no length")
+        raise ValueError(f"{brief(value)} is not a length")
     return float(value)

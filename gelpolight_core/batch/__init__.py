@@ -1,1 +1,1 @@
-"""Recordings and folders of pictures of any size, by many processes or a cluster; can be left."""
+"""Resumable runs over recordings and image folders, in many processes or on a cluster."""

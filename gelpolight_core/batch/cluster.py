@@ -1,6 +1,6 @@
-"""Workers of a Dask cluster that somebody else runs; the scheduler hands out the frames.
+"""Run frames on an existing Dask cluster; its scheduler distributes the frames.
 
-Its workers need this program in the same version, and the same folders under the same names.
+Its workers need the same version of this program, and the same folders under the same names.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from gelpolight_core.translation import tr
 
 ANSWER_S = 10.0
 TASK_FRAMES = 16
-"""Most frames in a task: a scheduler hands out some thousand tasks a second."""
+"""Largest number of frames per task: a scheduler handles about a thousand tasks per second."""
 WAITING_TASKS = 3
-"""Tasks for each core that the scheduler has, done and waiting ones."""
+"""Tasks in the scheduler for each core, running and waiting."""
 
 
 class ClusterRunner:
-    """Hands frames to the workers of a Dask cluster.
+    """Sends frames to the workers of a Dask cluster.
 
     Parameters
     ----------
     settings : BatchSettings
-        What the frames are done with.
+        Settings for the frames.
     out : Path
         Folder of the run; each worker must see it.
     address : str
-        Of the scheduler, such as ``tcp://10.0.0.1:8786``.
+        Address of the scheduler, such as ``tcp://10.0.0.1:8786``.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class ClusterRunner:
     def __call__(
         self, jobs: Iterator[Job], count: int, stopped: Stopped
     ) -> Generator[list[Outcome], None, None]:
-        """Yield the outcomes as they come; once stopped, of the tasks at hand only."""
+        """Yield the outcomes as they arrive; after a stop, only those of submitted tasks."""
         with self._client:
             tasks = _Tasks(self, jobs, count)
             tasks.fill()
@@ -65,31 +65,31 @@ class ClusterRunner:
         workers_may_go_on(self._out)
 
     def submit(self, jobs: list[Job]) -> Any:
-        """Hand a task to the scheduler; return its future."""
-        # Not pure: the same frames may have to be done again, and what counts are the files.
+        """Submit a task to the scheduler and return its future."""
+        # Not pure: the same frames may have to be repeated, and the result is the files.
         return self._client.submit(work, self._settings, self._out, jobs, pure=False)
 
     def cores(self) -> int:
-        """Return how many there are; a cluster may grow and shrink."""
+        """Return the number of cores; a cluster may grow and shrink."""
         cores: dict[str, int] = self._client.ncores()
         return max(sum(cores.values()), 1)
 
     def lost(self, error: BaseException) -> InputError:
-        """Return what to raise where the cluster does not do its work."""
+        """Return the error for a cluster that does not work."""
         return InputError(
-            tr("the cluster cannot do the work ({reason})").format(
+            tr("The cluster does not work ({reason})").format(
                 reason=str(error).splitlines()[0] if str(error) else type(error).__name__
             ),
             where=self._address,
             advice=tr(
-                "Check that it runs and has this program on each worker, then go on with the "
-                "same command"
+                "Check that it is running and has this program on each worker, then repeat the "
+                "command to continue"
             ),
         )
 
 
 class _Tasks:
-    """The tasks that the scheduler has."""
+    """The tasks in the scheduler."""
 
     def __init__(self, cluster: ClusterRunner, jobs: Iterator[Job], count: int) -> None:
         self._cluster, self.jobs = cluster, jobs
@@ -99,7 +99,7 @@ class _Tasks:
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def fill(self) -> None:
-        """Send tasks while the scheduler has fewer than it should."""
+        """Submit tasks until the scheduler has enough."""
         while len(self.sent) < WAITING_TASKS * self._cluster.cores():
             task = list(islice(self.jobs, self._frames))
             if not task:
@@ -135,7 +135,8 @@ class _Tasks:
             for job in task:
                 self._send([job])
             return []
-        except Exception as error:  # a worker notes all faults of frames: this is the cluster's
+        # a worker records all errors of frames; this is an error of the cluster
+        except Exception as error:
             raise self._cluster.lost(error) from error
         return outcomes
 
@@ -154,7 +155,7 @@ def _connect(address: str) -> Any:
         return Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
-            tr("no Dask scheduler answers"),
+            tr("There is no answer from a Dask scheduler"),
             where=address,
-            advice=tr("Check the address, as in tcp://10.0.0.1:8786, and that it runs"),
+            advice=tr("Check that it is running and that the address is like tcp://10.0.0.1:8786"),
         ) from error

@@ -1,8 +1,8 @@
-"""What a worker does with a frame; the same for a process of this machine and for a cluster's.
+"""The work of a worker on one frame, for a local process and for a cluster.
 
-:func:`work` depends on nothing but its arguments and the files they name, and may be called in any
-process any number of times: the same frame gives the same bits, and files that are there already
-are replaced by equal ones.
+:func:`work` depends only on its arguments and the files they name, and may be called in any process
+any number of times: the same frame gives the same bits, and existing files are replaced by
+identical ones.
 """
 
 from __future__ import annotations
@@ -26,19 +26,20 @@ from gelpolight_core.batch.stopping import shall_stop
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import write_heightmap
+from gelpolight_core.image.picture import Picture, linear_image
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.measurement.trust import judged
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
-from gelpolight_core.session.picture import Picture, linear_picture
-from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.session.images import read_picture, require_colour
 from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """Why no worker can go on, such as a full disk; the parts of an :class:`InputError`."""
+    """Why no worker can continue, such as a full disk; the parts of an :class:`InputError`."""
 
     found: str
     where: str
@@ -46,11 +47,11 @@ class Halt:
 
     @classmethod
     def because(cls, error: InputError) -> Halt:
-        """Return an error in a form that goes from one process to another."""
+        """Return an error in a form that can be sent between processes."""
         return cls(error.found, error.where, error.advice)
 
     def error(self) -> InputError:
-        """Return the error again."""
+        """Return the original error."""
         return InputError(self.found, where=self.where, advice=self.advice)
 
 
@@ -58,16 +59,16 @@ Outcome = FrameRow | Halt
 
 
 def work(settings: BatchSettings, out: Path, jobs: Sequence[Job]) -> list[Outcome]:
-    """Reconstruct frames and write their files; return what is to be noted of each.
+    """Reconstruct frames and write their files; return the rows for the ledger.
 
     Parameters
     ----------
     settings : BatchSettings
-        What it is done with; the calibration is read once in a process.
+        Settings of the run; the calibration is read once per process.
     out : Path
-        Folder of the run, which was begun with the same settings.
+        Folder of the run, created with the same settings.
     jobs : sequence of Job
-        The frames. Behind one that halts the run none is begun, nor once it shall stop.
+        The frames. No frame is begun after one that halts the run, or after a request to stop.
     """
     with _one_at_a_time:
         try:
@@ -85,13 +86,13 @@ def work(settings: BatchSettings, out: Path, jobs: Sequence[Job]) -> list[Outcom
 
 
 def failed(job: Job, error: str, *, seconds: float = 0.0, ours: bool = False) -> FrameRow:
-    """Return the row of a frame that has no result."""
+    """Return the row of a frame without a result."""
     return FrameRow(
         job.output, job.stamp, str(job.path), job.index, seconds=seconds, error=error, ours=ours
     )
 
 
-# Two threads of a process may not enter the compiled loops together.
+# Two threads of a process must not run the compiled loops at the same time.
 _one_at_a_time = threading.Lock()
 
 
@@ -104,8 +105,8 @@ class _FrameWorker:
     """Reconstructs frames of one calibration."""
 
     def __init__(self, settings: BatchSettings, out: Path) -> None:
-        cv2.setNumThreads(1)  # each process has a core of its own
-        # Also tells whether this process sees the folder that the results shall lie in.
+        cv2.setNumThreads(1)  # each process has one core
+        # Also checks that this process can see the folder of the results.
         require_same(replace(settings, program=__version__), out)
         self._settings, self._out = settings, out
         self._recording: Recording | None = None
@@ -113,9 +114,9 @@ class _FrameWorker:
         calibration = read_calibration(settings.calibration)
         if calibration.identity != settings.identity:
             raise InputError(
-                tr("the calibration was replaced while it was in use"),
+                tr("The calibration was replaced while in use"),
                 where=str(settings.calibration),
-                advice=tr("Put it back, or begin a run of its own with the new one"),
+                advice=tr("Restore it, or start a separate run with the new one"),
             )
         self._reconstructor = Reconstructor(
             calibration, model=settings.model, effort=settings.effort, workers=1
@@ -131,7 +132,7 @@ class _FrameWorker:
             return failed(job, str(error), seconds=time.process_time() - began)
         except _CannotWrite as error:
             return error.halt
-        except Exception:  # one frame's fault of ours shall not keep a million others waiting
+        except Exception:  # an internal error in one frame must not stop all others
             seconds = time.process_time() - began
             return failed(job, traceback.format_exc(), seconds=seconds, ours=True)
         return replace(row, seconds=time.process_time() - began)
@@ -144,8 +145,13 @@ class _FrameWorker:
         else:
             picture, row = self._recorded(job, job.index, row)
         shape = self._settings.shape
+        health = self._reconstructor.health(picture.rgb, name=job.name)
         heightmap = self._reconstructor.depth(
-            picture.rgb, name=job.name, normals=shape is None, uncertainty=shape is not None
+            picture.rgb,
+            name=job.name,
+            normals=shape is None,
+            uncertainty=shape is not None,
+            health=health,
         )
         return _described(row, heightmap, shape), heightmap
 
@@ -157,28 +163,28 @@ class _FrameWorker:
                 raise
             frame = self._frame(job, index)
         response = self._reconstructor.calibration.response
-        picture = linear_picture(frame.rgb, job.name, response=response)
+        picture = linear_image(frame.rgb, job.name, response=response)
         return picture, replace(row, number=frame.number, time_s=frame.time_s)
 
     def _frame(self, job: Job, index: int) -> RecordedFrame:
         recording = self._opened(job.path)
         if index >= len(recording):
             raise InputError(
-                tr("there is no frame {n}").format(n=index),
+                tr("Frame {n} does not exist").format(n=index),
                 where=str(job.path),
                 advice=tr("Copy the recording again"),
             )
         frame = recording.frame(index)
         if frame_stamp(recording.header.started, frame.number) != job.stamp:
             raise InputError(
-                tr("frame {n} is another one than when the run was begun").format(n=index),
+                tr("Frame {n} has changed since the run was started").format(n=index),
                 where=str(job.path),
-                advice=tr("Give the command again, which looks at the recording anew"),
+                advice=tr("Repeat the command, which reads the recording again"),
             )
         return frame
 
     def _opened(self, path: Path) -> Recording:
-        """Return a recording; its frames come one by one, and finding them takes a while."""
+        """Return an open recording; its frames are used one by one, and finding them takes time."""
         if self._recording is None or self._recording.path != path:
             self._close()
             mark = _file_mark(path)
@@ -186,9 +192,10 @@ class _FrameWorker:
         return self._recording
 
     def _forget_changed(self) -> bool:
-        """Close a recording whose file is another than when it was opened; return whether it was.
+        """Close a recording whose file has changed since it was opened; return whether it had.
 
-        A cluster's workers live long; but one that grows is not searched anew for every frame.
+        Workers of a cluster live long; but a growing recording is not searched again for every
+        frame.
         """
         if self._recording is None or self._mark == _file_mark(self._recording.path):
             return False
@@ -207,11 +214,11 @@ class _FrameWorker:
         except InputError as error:
             if isinstance(error.__cause__, OSError):
                 raise _CannotWrite(Halt.because(error)) from error
-            raise  # this frame's own, such as a surface without any part to be meshed
+            raise  # an error of this frame only, such as a surface without any part to mesh
 
 
 class _CannotWrite(Exception):
-    """The disk refuses files, those of other frames as well."""
+    """The disk refuses files, also those of other frames."""
 
     def __init__(self, halt: Halt) -> None:
         super().__init__(halt)
@@ -219,16 +226,16 @@ class _CannotWrite(Exception):
 
 
 def _file_mark(path: Path) -> tuple[int, ...]:
-    """Return what tells that a file was replaced or written on."""
+    """Return a mark that changes when a file is replaced or modified."""
     try:
         found = path.stat()
-    except OSError:  # opening it says why, in words
+    except OSError:  # opening it gives the error message
         return ()
     return found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _described(row: FrameRow, heightmap: HeightMap, shape: str | None) -> FrameRow:
-    """Return a row with what the summary says of a height map."""
+    """Return a row with the summary of a height map."""
     inside = (heightmap.flags & int(Flag.OUTSIDE)) == 0
     known = inside & np.isfinite(heightmap.depth_mm)
     depth_mm = heightmap.depth_mm[known].astype(np.float64)
@@ -243,7 +250,7 @@ def _described(row: FrameRow, heightmap: HeightMap, shape: str | None) -> FrameR
     if shape is None:
         return row
     try:
-        measurement = measure_heightmap(heightmap, shape=shape)
+        measurement = judged(measure_heightmap(heightmap, shape=shape), heightmap)
     except InputError as error:  # nothing is pressed, or something else
         return replace(row, notes=(*row.notes, error.found))
     return replace(row, measured=measurement.as_json())

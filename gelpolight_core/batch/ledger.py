@@ -1,7 +1,7 @@
-"""What was done in a run, one line per frame; a frame counts once its line is on the disk.
+"""The ledger of a run, one line per frame; a frame counts once its line is on disk.
 
-The files of a frame are whole before its line is written. A line that was cut short by a crash is
-no line: that frame is done again. Of two lines for one result the later one counts.
+The files of a frame are complete before its line is written. A line truncated by a crash is
+ignored: that frame is repeated. If there are two lines for one result, the later one counts.
 """
 
 from __future__ import annotations
@@ -12,28 +12,28 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gelpolight_core.export.appending import append_durably
-from gelpolight_core.reading import open_file, parse_json, unreadable
+from gelpolight_core.io.appending import append_durably
+from gelpolight_core.io.reading import open_file, parse_json, unreadable
 
 FILE = "batch.jsonl"
 
 
 @dataclass(frozen=True, slots=True)
 class FrameRow:
-    """What is noted of a frame.
+    """The ledger entry of a frame.
 
     Attributes
     ----------
     output : str
-        Its files in the run's folder, without their endings.
+        Its files in the run's folder, without extensions.
     stamp : str
-        What the frame was told by; another stamp is another frame.
+        Identifies the frame; another stamp means another frame.
     input : str
-        Picture or recording.
+        Image or recording.
     frame : int or None
-        Which of the recording's frames, from 0; None for a picture.
+        Index of the frame in the recording, from 0; None for an image.
     number, time_s : int or None, float or None
-        As :class:`~gelpolight_core.recording.recording.RecordedFrame` has them.
+        As in :class:`~gelpolight_core.recording.recording.RecordedFrame`.
     max_depth_mm : float or None
         Largest depth in the working area.
     volume_mm3 : float or None
@@ -41,15 +41,15 @@ class FrameRow:
     flagged_share : float or None
         Share of the working area whose depth is flagged, 0..1.
     notes : tuple of str
-        What is to be said of the result.
+        Notes on the result.
     measured : dict or None
-        The measurement, as ``measure --json`` writes it.
+        The measurement, as written by ``measure --json``.
     seconds : float
         Processor time.
     error : str
-        Why there is no result; empty where there is one.
+        Why there is no result; empty if there is one.
     ours : bool
-        Whether that is a fault of this program.
+        Whether it is an internal error of this program.
     """
 
     output: str
@@ -70,7 +70,7 @@ class FrameRow:
 
 @dataclass(slots=True)
 class _Place:
-    """Where a result's line begins in the file."""
+    """Position of a result's line in the file."""
 
     stamp: str
     offset: int
@@ -79,17 +79,17 @@ class _Place:
 
 
 class BatchLedger:
-    """The file of a run's rows; only their places are kept in memory.
+    """The file of a run's rows; only their positions are kept in memory.
 
     Parameters
     ----------
     path : Path
-        The file, made with the first row.
+        The file, created with the first row.
 
     Raises
     ------
     InputError
-        If the file is there and cannot be read.
+        If the file exists and cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -111,7 +111,7 @@ class BatchLedger:
         return place is not None and place.good and place.stamp == stamp
 
     def keep(self, rows: Sequence[FrameRow]) -> None:
-        """Write rows to the end of the file, and wait until the disk has them.
+        """Append rows to the file, and flush them to disk.
 
         Raises
         ------
@@ -128,12 +128,12 @@ class BatchLedger:
             self._note(row, len(line))
 
     def rows(self) -> Iterator[FrameRow]:
-        """Return the rows that count, by folder, input and frame, each read from the file.
+        """Return the valid rows, by folder, input and frame, each read from the file.
 
         Raises
         ------
         InputError
-            If the file cannot be read any more.
+            If the file can no longer be read.
         """
         places = sorted(self._places.values(), key=lambda place: place.order)
         if not places:
@@ -149,7 +149,7 @@ class BatchLedger:
             raise unreadable(error, self._path) from error
 
     def _take_in(self, line: bytes) -> None:
-        """Take in one line; what is none is passed over."""
+        """Index one line; an invalid line is skipped."""
         row = _unpacked(line)
         if row is None:
             self._end += len(line)
@@ -160,7 +160,7 @@ class BatchLedger:
     def _note(self, row: FrameRow, size: int) -> None:
         folder = row.output.rpartition("/")[0]
         frame = -1 if row.frame is None else row.frame
-        # A recording's frames are in their order, whatever their count of digits.
+        # Frames of a recording stay in order, whatever their number of digits.
         name = row.output if row.frame is None else row.input
         order = (folder, name, frame)
         self._places[row.output] = _Place(row.stamp, self._end, not row.error, order)
@@ -168,12 +168,12 @@ class BatchLedger:
 
 
 def _packed(row: FrameRow) -> bytes:
-    """Return a row as a line; numbers keep their last bit, as JSON writes them shortest."""
+    """Return a row as a line; JSON keeps the exact value of numbers."""
     return json.dumps(asdict(row), separators=(",", ":")).encode() + b"\n"
 
 
 def _unpacked(line: bytes) -> FrameRow | None:
-    """Return a line's row; None where it is no whole one."""
+    """Return the row of a line; None if the line is not complete."""
     if not line.endswith(b"\n"):
         return None
     try:

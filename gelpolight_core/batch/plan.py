@@ -1,4 +1,4 @@
-"""Which frames a run has: those of recordings, and pictures, each with a result of its own name."""
+"""The frames of a run: those of recordings, and images, each with its own result name."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.recording.recording import ENDING
-from gelpolight_core.session.session import SUFFIXES
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import SUFFIXES
 from gelpolight_core.translation import tr
 
 DIGITS = 6
-"""Of a frame's number in the name of its result, at least."""
+"""Least number of digits of a frame number in the name of its result."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One frame that is to be reconstructed.
+    """One frame to reconstruct.
 
     Attributes
     ----------
     path : Path
-        The picture, or the recording.
+        The image, or the recording.
     index : int or None
-        Which of the recording's frames, from 0; None for a picture.
+        Index of the frame in the recording, from 0; None for an image.
     output : str
-        Its files in the run's folder, without their endings.
+        Its files in the run's folder, without extensions.
     stamp : str
-        What tells it from another frame that takes its place later.
+        Distinguishes it from another frame that replaces it later.
     """
 
     path: Path
@@ -54,14 +54,14 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which frames of every recording, and pictures of every folder, are wanted.
+    """Selection of frames of every recording, and of images of every folder.
 
     Attributes
     ----------
     first, end : int, int or None
-        From `first`, counted from 0, up to but not with `end`; None: to the last.
+        From `first`, counted from 0, up to but not including `end`; None means to the last.
     every : int
-        Of these the first, and every so many-th after it.
+        Step: the first of these, and every n-th after it.
     """
 
     first: int = 0
@@ -69,13 +69,13 @@ class Selection:
     every: int = 1
 
     def of(self, count: int) -> range:
-        """Return the chosen ones of so many."""
+        """Return the selected indices for a number of frames."""
         return range(self.first, count if self.end is None else min(self.end, count), self.every)
 
 
 @dataclass(frozen=True, slots=True)
 class _Pictures:
-    """Pictures of one folder."""
+    """Images of one folder."""
 
     folder: Path
     names: tuple[str, ...]
@@ -93,14 +93,14 @@ class _Pictures:
         output = _joined(self.output, os.path.splitext(self.names[index])[0])
         try:
             found = path.stat()
-        except OSError:  # the worker says in its own words why it cannot be read
+        except OSError:  # the worker reports why it cannot be read
             return Job(path, None, output, "")
         return Job(path, None, output, f"{found.st_size} {found.st_mtime_ns}")
 
 
 @dataclass(frozen=True, slots=True)
 class _Frames:
-    """Frames of a recording; one that cannot be opened has a single frame, which tells so."""
+    """Frames of a recording; if it cannot be opened, a single frame that reports this."""
 
     path: Path
     output: str
@@ -121,16 +121,16 @@ class _Frames:
 
 @dataclass(frozen=True, slots=True)
 class BatchPlan:
-    """The frames of a run; none of them is read yet.
+    """The frames of a run; none of them has been read yet.
 
     Attributes
     ----------
     sources : tuple
-        Recordings, and folders of pictures.
+        Recordings, and image folders.
     selection : Selection
         Which of their frames.
     notes : tuple of str
-        What a person should know of them.
+        Notes for the user.
     """
 
     sources: tuple[_Pictures | _Frames, ...]
@@ -138,45 +138,45 @@ class BatchPlan:
     notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
-        """Return how many frames there are."""
+        """Return the number of frames."""
         return sum(len(self.selection.of(len(source))) for source in self.sources)
 
     def __iter__(self) -> Iterator[Job]:
-        """Return the frames one by one, made as they are asked for."""
+        """Yield the frames one by one."""
         for source in self.sources:
             for index in self.selection.of(len(source)):
                 yield source.job(index)
 
     @property
     def folders(self) -> set[str]:
-        """The folders of the results, in that of the run."""
+        """The folders of the results, relative to the folder of the run."""
         return {source.output for source in self.sources}
 
 
 def plan_batch(
     inputs: Sequence[Path], out: Path, calibration: Calibration, selection: Selection
 ) -> BatchPlan:
-    """Find the frames of recordings, pictures and folders, those in deeper folders included.
+    """Find the frames of recordings, images and folders, including subfolders.
 
-    A folder's results lie in a folder of its name in `out`, as deep as they did there; a
-    recording's in a folder of its name; those of a picture that is named itself in `out`.
+    Results of a folder go to a folder of the same name in `out`, with the same subfolders; those of
+    a recording to a folder of its name; those of an image given directly to `out`.
 
     Parameters
     ----------
     inputs : sequence of Path
-        Recordings, pictures, folders.
+        Recordings, images, folders.
     out : Path
-        Folder of the results; what lies in it is passed over.
+        Folder of the results; its content is not an input.
     calibration : Calibration
-        That the recordings have to match.
+        Must match the recordings.
     selection : Selection
         Which frames.
 
     Raises
     ------
     InputError
-        If an input is not there or lies in `out`, a recording is of another sensor or size, two
-        results would have one name, or there are no frames.
+        If an input does not exist or lies in `out`, a recording has another sensor or size, two
+        results would have the same name, or there are no frames.
     """
     found = _Found(out.resolve(), calibration)
     for path in inputs:
@@ -184,16 +184,16 @@ def plan_batch(
     plan = BatchPlan(tuple(found.sources), selection, tuple(found.notes))
     if not len(plan):
         raise InputError(
-            tr("there are no frames to reconstruct"),
+            tr("There are no frames to reconstruct"),
             where=", ".join(map(str, inputs)),
-            advice=tr("Name recordings, pictures (PNG or TIFF) or folders of them"),
+            advice=tr("Choose recordings, images (PNG or TIFF) or folders of them"),
         )
     _refuse_twins(plan)
     return plan
 
 
 class _Found:
-    """Gathers what the inputs hold."""
+    """Collects the contents of the inputs."""
 
     def __init__(self, out: Path, calibration: Calibration) -> None:
         self._out, self._calibration = out, calibration
@@ -201,17 +201,17 @@ class _Found:
         self.notes: list[str] = []
 
     def take(self, path: Path) -> None:
-        """Take in what a person named."""
+        """Add an input given by the user."""
         place = path.resolve()
         if not place.exists():
             raise InputError(
-                tr("there is no such file or folder"),
+                tr("The file or folder does not exist"),
                 where=str(path),
                 advice=tr("Check the name"),
             )
         if place.is_relative_to(self._out):
             raise InputError(
-                tr("the input lies in the folder of the results"),
+                tr("The input is inside the folder of the results"),
                 where=str(path),
                 advice=tr("Choose another folder for the results"),
             )
@@ -227,7 +227,7 @@ class _Found:
             self.sources.append(_Pictures(path.parent, (path.name,), ""))
 
     def _take_folder(self, folder: Path, output: str) -> None:
-        """Take in a folder and those in it; what is hidden is left out."""
+        """Add a folder and its subfolders; hidden ones are left out."""
         pictures, recordings, folders, others = [], [], [], 0
         with os.scandir(folder) as entries:
             for entry in entries:
@@ -247,9 +247,9 @@ class _Found:
             self._take_recording(folder / name, output)
         if others:
             self.notes.append(
-                tr("{folder}: {n} files are neither PNG, TIFF nor recordings, and left out").format(
-                    folder=folder, n=others
-                )
+                tr(
+                    "{folder}: {n} files are neither PNG, TIFF nor recordings and were left out"
+                ).format(folder=folder, n=others)
             )
         for name in sorted(folders):
             if (folder / name).resolve() != self._out:
@@ -259,7 +259,7 @@ class _Found:
         output = _joined(output, path.stem)
         try:
             recording = Recording.open(path)
-        except InputError:  # the one frame that stands for it tells why
+        except InputError:  # the single frame of this source reports the reason
             self.sources.append(_Frames(path, output))
             return
         with recording:
@@ -269,7 +269,7 @@ class _Found:
 
 
 def frame_stamp(started: str, number: int) -> str:
-    """Return what tells a recording's frame from others: when it was begun, and which it is."""
+    """Return the stamp of a recorded frame: start time of the recording, and frame number."""
     return f"{started} {number}"
 
 
@@ -278,12 +278,12 @@ def _seems_recording(path: Path) -> bool:
 
 
 def _goes_on(source: _Pictures | _Frames, path: Path) -> bool:
-    """Return whether a picture is of the same folder as the one that was named before it."""
+    """Return whether an image is in the same folder as the previous one."""
     return isinstance(source, _Pictures) and not source.output and source.folder == path.parent
 
 
 def _refuse_twins(plan: BatchPlan) -> None:
-    # Some disks ignore the case.
+    # Some file systems ignore upper and lower case.
     names = Counter(stem.casefold() for source in plan.sources for stem in source.stems)
     twins = [name for name, count in names.items() if count > 1]
     frames = {
@@ -291,22 +291,22 @@ def _refuse_twins(plan: BatchPlan) -> None:
         for source in plan.sources
         if isinstance(source, _Frames)
     }
-    for name in names:  # a picture may be called as a frame of the recording beside it
+    for name in names:  # an image may have the same name as a frame of a recording next to it
         stem, _, number = name.rpartition("_")
         if stem not in frames or not number.isdecimal():
             continue
         index = int(number)
         if number == f"{index:0{DIGITS}d}" and index in plan.selection.of(frames[stem]):
             raise InputError(
-                tr("a picture has the name of a frame's result: {name}").format(name=name),
+                tr("An image has the same name as the result of a frame: {name}").format(name=name),
                 where=tr("INPUT"),
-                advice=tr("Name its folder and the recording in runs of their own"),
+                advice=tr("Process its folder and the recording in separate runs"),
             )
     if twins:
         raise InputError(
-            tr("two inputs would have results named {name}").format(name=twins[0]),
+            tr("Two inputs would have results named {name}").format(name=twins[0]),
             where=tr("INPUT"),
-            advice=tr("Name their common folder in place of both, or use a folder for each run"),
+            advice=tr("Give their common folder instead, or use a separate folder for each run"),
         )
 
 

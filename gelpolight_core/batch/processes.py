@@ -1,7 +1,7 @@
-"""Workers on this machine: processes of one thread each.
+"""Workers on this machine: processes with one thread each.
 
-Not a pool of the standard library: when one of its processes is killed, it ends all the others and
-does not say whose frame it was.
+This is not a pool of the standard library: when one of its processes is killed, a pool ends all
+others and does not report whose frame it was.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from gelpolight_core.batch.stopping import Stopped
 from gelpolight_core.translation import tr
 
 LOOK_UP_S = 0.5
-"""How long a wish to stop may wait."""
+"""Longest delay until a request to stop is noticed."""
 DEATHS = 2
-"""A frame at which so many processes ended is left out."""
+"""A frame on which this many processes ended is left out."""
 THREADS = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -36,20 +36,20 @@ THREADS = (
     "BLIS_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
-"""What libraries read that would start threads of their own."""
+"""Environment variables of libraries that would start their own threads."""
 
 
 class ProcessRunner:
-    """Hands frames to processes of this machine.
+    """Sends frames to processes on this machine.
 
     Parameters
     ----------
     settings : BatchSettings
-        What the frames are done with.
+        Settings for the frames.
     out : Path
         Folder of the run.
     workers : int
-        Processes.
+        Number of processes.
     """
 
     def __init__(self, settings: BatchSettings, out: Path, workers: int) -> None:
@@ -58,7 +58,7 @@ class ProcessRunner:
     def __call__(
         self, jobs: Iterator[Job], count: int, stopped: Stopped
     ) -> Generator[list[Outcome], None, None]:
-        """Yield the outcomes as they come; once stopped, of the frames at hand only."""
+        """Yield the outcomes as they arrive; after a stop, only those of frames already begun."""
         crew = _Crew(partial(_begin, self._settings, self._out), jobs, stopped)
         try:
             crew.fill(min(self._workers, count))
@@ -80,7 +80,7 @@ class _Worker:
 
 
 class _Crew:
-    """The processes at work."""
+    """The running processes."""
 
     def __init__(
         self, begin: partial[tuple[SpawnProcess, Connection]], jobs: Iterator[Job], stopped: Stopped
@@ -91,14 +91,14 @@ class _Crew:
         self._deaths: Counter[str] = Counter()
 
     def fill(self, workers: int) -> None:
-        """Start processes while there are fewer than these, and frames for them."""
+        """Start processes up to the given number, as long as there are frames for them."""
         while len(self.busy) < workers and (job := self._next()) is not None:
             process, pipe = self._begin()
             self.busy[pipe] = _Worker(process, pipe, job)
             self._give(self.busy[pipe], job)
 
     def wait(self) -> list[Outcome]:
-        """Wait for outcomes for a while, and hand those who have one their next frame."""
+        """Wait for outcomes for a while, and give each free worker its next frame."""
         outcomes: list[Outcome] = []
         for pipe in wait(list(self.busy), LOOK_UP_S):
             assert isinstance(pipe, Connection)
@@ -117,7 +117,7 @@ class _Crew:
         return outcomes
 
     def end(self) -> None:
-        """End processes that are still at work, as after a second Ctrl-C."""
+        """Terminate running processes, as after a second Ctrl-C."""
         for worker in self.busy.values():
             worker.process.terminate()
             worker.process.join()
@@ -133,7 +133,7 @@ class _Crew:
         worker.job = job
         try:
             worker.pipe.send(job)
-        except OSError:  # it has just been killed; the next look at its pipe tells
+        except OSError:  # it was just killed; the next poll of its pipe detects this
             return
 
     def _dismiss(self, worker: _Worker) -> None:
@@ -142,7 +142,7 @@ class _Crew:
         worker.process.join()
 
     def _bury(self, worker: _Worker) -> list[Outcome]:
-        """Give a killed process's frame to another, unless it has been the end of several."""
+        """Give the frame of a killed process to another, unless it has ended several already."""
         self._dismiss(worker)
         job = worker.job
         self._deaths[job.output] += 1
@@ -153,8 +153,8 @@ class _Crew:
 
 
 def ended_workers() -> str:
-    """Return what is said of a frame that ends its workers."""
-    return tr("several processes ended while they worked on it; is there memory enough?")
+    """Return the message for a frame that ends its workers."""
+    return tr("Several processes ended while working on this frame; there may be too little memory")
 
 
 def _begin(settings: BatchSettings, out: Path) -> tuple[SpawnProcess, Connection]:
@@ -170,8 +170,8 @@ def _begin(settings: BatchSettings, out: Path) -> tuple[SpawnProcess, Connection
 
 
 def _serve(pipe: Connection, settings: BatchSettings, out: Path) -> None:
-    """Do frames until nobody asks for more; also when the leading process was killed."""
-    # Ctrl-C is for the process that leads: the frame at hand is brought to its end.
+    """Process frames until there are no more, or until the main process has ended."""
+    # The main process handles Ctrl-C: the present frame is completed.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         while True:
@@ -182,7 +182,7 @@ def _serve(pipe: Connection, settings: BatchSettings, out: Path) -> None:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Let a process that is started meanwhile find that libraries shall not start threads."""
+    """Prevent libraries in processes started meanwhile from starting their own threads."""
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))
     try:

@@ -1,9 +1,9 @@
-"""A run over many frames, which can be left at any time and gone on with.
+"""A run over many frames, which can be stopped at any time and resumed.
 
-    batch.json   batch.jsonl   batch.csv   FOLDER/PICTURE.npz   RECORDING/RECORDING_000000.npz ...
+    batch.json   batch.jsonl   batch.csv   FOLDER/IMAGE.npz   RECORDING/RECORDING_000000.npz ...
 
-``batch.json`` says what the frames are done with, ``batch.jsonl`` what was done; ``batch.csv`` is
-made from it at the end.
+``batch.json`` has the settings, ``batch.jsonl`` the completed frames; ``batch.csv`` is created from
+it at the end.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
 from gelpolight_core.batch.stopping import Stopped, never, workers_may_go_on
 from gelpolight_core.batch.summary import write_summary
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder
 from gelpolight_core.export.heightmap_files import ending
-from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.io.atomic import make_folder
+from gelpolight_core.io.lock import RunLock
 from gelpolight_core.translation import tr
 
 Runner = Callable[[Iterator[Job], int, Stopped], Generator[list[Outcome], None, None]]
-"""Does frames: takes them, their count and whether to stop; yields what became of them."""
+"""Processes frames: arguments are the frames, their count and whether to stop; yields outcomes."""
 
 
 @dataclass(frozen=True, slots=True)
 class BatchProgress:
-    """How far a run is.
+    """Progress of a run.
 
     Attributes
     ----------
     total, before : int
-        Frames of the plan, and those of them that were done before.
+        Frames of the plan, and those completed in earlier runs.
     done, bad, faults : int
-        Frames done now, frames without a result, and how many of these are faults of the program.
+        Frames completed now, frames without a result, and those of them with an internal error.
     row : FrameRow or None
-        The last one; None at the beginning.
+        The last frame; None at the beginning.
     """
 
     total: int
@@ -53,11 +53,11 @@ class BatchProgress:
 
     @property
     def left(self) -> int:
-        """Frames still to be done."""
+        """Number of frames not yet processed."""
         return self.total - self.before - self.done - self.bad
 
     def after(self, row: FrameRow) -> BatchProgress:
-        """Return how far it is with another frame."""
+        """Return the progress after another frame."""
         bad = bool(row.error)
         return BatchProgress(
             self.total,
@@ -70,7 +70,7 @@ class BatchProgress:
 
 
 def _tell_nobody(progress: BatchProgress) -> None:
-    """Let the work go on without a word."""
+    """Ignore progress."""
 
 
 def run_batch(
@@ -82,31 +82,31 @@ def run_batch(
     tell: Callable[[BatchProgress], None] = _tell_nobody,
     stopped: Stopped = never,
 ) -> BatchProgress:
-    """Do the frames of a plan that have no result yet; write the summary when none is left.
+    """Process the frames of a plan that have no result yet; write the summary when all are done.
 
-    A frame that could not be used is tried again when the run is gone on with.
+    A frame that could not be used is tried again when the run is resumed.
 
     Parameters
     ----------
     plan : BatchPlan
         The frames.
     settings : BatchSettings
-        What they are done with.
+        Settings for the frames.
     out : Path
-        Folder of the run, made when it is not there.
+        Folder of the run, created if it does not exist.
     runner : callable
-        What does them: a :class:`~gelpolight_core.batch.processes.ProcessRunner` or a
+        Processes the frames: a :class:`~gelpolight_core.batch.processes.ProcessRunner` or a
         :class:`~gelpolight_core.batch.cluster.ClusterRunner`.
     tell : callable, optional
-        Told how far it is, at the beginning and after each frame.
+        Called with the progress, at the beginning and after each frame.
     stopped : callable, optional
-        Whether to stop; the frames at hand are brought to their end.
+        Returns whether to stop; frames already begun are completed.
 
     Raises
     ------
     InputError
-        If the run in the folder was begun with other settings, another program works at it, or it
-        cannot go on, as on a full disk; what is done stays done.
+        If the run in the folder was started with other settings, another program is using it, or it
+        cannot continue, as on a full disk; completed frames are kept.
     """
     make_folder(out)
     with RunLock(out):
@@ -160,17 +160,17 @@ def _do(
 
 
 def _left_at(error: InputError, progress: BatchProgress) -> InputError:
-    """Return an error that also tells how far the run came."""
+    """Return an error that also reports the progress of the run."""
     return InputError(
         tr("{found}; {n} of {total} frames are done").format(
             found=error.found, n=progress.before + progress.done, total=progress.total
         ),
         where=error.where,
-        advice=tr("{advice}; the same command goes on from here").format(advice=error.advice),
+        advice=tr("{advice}. Run the same command again to continue").format(advice=error.advice),
     )
 
 
 def _remove_parts(folder: Path) -> None:
-    """Remove what killed processes left of files that they had not finished."""
+    """Remove incomplete files left by killed processes."""
     for path in folder.glob(".*.part"):
         path.unlink(missing_ok=True)

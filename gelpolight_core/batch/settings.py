@@ -1,4 +1,4 @@
-"""What the results of a run depend on; it stands in the run's folder, and may not change there."""
+"""The settings of a run, stored in its folder; they must not change there."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any, BinaryIO
 
 from gelpolight_core import __version__
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.reading import parse_json, read_file, unreadable
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.reading import parse_json, read_file, unreadable
 from gelpolight_core.translation import tr
 
 FILE = "batch.json"
@@ -20,22 +20,22 @@ VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class BatchSettings:
-    """What every frame of a run is done with.
+    """Settings for every frame of a run.
 
     Attributes
     ----------
     calibration : Path
-        Its file, as every worker finds it; it may move while its identity stays.
+        Its file, as every worker finds it; it may move if its identity stays.
     identity : str
-        Of the calibration.
+        Identity of the calibration.
     model, effort : str
         As for :class:`~gelpolight_core.reconstruction.reconstructor.Reconstructor`.
     formats : tuple of str
         Out of :data:`~gelpolight_core.export.heightmap_files.FORMATS`.
     shape : str or None
-        What is measured in every frame; None: nothing.
+        The shape measured in every frame; None for no measurement.
     program : str
-        Version that does it.
+        Version of the program.
     """
 
     calibration: Path
@@ -47,7 +47,7 @@ class BatchSettings:
     program: str = __version__
 
     def as_json(self) -> dict[str, Any]:
-        """Return what the results depend on as plain values."""
+        """Return the settings that affect the results as plain values."""
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -61,12 +61,12 @@ class BatchSettings:
 
 
 def begin_or_go_on(settings: BatchSettings, out: Path) -> None:
-    """Write the settings into a new run's folder, or compare them with those it was begun with.
+    """Write the settings of a new run, or compare them with those of an existing run.
 
     Raises
     ------
     InputError
-        If the run in the folder was begun with other settings, or the file cannot be read or
+        If the run in the folder was started with other settings, or the file cannot be read or
         written.
     """
     if (out / FILE).exists():
@@ -81,12 +81,12 @@ def begin_or_go_on(settings: BatchSettings, out: Path) -> None:
 
 
 def require_same(settings: BatchSettings, out: Path) -> None:
-    """Refuse settings that are not those of the run in a folder.
+    """Refuse settings that differ from those of the run in a folder.
 
     Raises
     ------
     InputError
-        If the folder holds no run, its file is damaged, or something in it is different.
+        If the folder contains no run, its file is damaged, or a setting differs.
     """
     begun = _read(out / FILE)
     wanted = settings.as_json()
@@ -94,11 +94,11 @@ def require_same(settings: BatchSettings, out: Path) -> None:
     if other:
         key = other[0]
         raise InputError(
-            tr("the run in this folder was begun with {what} {a}, and this is {b}").format(
+            tr("The run in this folder was started with {what} {a}, but now it is {b}").format(
                 what=key, a=_shown(begun.get(key)), b=_shown(wanted[key])
             ),
             where=str(out),
-            advice=tr("Give the same as at its beginning, or name a new folder"),
+            advice=tr("Use the same settings as at the start, or choose a new folder"),
         )
 
 
@@ -116,9 +116,9 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _damaged(path: Path) -> InputError:
     return InputError(
-        tr("the file is damaged"),
+        tr("The file is damaged"),
         where=str(path),
-        advice=tr("Put it back as it was written, or name a new folder"),
+        advice=tr("Restore it, or choose a new folder"),
     )
 
 

@@ -1,26 +1,26 @@
-"""A wish to stop: asked of whoever leads, and told to workers on other machines by a file."""
+"""Requests to stop: polled by the main process, and passed to remote workers by a file."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
-from gelpolight_core.export.atomic import cannot_write
+from gelpolight_core.io.atomic import cannot_write
 
 FILE = ".stop"
-"""In the run's folder; while it is there, workers begin no frame."""
+"""In the run's folder; while this file exists, workers begin no frame."""
 
 Stopped = Callable[[], bool]
-"""Returns whether no new frame shall be begun."""
+"""Returns whether no new frame may be begun."""
 
 
 def never() -> bool:
-    """Let a run come to its end."""
+    """Never stop the run."""
     return False
 
 
 def tell_workers(out: Path) -> None:
-    """Let no worker that sees a run's folder begin another frame.
+    """Prevent all workers that see a run's folder from beginning another frame.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def tell_workers(out: Path) -> None:
 
 
 def workers_may_go_on(out: Path) -> None:
-    """Take back what :func:`tell_workers` told, be it of an earlier run.
+    """Cancel the request of :func:`tell_workers`, also one from an earlier run.
 
     Raises
     ------
@@ -48,5 +48,5 @@ def workers_may_go_on(out: Path) -> None:
 
 
 def shall_stop(out: Path) -> bool:
-    """Return whether a worker shall begin no other frame."""
+    """Return whether a worker must not begin another frame."""
     return (out / FILE).exists()

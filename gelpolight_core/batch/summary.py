@@ -1,4 +1,4 @@
-"""The table of a run: a row per frame, made from nothing but the ledger."""
+"""The table of a run: one row per frame, created only from the ledger."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from gelpolight_core.batch.ledger import BatchLedger, FrameRow
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically
 
 FILE = "batch.csv"
 COLUMNS = (
@@ -25,18 +25,18 @@ COLUMNS = (
     "error",
 )
 MEASURED = ("shape", "diameter_mm", "side_mm", "height_mm", "centre_mm", "yaw_deg", "verdict")
-"""Columns besides, where something was measured."""
+"""Additional columns if something was measured."""
 
 
 def write_summary(ledger: BatchLedger, out: Path, *, measured: bool) -> Path:
-    """Write the table of all frames that were ever done in a run's folder.
+    """Write the table of all completed frames in a run's folder.
 
     Parameters
     ----------
     ledger : BatchLedger
-        Of the run.
+        Ledger of the run.
     out : Path
-        Its folder.
+        Folder of the run.
     measured : bool
         Whether there are columns for a measurement.
 
@@ -81,5 +81,5 @@ def _cell(value: object) -> str:
 
 
 def last_line(text: str) -> str:
-    """Return the last line, which in a fault's report says what it was."""
+    """Return the last line, which in the report of an error gives its cause."""
     return text.splitlines()[-1] if text else ""

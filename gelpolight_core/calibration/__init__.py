@@ -1,1 +1,1 @@
-"""The complete calibration of one sensor: its making and its file."""
+"""The complete calibration of one sensor: how it is made, and its file."""

@@ -1,15 +1,16 @@
-"""Pixels of the ball presses for the joint refinement: press over background, and the rays."""
+"""Pixels of the ball presses for the joint refinement: press over background, and camera rays."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.reflectance.press import LEAST_VALUE, SATURATED, BallPress
+from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
+from gelpolight_core.reflectance.surroundings import neighbourhood, view_directions
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -17,7 +18,8 @@ BOUNCE_REACH_MM = 1.0
 DRAPE_WIDTH_MM = 1.6
 EDGE_GAP_MM = 0.12
 PIXELS_PER_PART = 800
-# What a convex cap receives from its surroundings lies further off and is modelled less well.
+# Light that a convex cap receives from its surroundings comes from further away and is modelled
+# less well.
 CAP_TRUST = 0.3
 MODEL_ERROR = 0.01
 
@@ -29,11 +31,11 @@ class BallPixels:
     Attributes
     ----------
     points_mm, drift, view : (N, 2), (N, 2), (N, 3)
-        Rays, and unit directions back to the camera.
+        Camera rays (point and ray slope), and unit directions back to the camera.
     ratio, weight, around : (N, 3)
         Press over background, 1 / its standard deviation, and its average in the neighbourhood.
     radius_mm : float
-        Of the ball.
+        Radius of the ball.
     """
 
     points_mm: Array
@@ -43,22 +45,6 @@ class BallPixels:
     weight: Array
     around: Array
     radius_mm: float
-
-
-def view_directions(drift: Array) -> Array:
-    """Return unit directions (..., 3) back along the rays, from their drift (..., 2)."""
-    view = np.concatenate([drift, -np.ones_like(drift[..., :1])], axis=-1)
-    return np.asarray(view / np.linalg.norm(view, axis=-1, keepdims=True))
-
-
-def neighbourhood(ratio: Map, valid: NDArray[np.bool_], pitch_mm: float, reach_mm: float) -> Map:
-    """Return press over background, averaged over a Gaussian; 1 where it is not known."""
-    known = np.clip(np.where(valid[..., None], ratio, 1.0), 0.0, 4.0).astype(np.float32)
-    factor = max(int(reach_mm / pitch_mm / 4.0), 1)
-    rows, columns = valid.shape
-    small = cv2.resize(known, (columns // factor, rows // factor), interpolation=cv2.INTER_AREA)
-    small = cv2.GaussianBlur(small, (0, 0), reach_mm / pitch_mm / factor)
-    return np.asarray(cv2.resize(small, (columns, rows), interpolation=cv2.INTER_LINEAR))
 
 
 def gather_ball_pixels(
@@ -74,7 +60,7 @@ def gather_ball_pixels(
     Parameters
     ----------
     press : BallPress
-        The ball as found.
+        The detected ball.
     picture, background : (rows, columns, 3) float32
         Resampled, crosstalk removed.
     table : ResamplingTable
@@ -99,8 +85,8 @@ def gather_ball_pixels(
     )
     chosen, trust = [], []
     for part, low, high in parts:
-        places = np.flatnonzero((usable & (away >= low) & (away < high)).ravel())
-        chosen.append(random.permutation(places)[:PIXELS_PER_PART])
+        indices = np.flatnonzero((usable & (away >= low) & (away < high)).ravel())
+        chosen.append(random.permutation(indices)[:PIXELS_PER_PART])
         trust.append(np.full((chosen[-1].size, 1), part))
     rows, columns = np.unravel_index(np.concatenate(chosen), away.shape)
     value = picture[rows, columns].astype(np.float64)

@@ -1,69 +1,82 @@
-"""How far every depth of a calibrated sensor may be off by one common share.
+"""Common relative error of all depths of a calibrated sensor.
 
-Three parts, independent of each other. (1) A press is shaded by the calibrated sensor itself, with
-the formulae of the joint refinement, and is reconstructed by sensors whose LEDs and membrane are
-moved as far as the refinement leaves them open. (2) What no choice of LEDs and membrane explains
-shows where ball presses are reconstructed like any other: their height should be the one that
-their known radius asks for. (3) The lateral scale, since depth is slope times length.
+It has three independent parts. (1) A press is shaded by the calibrated sensor itself, with the
+formulae of the joint refinement, and is reconstructed by sensors whose LEDs and membrane are moved
+within the uncertainty of the refinement. (2) Errors that no choice of LEDs and membrane explains
+appear when ball presses are reconstructed: their height should match their known radius. (3) The
+lateral scale, since depth is slope times length.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.ball_pixels import neighbourhood, view_directions
-from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.calibration.joint_problem import COMMON, bent_curves
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
-from gelpolight_core.reconstruction.full import coarse_depth, shaded_field
-from gelpolight_core.reconstruction.near_light import ShadedField, solve_near_light
-from gelpolight_core.reconstruction.weighted import integrate_weighted
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.near_light.kernel import solve_rows
+from gelpolight_core.reconstruction.near_light.maps import (
+    COARSE,
+    kinds,
+    membrane_numbers,
+    middles,
+    sensor_scale,
+)
+from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
+from gelpolight_core.reconstruction.near_light.structures import Picture, Scale, Steps, slopes_like
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.membrane import bounce_weight
+from gelpolight_core.reflectance.surroundings import neighbourhood, view_directions
+from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-# A common press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
+# A typical press: 5 mm wide and 1 mm deep in a working circle of 26 mm.
 PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
-# Enough nodes for a plateau's median; more only cost time.
+# Enough nodes for the median of a plateau; more only cost time.
 NODES = 160
 NOISE = 0.003
 ROUNDS = 2
-# Below this the half difference of two depths is rounding.
+# Small differences of depths are compared.
+STEPS, SETTLED, TOLERANCE = 10, 1e-4, 1e-4
+# Below this, half the difference of two depths is rounding error.
 LEAST_SHARE = 1e-6
-# Ball tops within this radius (mm) are compared; beyond, the cap's slope weighs in.
+# Ball tops within this radius (mm) are compared; further out the slope of the cap has too much
+# weight.
 TOP_MM = 0.3
 
 
 def ball_height_error(
-    calibration: Calibration, pictures: Sequence[Map], balls: Sequence[BallPose]
+    calibration: Calibration, images: Sequence[Map], balls: Sequence[BallPose]
 ) -> float:
-    """Return the relative error (root mean square) of ball presses that are reconstructed.
+    """Return the relative error (root mean square) of reconstructed ball presses.
 
     Parameters
     ----------
     calibration : Calibration
         With its full model.
-    pictures : sequence of (height, width, 3) float32
-        Raw pictures of ball presses.
+    images : sequence of (height, width, 3) float32
+        Raw images of ball presses, linear light.
     balls : sequence of BallPose
-        Where the joint refinement has them.
+        Poses from the joint refinement.
     """
     assert calibration.full is not None
-    table = calibration.table
+    solver = NearLightSolver(calibration, calibration.full, workers=1)
+    scale, grid = solver.maps.scale(COARSE), calibration.table.grid
+    points = np.stack(np.meshgrid(middles(grid.x_mm, COARSE), middles(grid.y_mm, COARSE)), axis=-1)
+    rays = np.moveaxis(scale.rays[:2], 0, -1)
     errors = []
-    for rgb, ball in zip(pictures, balls, strict=True):
-        field = shaded_field(rgb, calibration, calibration.full)
-        depth, _ = coarse_depth(field, calibration.full, table.grid.pitch_mm, 1)
-        place = table.grid.points_mm() + depth[..., None] * table.drift
-        away = np.hypot(place[..., 0] - ball.centre_mm[0], place[..., 1] - ball.centre_mm[1])
-        top = (away < TOP_MM) & field.usable
+    for rgb, ball in zip(images, balls, strict=True):
+        depth = solver.coarse_depth(rgb)
+        away = np.linalg.norm(points + depth[..., None] * rays - ball.centre_mm, axis=-1)
+        top = (away < TOP_MM) & (scale.kind == 2)
         if top.any():
             true = ball.depth_mm - ball.radius_mm + np.sqrt(ball.radius_mm**2 - away[top] ** 2)
             errors.append(float(np.median(depth[top] - true)) / ball.depth_mm)
@@ -73,17 +86,18 @@ def ball_height_error(
 def lateral_scale_sd(stack: LayerStack, distance_sd_mm: float, focal_sd: float) -> float:
     """Return the relative standard deviation of lengths on the membrane.
 
-    The board on the top surface ties distance and focal length together: an error of both alike
-    moves the lateral scale only as far as refraction lifts the surface.
+    The board on the top surface ties distance and focal length together: a common error of both
+    changes the lateral scale only as far as refraction shifts the surface.
 
     Parameters
     ----------
     stack : LayerStack
-        Between camera and top surface.
+        Layers between camera and top surface.
     distance_sd_mm : float
-        Of the top surface, the focal length's share included.
+        Standard deviation of the distance of the top surface, including the effect of the focal
+        length.
     focal_sd : float
-        Relative.
+        Relative standard deviation of the focal length.
     """
     pairs = list(zip(stack.thicknesses_mm, stack.indices, strict=True))
     distance, apparent = sum(t for t, _ in pairs), sum(t / n for t, n in pairs)
@@ -101,8 +115,9 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
     table : ResamplingTable
         Grid and rays.
     covariance : (15, 15) or (27, 27)
-        Of the joint refinement's shared parameters, in their order: LEDs (9), exponent, gloss,
-        roughness, bounce of the balls' caps, bounce, decay length, heights of the curves.
+        Covariance of the shared parameters of the joint refinement, in their order: LEDs (9),
+        exponent, gloss, roughness, interreflection on the ball caps, interreflection, decay length,
+        heights of the curves.
     """
     field, depth, plateau = synthetic_press(full, table)
     height = np.median(depth[plateau])
@@ -112,24 +127,48 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
         step = np.sqrt(max(float(size), 0.0)) * direction
         if np.abs(step).max() < LEAST_SHARE:
             continue
-        ends = [_depth(_moved(full, sign * step), field, depth)[plateau] for sign in (1.0, -1.0)]
+        ends = [
+            found_depth(_moved(full, sign * step), field, depth)[plateau] for sign in (1.0, -1.0)
+        ]
         share += float((np.median(ends[0]) - np.median(ends[1])) / (2.0 * height)) ** 2
     return float(np.sqrt(share))
 
 
+class SyntheticPress(NamedTuple):
+    """Simulated view of a press by the calibrated sensor.
+
+    Attributes
+    ----------
+    picture : Picture
+        Press over background.
+    x_mm, y_mm : (columns,), (rows,)
+        Nodes.
+    ray_slope : (2, rows, columns)
+        Slopes of the camera rays.
+    usable : (rows, columns) bool
+        Visible nodes.
+    """
+
+    picture: Picture
+    x_mm: Array
+    y_mm: Array
+    ray_slope: Map
+    usable: NDArray[np.bool_]
+
+
 def synthetic_press(
     full: FullModel, table: ResamplingTable
-) -> tuple[ShadedField, Map, NDArray[np.bool_]]:
+) -> tuple[SyntheticPress, Map, NDArray[np.bool_]]:
     """Shade a round plateau with its drape, as the calibrated sensor would see it.
 
     Returns
     -------
-    field : ShadedField
+    field : SyntheticPress
         On a coarse grid.
     depth_mm : (rows, columns) float32
         True depth along the rays.
     plateau : (rows, columns) bool
-        Nodes that see the plateau.
+        Nodes on the plateau.
     """
     stride = max(min(table.grid.shape) // NODES, 1)
     grid, cut = table.grid, np.s_[::stride, ::stride]
@@ -144,27 +183,20 @@ def synthetic_press(
     for _ in range(12):  # damped: a ray's slope against the drape stays below 1
         r = np.linalg.norm(points + depth[:, None] * rays - centre, axis=1)
         depth = 0.5 * (depth + height * np.exp(-np.maximum(r - radius, 0.0) / full.decay_mm))
-    place = points + depth[:, None] * rays
-    away = place - centre
+    position = points + depth[:, None] * rays
+    away = position - centre
     r = np.linalg.norm(away, axis=1)
     steep = np.where(r > radius, -depth / full.decay_mm, 0.0) / np.maximum(r, 1e-9)
     normals = np.concatenate([-steep[:, None] * away, -np.ones((len(r), 1))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     shape = usable.shape
     ratio, around = _shaded(
-        full, (points, rays, place, depth, normals), usable, stride, grid.pitch_mm
+        full, (points, rays, position, depth, normals), usable, stride, grid.pitch_mm
     )
-    field = ShadedField(
-        ratio,
-        np.full((*shape, 3), NOISE, np.float32),
-        around,
-        np.zeros((*shape, 3), bool),
-        usable,
-        usable,
-        np.ascontiguousarray(drift),
-        x,
-        y,
-    )
+    planes = [np.ascontiguousarray(np.moveaxis(m, -1, 0)) for m in (ratio, around)]
+    noise = np.full_like(planes[0], NOISE)
+    image = Picture(planes[0], noise, planes[1], np.zeros(shape, np.uint8))
+    field = SyntheticPress(image, x, y, np.moveaxis(drift, -1, 0), usable)
     return field, depth.reshape(shape).astype(np.float32), (r < radius).reshape(shape) & usable
 
 
@@ -176,11 +208,11 @@ def _shaded(
     pitch_mm: float,
 ) -> tuple[Map, Map]:
     """Return press over background and its average in the neighbourhood."""
-    points, rays, place, depth, normals = seen
+    points, rays, position, depth, normals = seen
     view = view_directions(rays)
     flat = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
     light, distance = light_directions(
-        full.led_positions_mm, np.concatenate([place, -depth[:, None]], axis=1)
+        full.led_positions_mm, np.concatenate([position, -depth[:, None]], axis=1)
     )
     flat_light, flat_distance = light_directions(full.led_positions_mm, flat)
     up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
@@ -210,12 +242,35 @@ def _moved(full: FullModel, step: Array) -> FullModel:
     return replace(full, led_positions_mm=leds, membrane=membrane)
 
 
-def _depth(full: FullModel, field: ShadedField, depth_mm: Map) -> Map:
-    """Return the depth that a sensor finds, from near the true one."""
+def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
+    """Return the depth that a sensor reconstructs, starting near the true one.
+
+    Parameters
+    ----------
+    full : FullModel
+        The reconstructing sensor.
+    field : SyntheticPress
+        The simulated view.
+    depth_mm : (rows, columns) float32
+        Start values.
+    """
+    scale = _scale(full, field)
+    membrane, steps = membrane_numbers(full), Steps(STEPS, SETTLED**2, True, False)
     for _ in range(ROUNDS):
-        slopes = solve_near_light(field, depth_mm, full.led_positions_mm, full.membrane)
-        pitch = float(field.x_mm[1] - field.x_mm[0])
+        slopes = slopes_like(depth_mm)
+        rows = len(depth_mm)
+        solve_rows(0, rows, field.picture, depth_mm, scale, (0, 0), membrane, steps, slopes)
         depth_mm = integrate_weighted(
-            slopes.slope_x, slopes.slope_y, slopes.weight, pitch_mm=pitch, start_mm=depth_mm
+            slopes.slope_x,
+            slopes.slope_y,
+            slopes.weight,
+            pitch_mm=scale.pitch_mm,
+            start_mm=depth_mm,
+            tolerance=TOLERANCE,
         ).depth_mm
     return depth_mm
+
+
+def _scale(full: FullModel, field: SyntheticPress) -> Scale:
+    kind = kinds(field.usable, field.usable, 1)
+    return sensor_scale(full, (field.x_mm, field.y_mm), field.ray_slope, kind, factor=1)

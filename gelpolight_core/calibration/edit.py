@@ -1,4 +1,4 @@
-"""The reflectance table, changed by hand."""
+"""Edit the reflectance table by hand."""
 
 from __future__ import annotations
 
@@ -8,45 +8,45 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import Calibration, HandEdit
+from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import flat_cosines
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 from gelpolight_core.reflectance.table import LEAST_STEP, ReflectanceTable
+from gelpolight_core.sensor_calibration import Calibration, HandEdit
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Curve = tuple[Array, Array]
-CHANNELS = ("red", "green", "blue")
-# Below this share of a curve's brightest value its relative change means nothing.
+# Below this share of a curve's brightest value, its relative change is meaningless.
 LEAST_SHARE = 0.01
 
 
 def edited(
     calibration: Calibration, curves: Mapping[int, Curve], *, operator: str, made: str
 ) -> Calibration:
-    """Return the calibration with reflectance curves that a person drew.
+    """Return the calibration with reflectance curves drawn by the user.
 
-    The paper's model uses the curve as it is drawn. The full model's diffuse share is multiplied by
-    what was changed, new curve over old; its gloss stays. The reflectance factors (Eq. 9) follow,
-    so that the bare membrane stays flat, whatever the curve says of it.
+    The paper's model uses the curve as drawn. In the full model the diffuse share is multiplied by
+    the change, new curve over old; its gloss stays. The reflectance factors (Eq. 9) are updated, so
+    that the bare membrane stays flat for any curve.
 
     Parameters
     ----------
     calibration : Calibration
-        To be changed; the result is another.
+        The original, which is not modified.
     curves : mapping of int to (cosines, values)
         By channel (0 red, 1 green, 2 blue), nodes (N,) of G: cosines from 0 to 1, processed values
-        I / (rho |L|). Channels that are left out, or not changed, stay.
+        I / (rho |L|). Channels that are missing, or not changed, stay.
     operator : str
-        Who did it.
+        Name of the user.
     made : str
-        When: ISO 8601 time with zone.
+        ISO 8601 time with zone.
 
     Raises
     ------
     InputError
-        If a curve is not finite, does not reach from 0 to 1, or does not rise everywhere.
+        If a curve is not finite, does not span 0 to 1, or does not increase everywhere.
     """
     old = calibration.reflectance
     cosines, values = list(old.cosines), list(old.values)
@@ -72,7 +72,7 @@ def edited(
     if full is not None:
         middle = flat[flat.shape[0] // 2, flat.shape[1] // 2]
         full = replace(full, membrane=edited_membrane(full.membrane, old, new, changed, middle))
-    edit = HandEdit("reflectance", tuple(CHANNELS[k] for k in changed), made, operator)
+    edit = HandEdit("reflectance", tuple(CHANNEL_KEYS[k] for k in changed), made, operator)
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
     return replace(calibration, reflectance=new, factors=factors, full=full, provenance=provenance)
 
@@ -89,14 +89,14 @@ def edited_membrane(
     Parameters
     ----------
     membrane : Membrane
-        Before.
+        The original membrane.
     old, new : ReflectanceTable
         Before and after.
     channels : list of int
-        Which were changed.
+        The edited channels.
     flat_cosine : (3,)
-        Of each light on the flat membrane: as the picture without contact is what a press is
-        compared with, a curve's height means nothing; the share keeps its brightness here.
+        Cosine of each light on the flat membrane. Presses are compared with the contact-free image,
+        so the height of a curve has no meaning; the share keeps its brightness at this cosine.
     """
     even = np.linspace(0.0, 1.0, CURVE_NODES)
     share = membrane.diffuse_share(np.repeat(even[:, None], 3, axis=1)).T
@@ -112,29 +112,29 @@ def edited_membrane(
 
 
 def table_membrane(table: ReflectanceTable) -> Membrane:
-    """Return the paper's one-dimensional membrane: a table as it is, without gloss or bounce."""
+    """Return the paper's one-dimensional membrane: no gloss, no interreflection."""
     even = np.linspace(0.0, 1.0, CURVE_NODES)
     curves = [table.response(k, even) / table.values[k][-1] for k in range(3)]
     return Membrane(diffuse=tuple(tuple(curve.tolist()) for curve in curves))
 
 
 def _checked(channel: int, curve: Curve) -> Curve:
-    """Return a curve's nodes as float64, or say what is wrong with them."""
+    """Return a curve's nodes as float64, or raise an error that says what is wrong."""
     if channel not in range(3):
         raise ValueError(f"channel {channel}")
     nodes, shown = (np.array(part, np.float64) for part in curve)
     if nodes.ndim != 1 or nodes.shape != shown.shape or nodes.size < 2:
-        found = tr("the curve has {n} cosines and {m} values").format(n=nodes.size, m=shown.size)
+        found = tr("The curve has {n} cosines and {m} values").format(n=nodes.size, m=shown.size)
     elif not (np.isfinite(nodes).all() and np.isfinite(shown).all()):
-        found = tr("the curve holds values that are no numbers")
+        found = tr("The curve contains values that are not numbers")
     elif nodes[0] != 0.0 or nodes[-1] != 1.0 or (np.diff(nodes) <= 0.0).any():
-        found = tr("the curve's cosines do not rise from 0 to 1")
+        found = tr("The cosines of the curve do not increase from 0 to 1")
     elif shown[0] < 0.0 or (np.diff(shown) <= 0.0).any():
-        found = tr("the curve does not rise everywhere from 0 or above")
+        found = tr("The curve does not increase everywhere from 0 or above")
     else:
         return nodes, shown
     raise InputError(
         found,
-        where=tr("reflectance, {name} channel").format(name=tr(CHANNELS[channel])),
-        advice=tr("Move the nodes so that brightness grows with the cosine"),
+        where=tr("reflectance, {name} channel").format(name=channel_name(channel)),
+        advice=tr("Move the nodes so that brightness increases with the cosine"),
     )

@@ -1,8 +1,8 @@
-"""The calibration file (.gplcal): a zip of a manifest and plain arrays, checked whole.
+"""The calibration file (.gplcal): a zip archive of a manifest and plain arrays, checked completely.
 
-``manifest.json`` holds every number that is not an array, with units in the key names, and the
-SHA-256, shape and kind of every array; the arrays are NumPy files without pickle. The file is
-written whole or not at all, and a damaged one is refused before anything of it is used.
+``manifest.json`` contains every number that is not an array, with units in the key names, and the
+SHA-256, shape and type of every array; the arrays are NumPy files without pickle. The file is
+written completely or not at all, and a damaged one is refused before any part of it is used.
 """
 
 from __future__ import annotations
@@ -12,18 +12,20 @@ import io
 import json
 import zipfile
 from dataclasses import asdict
+from os import PathLike
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import MODELS, Calibration, HandEdit, Provenance
+from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.calibration.file_full import full_arrays, full_entry, read_full
 from gelpolight_core.calibration.manifest import (
     FORMAT,
     HEAD_LIMIT,
     MANIFEST,
+    OPEN_VERSION,
     UNREADABLE,
     VERSION,
     damaged,
@@ -34,42 +36,61 @@ from gelpolight_core.calibration.manifest import (
     read_quality,
     refuse_bomb,
 )
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.export.npy import array_of
+from gelpolight_core.image.file import MAX_PIXELS
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.npy import array_of
+from gelpolight_core.io.reading import brief, plain_text, written_text
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import MembraneGrid, visible_grid
-from gelpolight_core.reading import brief, plain_text, written_text
+from gelpolight_core.reconstruction.in_place.calibration import (
+    MODEL,
+    AnyCalibration,
+    InPlaceCalibration,
+    in_place_arrays,
+    in_place_entry,
+    read_in_place,
+    require_open,
+)
 from gelpolight_core.reflectance.table import ReflectanceTable
-from gelpolight_core.response.curve import CameraResponse
+from gelpolight_core.sensor_calibration import MODELS, Calibration, HandEdit, Provenance
 from gelpolight_core.session.session import SENSOR_RANGES, SensorData
-from gelpolight_core.session.wholeness import MAX_PIXELS
 
 NODES_LIMIT = 10_000
+BAD_PIXELS = "bad_pixels"
 LEAST_BACKGROUND = -0.2
 MOST_CROSSTALK = 100.0
 # A fixed time stamp: the same calibration gives the same bytes.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
 
-def write_calibration(calibration: Calibration, path: Path, *, new: bool = False) -> None:
+def write_calibration(
+    calibration: AnyCalibration, path: str | PathLike[str], *, new: bool = False
+) -> None:
     """Write a calibration file, whole or not at all.
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : Calibration or InPlaceCalibration
         To be written.
-    path : Path
-        Where.
+    path : path
+        The file, usually ``*.gplcal``.
     new : bool, optional
-        Whether it never takes the place of another file.
+        Refuse to replace an existing file.
 
     Raises
     ------
     NameTakenError
-        If it is to be new and there is a file of its name.
+        If `new` is set and the file exists.
     InputError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> calibration = gp.read_calibration("sensor.gplcal")
+    >>> gp.write_calibration(calibration, "copy.gplcal")
     """
     arrays = _arrays_of(calibration)
     encoded = {name: _encode(array) for name, array in arrays.items()}
@@ -94,18 +115,26 @@ def write_calibration(calibration: Calibration, path: Path, *, new: bool = False
             ):
                 archive.writestr(zipfile.ZipInfo(name, ZIP_TIME), data, zipfile.ZIP_DEFLATED)
 
-    write_atomically(path, write, new=new)
+    write_atomically(Path(path), write, new=new)
 
 
-def read_calibration(path: Path) -> Calibration:
+def read_calibration(path: str | PathLike[str]) -> AnyCalibration:
     """Read a calibration file and check all of it.
 
     Raises
     ------
     InputError
-        If the file is missing, damaged, truncated, of a newer version, or holds values that no
-        calibration has.
+        If the file is missing, damaged, truncated or of a newer version, or holds impossible
+        values.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> calibration = gp.read_calibration("sensor.gplcal")
+    >>> calibration.model
+    'full'
     """
+    path = Path(path)
     try:
         with opened(path) as archive:
             manifest = read_manifest(archive, path)
@@ -119,13 +148,26 @@ def read_calibration(path: Path) -> Calibration:
         raise damaged(path, error) from error
 
 
+def read_open_calibration(path: Path) -> Calibration:
+    """Read the calibration of an open sensor, for work that needs its optics and lights.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_calibration`; or if the calibration is of a closed sensor.
+    """
+    return require_open(read_calibration(path), where=str(path))
+
+
 def _encode(array: NDArray[Any]) -> bytes:
     buffer = io.BytesIO()
     np.save(buffer, np.ascontiguousarray(array), allow_pickle=False)
     return buffer.getvalue()
 
 
-def _arrays_of(c: Calibration) -> dict[str, NDArray[Any]]:
+def _arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
+    if isinstance(c, InPlaceCalibration):
+        return in_place_arrays(c)
     arrays: dict[str, NDArray[Any]] = {
         "led_positions_mm": c.led_positions_mm,
         "led_covariance_mm2": c.led_covariance_mm2,
@@ -142,34 +184,37 @@ def _arrays_of(c: Calibration) -> dict[str, NDArray[Any]]:
         arrays |= full_arrays(c.full)
     if c.response is not None:
         arrays["camera_response"] = c.response.curves
+    if c.bad is not None:
+        # Older programs read this file too, and know arrays of floats only.
+        arrays[BAD_PIXELS] = c.bad.places.astype(np.float32)
     return arrays
 
 
-def _manifest_of(c: Calibration) -> dict[str, Any]:
+def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
     manifest = {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION if isinstance(c, InPlaceCalibration) else OPEN_VERSION,
         "identity": c.identity,
         "model": c.model,
         "units": {"length": "mm", "picture": "linear light 0..1", "camera": "px"},
+        "grid": _grid_entry(c.table.grid),
+        "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
+        "provenance": asdict(c.provenance),
+    }
+    if isinstance(c, InPlaceCalibration):
+        return manifest | in_place_entry(c)
+    manifest |= {
         "sensor": asdict(c.sensor),
         "camera": asdict(c.camera),
         "plane": asdict(c.plane),
-        "grid": _grid_of(c),
-        "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
-        "provenance": asdict(c.provenance),
     }
     if c.full is not None:
         manifest["full"] = full_entry(c.full)
     return manifest
 
 
-def _grid_of(c: Calibration) -> dict[str, Any]:
-    """Return where the maps' nodes lie; the grid is made anew on reading and must be the same."""
-    return _grid_entry(c.table.grid)
-
-
 def _grid_entry(grid: MembraneGrid) -> dict[str, Any]:
+    """Return the position of the maps' nodes; the grid is recomputed on reading and must match."""
     return {
         "rows": grid.shape[0],
         "columns": grid.shape[1],
@@ -185,12 +230,16 @@ def _read_array(archive: zipfile.ZipFile, name: str, entry: dict[str, Any]) -> N
         raise ValueError(f"the checksum of {name} is wrong")
     array = array_of(data)
     if list(array.shape) != entry["shape"] or array.dtype.str != entry["kind"]:
-        raise ValueError(f"{name} is {array.dtype} {array.shape}")
+        raise ValueError(f"{name} has the type {array.dtype} and the shape {array.shape}")
     return array.copy()
 
 
-def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibration:
+def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> AnyCalibration:
     model = manifest["model"]
+    if model == MODEL:
+        plain_text(manifest["sensor"]["serial"])
+        quality = {stage: read_quality(rows) for stage, rows in manifest["quality"].items()}
+        return read_in_place(manifest, arrays, quality, _read_provenance(manifest["provenance"]))
     if model not in MODELS:
         raise ValueError(f"unknown model {model!r}")
     camera = dict(manifest["camera"])
@@ -215,6 +264,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
         provenance=_read_provenance(manifest["provenance"]),
         full=read_full(manifest["full"], arrays) if "full" in manifest else None,
         response=_read_response(arrays.get("camera_response")),
+        bad=_read_bad_pixels(arrays.get(BAD_PIXELS), camera["height"], camera["width"]),
     )
     _check(calibration)
     _check_grid(calibration, manifest["grid"])
@@ -223,7 +273,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Calibra
 
 
 def _read_sensor(entry: dict[str, Any]) -> SensorData:
-    """Return what is stated of the sensor, in the ranges in which a session states it."""
+    """Return the stated sensor data, checked against the ranges of a session."""
     sensor = SensorData(**entry)
     plain_text(sensor.serial)
     for name, (low, high) in SENSOR_RANGES.items():
@@ -233,17 +283,17 @@ def _read_sensor(entry: dict[str, Any]) -> SensorData:
             or not isinstance(value, int | float)
             or not low <= value <= high
         ):
-            raise ValueError(f"{name} is {brief(value)}")
+            raise ValueError(f"{name} has the invalid value {brief(value)}")
     return sensor
 
 
 def _check_grid(calibration: Calibration, stated: dict[str, Any]) -> None:
-    """Compare the grid that the optics give with the stated one, before anything is made on it."""
+    """Compare the grid given by the optics with the stored one, before it is used."""
     c = calibration
     grid = visible_grid(c.camera, c.plane, c.stack, diameter_mm=c.sensor.working_diameter_mm)
     made = _grid_entry(grid)
     if not np.allclose([float(stated[key]) for key in made], list(made.values()), atol=1e-6):
-        raise ValueError("the maps lie on another grid than this program makes")
+        raise ValueError("the grid of the maps differs from the grid of this program")
     if c.radiance.shape != (*grid.shape, 3):
         raise ValueError("radiance does not fit the optics")
 
@@ -256,7 +306,7 @@ def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
         if not sized or not (np.diff(nodes) > 0).all():
             raise ValueError("the reflectance table is not monotone")
     if any(c.size != v.size for c, v in zip(cosines, values, strict=True)):
-        raise ValueError("the reflectance table's columns differ in length")
+        raise ValueError("the columns of the reflectance table differ in length")
     return ReflectanceTable(
         (cosines[0], cosines[1], cosines[2]),
         (values[0], values[1], values[2]),
@@ -266,6 +316,15 @@ def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
 
 def _read_response(curves: NDArray[Any] | None) -> CameraResponse | None:
     return None if curves is None else CameraResponse(curves.astype(np.float64))
+
+
+def _read_bad_pixels(places: NDArray[Any] | None, height: int, width: int) -> BadPixels | None:
+    """Return the bad pixels; None in files without, which older programs wrote."""
+    if places is None:
+        return None
+    if not np.isfinite(places).all() or (places != np.rint(places)).any():
+        raise ValueError("bad pixels are not whole numbers")
+    return BadPixels(places.astype(np.int32), height, width)
 
 
 def _read_provenance(entry: dict[str, Any]) -> Provenance:
@@ -288,20 +347,20 @@ def _read_edit(entry: dict[str, Any]) -> HandEdit:
 
 
 def _check(calibration: Calibration) -> None:
-    """Refuse values that no calibration has, whatever the checksums say."""
+    """Refuse impossible values, even if the checksums are correct."""
     c = calibration
     lengths = [c.camera.width, c.camera.height, c.camera.fx, c.camera.fy, c.plane.distance_mm]
     numbers = np.array(
         [*lengths, c.camera.cx, c.camera.cy, *c.camera.distortion, *c.plane.normal_camera], float
     )
     if not np.isfinite(numbers).all() or min(lengths) <= 0:
-        raise ValueError("camera or plane is not possible")
+        raise ValueError("camera or plane have impossible values")
     if type(c.camera.width) is not int or type(c.camera.height) is not int:
-        raise ValueError("the picture size is not whole")
+        raise ValueError("the image size is not a whole number")
     if c.camera.width * c.camera.height > MAX_PIXELS:
-        raise ValueError("the picture size is too large")
+        raise ValueError("the image size is too large")
     if abs(float(np.linalg.norm(c.plane.normal_camera)) - 1.0) > 1e-6:
-        raise ValueError("the plane's normal is not of length 1")
+        raise ValueError("the normal of the plane does not have length 1")
     expected = {
         "led_positions_mm": ((3, 3), c.led_positions_mm),
         "led_covariance_mm2": ((3, 3, 3), c.led_covariance_mm2),
@@ -316,9 +375,9 @@ def _check(calibration: Calibration) -> None:
         raise ValueError("the full model is missing")
     for name, (shape, array) in expected.items():
         if array.shape != shape or not np.isfinite(array).all():
-            raise ValueError(f"{name} is not possible")
+            raise ValueError(f"{name} has impossible values")
     if not np.linalg.cond(c.crosstalk) < MOST_CROSSTALK:
-        raise ValueError("the crosstalk cannot be removed")
+        raise ValueError("the crosstalk matrix cannot be inverted")
 
 
 def _check_maps(calibration: Calibration) -> None:
@@ -330,7 +389,8 @@ def _check_maps(calibration: Calibration) -> None:
     for name, map_ in maps.items():
         if map_.shape != (*rows_columns, 3) or map_.dtype != np.float32:
             raise ValueError(f"{name} does not fit the optics")
-        # Crosstalk is taken off the background, which leaves noise about zero where it is dark.
+        # Crosstalk is subtracted from the background, which leaves noise around zero where it is
+        # dark.
         least = LEAST_BACKGROUND if name == "full_background" else 0.0
         if not np.isfinite(map_).all() or float(map_.min()) < least:
-            raise ValueError(f"{name} is not possible")
+            raise ValueError(f"{name} has impossible values")

@@ -1,4 +1,4 @@
-"""The full model's part of the calibration file."""
+"""The part of the calibration file for the full model."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import FullModel, ScaleSd
 from gelpolight_core.reflectance.membrane import CURVE_NODES, MEMBRANES, Membrane
+from gelpolight_core.sensor_calibration import FullModel, ScaleSd
 
 CURVES = "full_membrane_diffuse"
 
 
 def full_entry(full: FullModel) -> dict[str, Any]:
-    """Return what of a full model goes into the manifest."""
+    """Return the part of a full model that goes into the manifest."""
     membrane = asdict(full.membrane)
     del membrane["diffuse"]
     scale = {} if full.scale_sd is None else {"scale_sd": asdict(full.scale_sd)}
@@ -45,20 +45,20 @@ def full_arrays(full: FullModel) -> dict[str, NDArray[Any]]:
 
 
 def read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullModel:
-    """Return the full model of a file, its plain values checked.
+    """Return the full model of a file, with its plain values checked.
 
     Raises
     ------
     ValueError
-        If a value is missing or is one that no full model has.
+        If a value is missing or impossible.
     """
     before, after = (float(value) for value in entry["held_out"])
     lengths = np.array([entry["decay_mm"], entry["misfit"], before, after], float)
     if not np.isfinite(lengths).all() or lengths.min() < 0.0 or lengths[0] == 0.0:
-        raise ValueError("the joint refinement's figures are not possible")
+        raise ValueError("the figures of the joint refinement are impossible")
     if entry["kept"] not in ("refined", "mirror"):
-        raise ValueError(f"unknown LEDs {entry['kept']!r}")
-    # Files of version 1 do not have what follows.
+        raise ValueError(f"unknown LED choice {entry['kept']!r}")
+    # Files of version 1 do not have the following entries.
     kept = entry.get("membrane_kept", MEMBRANES[0])
     if kept not in MEMBRANES:
         raise ValueError(f"unknown membrane {kept!r}")
@@ -66,7 +66,7 @@ def read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMod
     sd = {str(name): float(value) for name, value in entry.get("membrane_sd", {}).items()}
     figures = np.array([two_lobe, one_dimensional, *sd.values()], float)
     if not np.isfinite(figures).all() or figures.min() < 0.0:
-        raise ValueError("the membrane's figures are not possible")
+        raise ValueError("the figures of the membrane are impossible")
     return FullModel(
         led_positions_mm=arrays["full_led_positions_mm"],
         led_sd_mm=arrays["full_led_sd_mm"],
@@ -87,7 +87,7 @@ def _read_scale(entry: dict[str, Any]) -> ScaleSd:
     scale = ScaleSd(**{name: float(value) for name, value in entry.items()})
     numbers = np.array([scale.depth, scale.lateral, scale.balls])
     if not np.isfinite(numbers).all() or numbers.min() < 0.0:
-        raise ValueError("the uncertainty of lengths is not possible")
+        raise ValueError("the uncertainty of lengths is impossible")
     return scale
 
 
@@ -96,17 +96,17 @@ def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membra
     diffuse: tuple[tuple[float, ...], ...] = ()
     if curves is not None:
         if curves.shape != (3, CURVE_NODES) or not np.isfinite(curves).all():
-            raise ValueError("the membrane's curves are not possible")
+            raise ValueError("the membrane curves have impossible values")
         if curves.min() < 0.0 or (np.diff(curves, axis=1) < 0.0).any():
-            raise ValueError("the membrane's curves are not monotone")
+            raise ValueError("the membrane curves are not monotone")
         if not (curves[:, -1] > 0.0).all():
-            raise ValueError("the membrane's curves are dark")
+            raise ValueError("the membrane curves are dark")
         diffuse = tuple(tuple(curve) for curve in curves.astype(np.float64).tolist())
     membrane = Membrane(**values, diffuse=diffuse)
     if not np.isfinite(list(values.values())).all() or not 0.0 <= membrane.gloss < 1.0:
-        raise ValueError("the membrane is not possible")
+        raise ValueError("the membrane has impossible values")
     if membrane.exponent <= 0.0 or not 0.0 < membrane.roughness <= 1.0:
-        raise ValueError("the membrane is not possible")
+        raise ValueError("the membrane has impossible values")
     if membrane.bounce < 0.0 or membrane.bounce_reach_mm <= 0.0:
-        raise ValueError("the membrane is not possible")
+        raise ValueError("the membrane has impossible values")
     return membrane

@@ -1,4 +1,4 @@
-"""What each stage of a calibration rests on, so that what has become stale is known."""
+"""The inputs of each stage of a calibration, to find out which results are out of date."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
 
-from gelpolight_core.session.copies import file_hash
+from gelpolight_core.session.file_hashes import file_hash
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 
 class Stage(StrEnum):
-    """A stage, in the order in which a calibration goes through them."""
+    """A stage, in calibration order."""
 
     RESPONSE = "response"
     LENS = "lens"
@@ -38,10 +38,10 @@ FOLDERS = MappingProxyType(
         Stage.BALLS: "balls",
     }
 )
-"""Folder of the pictures of each stage that cannot do without."""
+"""Image folder of each required stage."""
 
 OPTIONAL_FOLDERS = MappingProxyType({Stage.RESPONSE: "response", Stage.LIGHTS: "single_led"})
-"""Folder of further pictures that a stage uses where a session has them."""
+"""Folders of additional images that a stage uses if a session has them."""
 
 NEEDS = MappingProxyType(
     {
@@ -50,25 +50,25 @@ NEEDS = MappingProxyType(
         Stage.TOP_POSE: (Stage.LENS,),
         Stage.LIGHTS: (Stage.TOP_POSE,),
         Stage.RADIANCE: (Stage.LIGHTS,),
-        Stage.BACKGROUND: (Stage.TOP_POSE,),
-        Stage.BALLS: (Stage.RADIANCE, Stage.BACKGROUND),
+        Stage.BACKGROUND: (Stage.RADIANCE,),
+        Stage.BALLS: (Stage.BACKGROUND,),
         Stage.REFLECTANCE: (Stage.BALLS,),
         Stage.JOINT: (Stage.REFLECTANCE,),
     }
 )
-"""Stages whose results a stage builds on, directly."""
+"""Stages whose results a stage uses directly."""
 
 
 @dataclass(frozen=True, slots=True)
 class StageInputs:
-    """All that a stage's result rests on.
+    """All inputs of a stage's result.
 
     Attributes
     ----------
     pictures : tuple of (name, SHA-256)
-        Its own pictures, those that are not excluded.
+        Its own images, without excluded ones.
     stated : str
-        What a person stated or decided that it uses.
+        Stated values and decisions that it uses.
     earlier : tuple of str
         Fingerprints of the stages that it needs.
     """
@@ -79,21 +79,21 @@ class StageInputs:
 
     @property
     def fingerprint(self) -> str:
-        """A text that changes with any of them."""
+        """A text that changes with any of the inputs."""
         return hashlib.sha256(repr((self.pictures, self.stated, self.earlier)).encode()).hexdigest()
 
 
 def inputs_of(
     session: Session, hashes: Callable[[Path], str] = file_hash
 ) -> dict[Stage, StageInputs]:
-    """Return what every stage rests on at present.
+    """Return the present inputs of every stage.
 
     Parameters
     ----------
     session : Session
-        Pictures, description and decisions.
+        Images, description and decisions.
     hashes : callable, optional
-        File to hash; one that remembers saves reading every picture again.
+        Returns the hash of a file; a caching one avoids reading every image again.
     """
     found: dict[Stage, StageInputs] = {}
     for stage in Stage:
@@ -108,7 +108,7 @@ def inputs_of(
 
 
 def all_inputs(session: Session, hashes: Callable[[Path], str] = file_hash) -> str:
-    """Return a text that changes with anything that a session's calibration rests on.
+    """Return a text that changes with any input of a session's calibration.
 
     Parameters
     ----------
@@ -122,29 +122,29 @@ def all_inputs(session: Session, hashes: Callable[[Path], str] = file_hash) -> s
 
 
 def changes_between(before: StageInputs, now: StageInputs) -> tuple[str, ...]:
-    """Say in words what has changed since a result was made."""
+    """Describe what has changed since a result was computed."""
     old, new = dict(before.pictures), dict(now.pictures)
-    said = []
+    changes = []
     added = [name for name in new if name not in old]
     gone = [name for name in old if name not in new]
     other = [name for name in new if name in old and new[name] != old[name]]
     for names, text in (
         (added, tr("{names} added")),
-        (gone, tr("{names} left out")),
+        (gone, tr("{names} excluded")),
         (other, tr("{names} changed")),
     ):
         if names:
             more = tr(" and {n} more").format(n=len(names) - 3) if len(names) > 3 else ""
-            said.append(text.format(names=", ".join(names[:3]) + more))
+            changes.append(text.format(names=", ".join(names[:3]) + more))
     if before.stated != now.stated:
-        said.append(tr("a stated value or a correction by hand changed"))
+        changes.append(tr("a stated value or a manual correction changed"))
     if before.earlier != now.earlier:
-        said.append(tr("an earlier stage changed"))
-    return tuple(said)
+        changes.append(tr("an earlier stage changed"))
+    return tuple(changes)
 
 
 def _stated(stage: Stage, session: Session) -> object:
-    """Return what a person stated or decided that a stage uses."""
+    """Return the stated values and decisions that a stage uses."""
     sensor, decisions = session.sensor, session.decisions
     match stage:
         case Stage.RESPONSE:

@@ -1,13 +1,14 @@
 """Joint refinement of LEDs, balls and membrane on the ball presses.
 
-Press over background cancels light intensity and reflectance factor, so what is left depends on
-geometry and on the membrane's response alone. Both the balls and the drape around them are used:
-the drape is concave, as the walls of pressed objects are, and receives light from its surroundings
-that a ball's cap does not. The mirror's LED positions and the housing's Z1 are priors.
+Press over background cancels light intensity and reflectance factor, so the ratio depends only on
+geometry and on the membrane's response. Both the balls and the drape around them are used: the
+drape is concave, like the walls around pressed objects, and receives light from its surroundings
+that a ball's cap does not receive. The LED positions from the mirror and Z1 from the housing are
+priors.
 
-Two membranes are tried: two lobes, whose brightness depends on the viewing side, and the paper's
-one-dimensional curve of the light's cosine for each channel (Eq. 6). Presses that were held out
-decide.
+Two membranes are tested: one with two lobes, whose brightness depends on the viewing direction, and
+the paper's one-dimensional curve of the cosine to the light for each channel (Eq. 6). Held-out
+presses decide.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from gelpolight_core.calibration.ball_pixels import BOUNCE_REACH_MM, BallPixels, thinned
+from gelpolight_core.calibration.jackknife import jackknife_covariance
 from gelpolight_core.calibration.joint_problem import (
     COMMON,
     CORRELATION,
@@ -28,8 +29,9 @@ from gelpolight_core.calibration.joint_problem import (
     Problem,
     diffuse_curves,
 )
-from gelpolight_core.calibration.spread import jackknife_covariance
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
+from gelpolight_core.least_squares import fit_least_squares
+from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.press import BallPress
@@ -40,18 +42,18 @@ _NAMES = ("exponent", "gloss", "roughness", "cap_bounce", "bounce", "decay_mm")
 
 @dataclass(frozen=True, slots=True)
 class JointResult:
-    """LEDs, membrane and balls that explain the presses together.
+    """LEDs, membrane and balls that fit all presses together.
 
     Attributes
     ----------
     led_positions_mm, led_sd_mm : (3, 3)
         Sensor frame.
     membrane : Membrane
-        With the drape's share of light from the neighbourhood.
+        With the share of light that the drape receives from its neighbourhood.
     membrane_sd : dict
         Standard deviations of its parameters.
     cap_bounce : float
-        The same share on the convex caps of the balls.
+        Interreflection on the convex caps of the balls.
     decay_mm : float
         Decay length of the drape.
     balls : tuple of BallPose
@@ -59,20 +61,19 @@ class JointResult:
     misfit : float
         Robust relative misfit over all pixels.
     ball_misfits : (balls,)
-        The same for each press; NaN where none of its pixels counts.
+        The same for each press; NaN if it has no usable pixels.
     held_out : tuple of 2 floats
-        Mean robust loss on presses that were held out: with the mirror's LEDs, and with refined
-        ones.
+        Mean robust loss on held-out presses: with the LEDs from the mirror, and with refined ones.
     kept : str
-        ``refined`` or ``mirror``: whose LEDs were the better on what was held out.
+        ``refined`` or ``mirror``: the LEDs that were better on held-out presses.
     membrane_held_out : tuple of 2 floats
         The same loss with the two-lobe membrane, and with the one-dimensional one.
     membrane_kept : str
-        ``two-lobe`` or ``one-dimensional``: which of them `membrane` is.
+        ``two-lobe`` or ``one-dimensional``: the form of `membrane`.
     covariance : (15, 15) or (27, 27)
-        Of LEDs (9), exponent, gloss, roughness, cap's bounce, bounce and decay length, and, where
-        the membrane is one-dimensional, of the heights of its curves; by leaving out one press at
-        a time. 0 for what was held.
+        Of LEDs (9), exponent, gloss, roughness, interreflection on the cap, interreflection and
+        decay length and, if the membrane is one-dimensional, of the heights of its curves; from
+        leaving out one press at a time. 0 for fixed parameters.
     """
 
     led_positions_mm: Array
@@ -100,17 +101,17 @@ def refine_jointly(
 ) -> JointResult:
     """Refine LEDs, membrane and balls together.
 
-    The mirror's LEDs are kept where they do better on presses that are held out, and the membrane
-    is one-dimensional where two lobes do no better.
+    The LEDs from the mirror are kept if they do better on held-out presses, and the membrane is
+    one-dimensional if two lobes do no better.
 
     Parameters
     ----------
     presses, pixels : sequences of equal length
-        The balls as found, and their pixels.
+        The detected balls, and their pixels.
     led_positions_mm : (3, 3)
         From the mirror spots.
     terms : CalibrationTerms, optional
-        What is reckoned with; by default everything.
+        The effects to model; by default all.
     """
     held_out, membranes = _held_out(presses, pixels, led_positions_mm, terms)
     refine = held_out[1] <= held_out[0]
@@ -163,7 +164,7 @@ class _Solution:
 def _start(
     presses: Sequence[BallPress], leds: Array, terms: CalibrationTerms, *, curves: bool
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return where the fit starts, and which parameters are free."""
+    """Return the start values of the fit, and which parameters are free."""
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
     glossy = terms.gloss and not curves
     bounce = 0.1 * terms.bounce
@@ -172,7 +173,7 @@ def _start(
     start = np.concatenate([leds.ravel(), common, np.ravel(balls), heights])
     free = np.ones(start.size, dtype=bool)
     free[:9] = terms.led_refinement
-    # A power of the cosine other than Lambert's is what the one-dimensional curves are for.
+    # Deviations from Lambert's cosine law are covered by the one-dimensional curves.
     free[9:14] = [False, glossy, glossy, terms.bounce, terms.bounce]
     return start, free
 
@@ -187,7 +188,7 @@ def _solve(
     curves: bool = False,
     judging: Array | None = None,
 ) -> _Solution:
-    """Solve for all parameters, or, when judging a fit to other presses, for the balls alone."""
+    """Solve for all parameters or, when judging a fit to other presses, for the balls alone."""
     start, free = _start(presses, leds, terms, curves=curves)
     balls = slice(COMMON, COMMON + 3 * len(pixels))
     free[:9] &= refine
@@ -213,18 +214,15 @@ def _solve(
         x[free] = part
         return x
 
-    fit = least_squares(
+    found = fit_least_squares(
         lambda part: problem.all(whole(part)),
+        lambda part: problem.jacobian(whole(part))[:, free],
         start[free],
-        jac=lambda part: problem.jacobian(whole(part))[:, free],
-        bounds=(low[free], high[free]),
-        loss="soft_l1",
-        x_scale=scale[free],
-        ftol=1e-5,
-        xtol=1e-5,
-        max_nfev=40,
+        (low[free], high[free]),
+        scale=scale[free],
+        robust=True,
     )
-    return _described(problem, whole(fit.x))
+    return _described(problem, whole(found.x))
 
 
 def _described(problem: Problem, x: Array) -> _Solution:
@@ -243,10 +241,10 @@ def _described(problem: Problem, x: Array) -> _Solution:
 
 
 def shared_covariance(problem: Problem, x: Array) -> Array:
-    """Return the covariance of all parameters that the presses share; 0 for what was held."""
+    """Return the covariance of all parameters shared by the presses; 0 for fixed ones."""
     jacobian = problem.jacobian(x)
     parts = problem.residuals(x)
-    # Soft L1 lets residuals count for less the larger they are.
+    # With soft L1, larger residuals have less weight.
     weights = [(1.0 + r**2) ** -0.25 for r in parts]
     shared = np.concatenate([np.arange(COMMON), np.arange(problem.balls_end, x.size)])
     balls = np.arange(COMMON, problem.balls_end)
@@ -260,13 +258,13 @@ def shared_covariance(problem: Problem, x: Array) -> Array:
         common=solved.size,
     )
     covariance = np.zeros((shared.size, shared.size))
-    place = np.flatnonzero(problem.free[shared])
-    covariance[np.ix_(place, place)] = found
+    index = np.flatnonzero(problem.free[shared])
+    covariance[np.ix_(index, index)] = found
     return covariance
 
 
 def _relative_misfit(scaled: Array, weight: Array) -> float:
-    """Return the robust misfit of the ratio from scaled residuals; NaN where none counts."""
+    """Return the robust misfit of the ratio from scaled residuals; NaN if no pixel is usable."""
     seen = (weight > 0.0) & (scaled != 0.0)
     if not seen.any():
         return float("nan")
@@ -281,14 +279,15 @@ def _held_out(
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return mean robust losses on every second press, from fits to the others.
 
-    First with the mirror's LEDs and with refined ones; then, with the better of these, with the
-    two-lobe membrane and with the one-dimensional one.
+    First with the LEDs from the mirror and with refined ones; then, with the better of these, with
+    the two-lobe membrane and with the one-dimensional one.
     """
     even, odd = slice(0, None, 2), slice(1, None, 2)
     if len(presses) < 4:
-        # Too few to hold any out: the mirror's LEDs stay, and the form that extrapolates.
+        # Too few presses to hold any out: keep the LEDs from the mirror, and the form that
+        # extrapolates better.
         return (0.0, 1.0), (0.0, 1.0)
-    # Half of the pixels tell which of two fits is the better as well as all do.
+    # Half of the pixels are enough to decide which of two fits is better.
     pixels = [thinned(p) for p in pixels]
 
     def loss(refine: bool, curves: bool) -> float:
@@ -297,7 +296,7 @@ def _held_out(
             presses[odd], pixels[odd], leds, terms, refine=refine, curves=curves, judging=fitted.x
         ).loss
 
-    mirror = loss(False, False)
-    refined = loss(True, False) if terms.led_refinement else np.inf
+    tried = [False, True] if terms.led_refinement else [False]
+    mirror, refined = [*in_parallel(lambda refine: loss(refine, False), tried), np.inf][:2]
     one_dimensional = loss(refined <= mirror, True) if terms.curves else np.inf
     return (mirror, refined), (min(mirror, refined), one_dimensional)

@@ -1,4 +1,4 @@
-"""What the joint refinement minimises: residuals of all ball presses, priors, and their slopes."""
+"""The residuals minimised by the joint refinement: all ball presses, priors, and derivatives."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from gelpolight_core.reflectance.membrane import CURVE_NODES, LEAST_COSINE, Memb
 Array = NDArray[np.float64]
 Surface = tuple[Array, Array, NDArray[np.bool_]]
 DARK_COSINE = 0.08
-# Pixels of one ball err together (lens, centre, membrane), so that each counts for less than one.
+# Errors of the pixels of one ball are correlated (lens, centre, membrane), so each pixel has a
+# weight below one.
 CORRELATION = 4.0
 LED_LATERAL_SD_MM = 0.05
 LED_HEIGHT_SD_MM = 0.2
 PRIOR_STRENGTH = 3.0
-# LEDs (9), exponent, gloss, roughness, cap's and drape's bounce, decay length.
+# LEDs (9), exponent, gloss, roughness, interreflection on the cap and the drape, decay length.
 COMMON, DECAY = 15, 14
-# The one-dimensional membrane: cos times the exponential of a spline through these cosines, which
-# is 0 at the last. Below the first, where balls hardly reach, it goes on as Lambert's law does.
+# The one-dimensional membrane: cos times the exponential of a spline through these cosines; it is 0
+# at the last. Below the first, which balls hardly reach, it continues with Lambert's law.
 CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
 CURVE_SIZE = 3 * (CURVE_COSINES.size - 1)
 CURVE_SD = 0.1
@@ -45,9 +46,9 @@ _BUMPS = _bumps()
 
 def curve_terms(cosine: Array) -> Array:
     """Return the spline's terms at cosines (...), (..., nodes - 1)."""
-    place = np.clip(cosine, 0.0, 1.0) * (CURVE_NODES - 1)
-    below = np.minimum(place.astype(np.int64), CURVE_NODES - 2)
-    share = (place - below)[..., None]
+    position = np.clip(cosine, 0.0, 1.0) * (CURVE_NODES - 1)
+    below = np.minimum(position.astype(np.int64), CURVE_NODES - 2)
+    share = (position - below)[..., None]
     return np.asarray(_BUMPS[below] * (1.0 - share) + _BUMPS[below + 1] * share)
 
 
@@ -70,8 +71,8 @@ def bent_curves(
 class Problem:
     """Residuals of all presses, with priors.
 
-    Parameters are the common ones, then x, y and depth of each ball, and then, where the membrane
-    is one-dimensional, the heights of its curves; only those that are `free` are solved for.
+    The parameters are the common ones, then x, y and depth of each ball and, if the membrane is
+    one-dimensional, the heights of its curves; only those that are `free` are solved for.
     """
 
     presses: Sequence[BallPixels]
@@ -80,16 +81,16 @@ class Problem:
 
     @property
     def balls_end(self) -> int:
-        """Where the balls' parameters end."""
+        """Index after the last ball parameter."""
         return COMMON + 3 * len(self.presses)
 
     def residuals(self, x: Array, surfaces: Sequence[Surface] | None = None) -> list[Array]:
-        """Return the weighted residuals of each press, (3 N,); on known surfaces where given."""
+        """Return the weighted residuals of each press, (3 N,); on known surfaces if given."""
         seen = self._surfaces(x) if surfaces is None else surfaces
         return [self._press(x, i, surface)[0].ravel() for i, surface in enumerate(seen)]
 
     def _surfaces(self, x: Array) -> list[Surface]:
-        """Return what is seen of each ball: points and normals (N, 3), and where it touches."""
+        """Return the visible points and normals (N, 3) of each ball, and where it is in contact."""
         seen = []
         for pixels, ball in zip(
             self.presses, x[COMMON : self.balls_end].reshape(-1, 3), strict=True
@@ -99,7 +100,7 @@ class Problem:
         return seen
 
     def _press(self, x: Array, index: int, seen: Surface) -> tuple[Array, Array, Array, Array]:
-        """Return residuals, those that the direct light alone makes, and its cosines, (N, 3)."""
+        """Return residuals, those from direct light alone, and its cosines, (N, 3)."""
         pixels = self.presses[index]
         leds = x[:9].reshape(3, 3)
         surface, normals, on_ball = seen
@@ -118,24 +119,24 @@ class Problem:
             up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
             membrane = Membrane(float(x[9]), float(x[10]), float(x[11]))
             direct = membrane.response(light, normals, pixels.view)
-            # A step of the solver may bring an LED above the membrane, where it gives no light.
+            # A solver step may move an LED above the membrane, where it gives no light.
             direct /= np.maximum(membrane.response(flat_light, up, pixels.view), LEAST_COSINE)
         share = np.where(on_ball, x[12], x[13]) * bounce_weight(normals)
-        # What lies in shadow, or near it, depends on shadows that are not modelled here.
+        # Pixels in or near shadow depend on shadows that are not modelled here.
         lit = np.clip((facing - DARK_COSINE) / DARK_COSINE, 0.0, 1.0)
         model = gain * direct + share[:, None] * pixels.around
         weight = pixels.weight * lit / CORRELATION
         return (model - pixels.ratio) * weight, gain * direct * weight, cosine, flat_cosine
 
     def priors(self, x: Array) -> Array:
-        """Return the residuals of what is known beforehand."""
+        """Return the residuals of the prior knowledge."""
         moved = (x[:9] - self.start[:9]).reshape(3, 3)
         return np.concatenate(
             [
                 PRIOR_STRENGTH * moved[:, :2].ravel() / LED_LATERAL_SD_MM,
                 PRIOR_STRENGTH * moved[:, 2] / LED_HEIGHT_SD_MM,
-                # Exponent and gloss trade off; a diffuse share that departs from Lambert's law has
-                # to be asked for by the data (the loss lets it go far), as has an unseen lobe.
+                # Exponent and gloss trade off; the data must clearly show a diffuse share that
+                # deviates from Lambert's law (the loss allows large deviations), or an unseen lobe.
                 [PRIOR_STRENGTH * (x[9] - 1.0) / 0.01, (x[12] - x[13]) / 0.2, (x[11] - 0.5) / 0.3],
                 x[self.balls_end :] / CURVE_SD,
             ]
@@ -146,10 +147,10 @@ class Problem:
         return np.concatenate([*self.residuals(x), self.priors(x)])
 
     def jacobian(self, x: Array) -> Array:
-        """Finite differences, as few as can be told apart.
+        """Return the Jacobian by finite differences, with as few evaluations as possible.
 
-        A light brightens its own channel only, and a ball's parameters its own press, so that one
-        coordinate of all lights, or of all balls, is moved at once.
+        A light affects only its own channel, and a ball's parameters only its own press, so one
+        coordinate of all lights, or of all balls, is moved at the same time.
         """
         surfaces = self._surfaces(x)
         base = self.residuals(x, surfaces)
@@ -161,7 +162,7 @@ class Problem:
         def slopes(
             columns: slice | list[int], surfaces: Sequence[Surface] | None
         ) -> Iterator[tuple[int, slice, Array]]:
-            """Yield each press, its rows, and its slopes where all `columns` are moved."""
+            """Yield each press, its rows, and its derivatives when all `columns` are moved."""
             moved = x.copy()
             moved[columns] += _STEP
             for i, r in enumerate(self.residuals(moved, surfaces)):
@@ -188,7 +189,7 @@ class Problem:
         return result
 
     def _curve_slopes(self, x: Array, index: int, seen: Surface) -> Array:
-        """Return the slopes of one press's residuals along the curves' heights, in closed form."""
+        """Return the derivatives of one press's residuals by the curve heights, in closed form."""
         _, direct, cosine, flat_cosine = self._press(x, index, seen)
         rise = (curve_terms(cosine) - curve_terms(flat_cosine)) * direct[..., None]
         slopes = np.zeros((*direct.shape, 3, rise.shape[-1]))

@@ -1,7 +1,7 @@
 """The manifest of a calibration file: every number that is not an array, quick to read.
 
-The library of sensors shows many calibrations; reading their manifests alone takes a millisecond
-each, and loads none of the numerical libraries.
+The sensor library shows many calibrations; reading only their manifests takes a millisecond each,
+and needs no numerical libraries.
 """
 
 from __future__ import annotations
@@ -17,22 +17,25 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import NEWEST, brief, open_file, parse_json, written_text
 from gelpolight_core.quality import Figure, QualityTable, Verdict
-from gelpolight_core.reading import NEWEST, brief, open_file, parse_json, written_text
 from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-calibration"
-# 1: without the membrane's curves, its deviations, edits by hand and the camera's response.
-VERSION = 2
+# Version 1 has no membrane curves, standard deviations, manual edits or camera response.
+# Version 3 adds closed sensors; calibrations of open sensors are the same as in version 2.
+VERSION = 3
+OPEN_VERSION = 2
 MANIFEST = "manifest.json"
 MANIFEST_LIMIT = 4_000_000
 MOST_ARRAYS = 64
 MOST_DIMENSIONS = 4
-# What all arrays may declare: a small calibration whole, a larger one this often its file.
+# Limit for the declared size of all arrays: fixed for a small calibration, this multiple of the
+# file size for a larger one.
 DECLARED_LIMIT = 64_000_000
 DECLARED_TIMES = 100
 HEAD_LIMIT = 4096
-# What a damaged zip, a damaged JSON text or values of a wrong kind raise while they are read.
+# Exceptions raised while reading a damaged zip, damaged JSON text or values of the wrong type.
 UNREADABLE = (
     zipfile.BadZipFile,
     zlib.error,
@@ -52,18 +55,18 @@ UNREADABLE = (
 
 @dataclass(frozen=True, slots=True)
 class CalibrationSummary:
-    """What a calibration file says of itself, without its arrays.
+    """Contents of a calibration file without its arrays.
 
     Attributes
     ----------
     identity, serial, model : str
-        The calibration's short name, its sensor and the model that it was made for.
+        Short name of the calibration, its sensor and its model.
     created, operator, program_version, session, inputs : str
         As in its provenance.
     picture_size : tuple of int
-        Width and height of the camera's pictures, px.
+        Width and height of the camera images, px.
     quality : mapping
-        Quality table of every stage, in their order.
+        Quality table of every stage, in order.
     """
 
     identity: str
@@ -84,20 +87,20 @@ class CalibrationSummary:
 
 
 def read_summary(path: Path) -> CalibrationSummary:
-    """Read what a calibration file says of itself.
+    """Read the summary of a calibration file.
 
-    The manifest is checked as :func:`~gelpolight_core.calibration.file.read_calibration` does it,
-    and that every part is there; what the arrays hold is not looked at.
+    The manifest is checked as in :func:`~gelpolight_core.calibration.file.read_calibration`, and
+    every part must exist; the content of the arrays is not checked.
 
     Raises
     ------
     InputError
-        If the file is missing, damaged, truncated or of a newer version.
+        If the file is missing, damaged, truncated or has a newer version.
     """
     try:
         with opened(path) as archive:
             manifest = read_manifest(archive, path)
-            for part in ("plane", "grid"):
+            for part in ("in_place" if "in_place" in manifest else "plane", "grid"):
                 manifest[part]
             for name in manifest["arrays"]:
                 archive.getinfo(f"{name}.npy")
@@ -121,7 +124,7 @@ def refuse_damaged_arrays(path: Path) -> None:
             refuse_bomb(arrays, archive)
             for name, entry in arrays.items():
                 with archive.open(f"{name}.npy") as stream:
-                    # typeshed knows the reader of a zip as a plain byte stream only
+                    # typeshed describes the reader of a zip as a plain byte stream only
                     found = hashlib.file_digest(stream, "sha256")  # type: ignore[arg-type]
                 if found.hexdigest() != entry["sha256"]:
                     raise ValueError(f"the checksum of {name} is wrong")
@@ -150,13 +153,13 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
     text = read_member(archive, MANIFEST, MANIFEST_LIMIT)
     manifest = parse_json(text)
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise ValueError("no calibration manifest")
+        raise ValueError("not a calibration manifest")
     version = manifest.get("version")
     if type(version) is int and VERSION < version < NEWEST:
         raise InputError(
-            tr("the calibration has version {v} and this program knows version {k}").format(
-                v=version, k=VERSION
-            ),
+            tr(
+                "The calibration has version {v}, but this program only reads up to version {k}"
+            ).format(v=version, k=VERSION),
             where=str(path),
             advice=tr("Use a newer version of GelPoLight Studio"),
         )
@@ -169,22 +172,22 @@ def read_manifest(archive: zipfile.ZipFile, path: Path) -> dict[str, Any]:
 
 
 def read_member(archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
-    """Read a member whose declared size is within its limit, before memory is taken."""
+    """Read a member whose declared size is within its limit, before memory is allocated."""
     info = archive.getinfo(name)
     if info.file_size > limit:
         raise ValueError(f"{name} declares {info.file_size} bytes")
-    # Other packings declare how much memory their unpacking takes.
+    # Other compression methods declare the memory that they need.
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise ValueError(f"{name} is packed in a way that this program does not use")
+        raise ValueError(f"{name} uses a compression method that this program does not use")
     with archive.open(info) as stream:
         data = stream.read(limit + 1)
     if len(data) != info.file_size:
-        raise ValueError(f"{name} is cut short")
+        raise ValueError(f"{name} is truncated")
     return data
 
 
 def read_quality(rows: list[dict[str, Any]]) -> QualityTable:
-    """Return a quality table from the rows that ``QualityTable.as_rows`` made."""
+    """Return a quality table from the rows of ``QualityTable.as_rows``."""
     return QualityTable(tuple(_figure(row) for row in rows))
 
 
@@ -201,43 +204,45 @@ _LIMITS = ("warn_limit", "fail_limit")
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{brief(value)} is no number")
+        raise ValueError(f"{brief(value)} is not a number")
     return value
 
 
 def declared_bytes(name: str, entry: dict[str, Any]) -> int:
-    """Return what an array takes as its manifest declares it.
+    """Return the number of bytes of an array as declared in the manifest.
 
     Raises
     ------
     ValueError
-        If no array is so.
+        If the declaration is invalid.
     """
     shape, kind = entry["shape"], entry["kind"]
     if not isinstance(shape, list) or not 1 <= len(shape) <= MOST_DIMENSIONS:
         raise ValueError(f"{brief(name)} has no shape")
     if not all(type(n) is int and 1 <= n <= 10**9 for n in shape) or kind not in ("<f4", "<f8"):
-        raise ValueError(f"{brief(name)} is {brief(kind)} {brief(shape)}")
+        raise ValueError(f"{brief(name)} has the invalid type {brief(kind)} {brief(shape)}")
     return math.prod(shape) * int(kind[-1])
 
 
 def refuse_bomb(arrays: Mapping[str, dict[str, Any]], archive: zipfile.ZipFile) -> None:
-    """Refuse arrays that declare far more than a file of this size can hold.
+    """Refuse arrays that declare far more than a file of this size can contain.
 
     Raises
     ------
     ValueError
-        If they do, or a member of the archive declares more than its array.
+        If they do, or if a member of the archive declares more than its array.
     """
     if not isinstance(arrays, dict) or len(arrays) > MOST_ARRAYS:
-        raise ValueError("the list of arrays is none")
+        raise ValueError("the list of arrays is not a table")
     packed = 0
     for name, entry in arrays.items():
         info = archive.getinfo(f"{name}.npy")
         if info.file_size > declared_bytes(name, entry) + HEAD_LIMIT:
             raise ValueError(f"{brief(name)} declares {info.file_size} bytes")
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise ValueError(f"{brief(name)} is packed in a way that this program does not use")
+            raise ValueError(
+                f"{brief(name)} uses a compression method that this program does not use"
+            )
         packed += info.compress_size
     total = sum(declared_bytes(name, entry) for name, entry in arrays.items())
     if total > max(DECLARED_LIMIT, DECLARED_TIMES * packed):
@@ -246,12 +251,12 @@ def refuse_bomb(arrays: Mapping[str, dict[str, Any]], archive: zipfile.ZipFile) 
 
 @contextmanager
 def opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a calibration file as the archive that it is.
+    """Open a calibration file as a zip archive.
 
     Raises
     ------
     InputError
-        If there is no such file, or the system does not give it.
+        If the file does not exist or cannot be read.
     """
     try:
         stream = open_file(path)
@@ -262,20 +267,20 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def missing(path: Path) -> InputError:
-    """Return the refusal of a file that is not there."""
+    """Return the error for a missing file."""
     return InputError(
-        tr("there is no such file"),
+        tr("The file does not exist"),
         where=str(path),
-        advice=tr("Make one with gelpolight calibrate"),
+        advice=tr("Create it with gelpolight calibrate"),
     )
 
 
 def damaged(path: Path, error: Exception) -> InputError:
-    """Return the refusal of a damaged file."""
+    """Return the error for a damaged file."""
     return InputError(
-        tr("the calibration is damaged or is not one ({error})").format(
+        tr("The file is damaged, or is not a calibration ({error})").format(
             error=brief(str(error).splitlines()[0], 200) if str(error) else type(error).__name__
         ),
         where=str(path),
-        advice=tr("Take a copy, or calibrate again from the session"),
+        advice=tr("Use a backup copy, or calibrate again from the session"),
     )

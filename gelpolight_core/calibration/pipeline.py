@@ -1,22 +1,21 @@
-"""From a session folder to a calibration: the stages, one after the other."""
+"""From a session folder to a calibration: all stages in order."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from gelpolight_core import __version__
-from gelpolight_core.calibration.calibration import MODELS, Calibration, FullModel, Provenance
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.inputs import FOLDERS, Stage, all_inputs
 from gelpolight_core.calibration.joint import JointResult
+from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.calibration.refinement import bare_calibration
-from gelpolight_core.calibration.results import StageResults, require_balls
+from gelpolight_core.calibration.results import StageResults, judge_balls, require_balls
 from gelpolight_core.calibration.stages import run_stage
+from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult
 from gelpolight_core.lights.crosstalk import CrosstalkResult
@@ -25,35 +24,34 @@ from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
-from gelpolight_core.reading import as_text
 from gelpolight_core.reflectance.membrane import MEMBRANES
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.response.stage import ResponseResult
-from gelpolight_core.session.copies import file_hash, refuse_copies
-from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
+from gelpolight_core.sensor_calibration import MODELS, Calibration, FullModel
+from gelpolight_core.session.file_hashes import refuse_copies
+from gelpolight_core.session.missing import refuse_missing_stages
 from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
-from gelpolight_core.who import user_name
 
 Progress = Callable[[str, float], None]
 STAGES = tuple(FOLDERS.values())
-_SHARES = {
-    Stage.RESPONSE: ("camera response", 0.0),
-    Stage.LENS: ("lens", 0.02),
-    Stage.TOP_POSE: ("top surface", 0.3),
-    Stage.LIGHTS: ("lights", 0.4),
-    Stage.RADIANCE: ("light intensity", 0.45),
-    Stage.BACKGROUND: ("background", 0.48),
-    Stage.BALLS: ("ball presses", 0.5),
-    Stage.REFLECTANCE: ("reflectance", 0.8),
-    Stage.JOINT: ("joint refinement", 0.85),
+_BEGINS = {
+    Stage.RESPONSE: 0.0,
+    Stage.LENS: 0.02,
+    Stage.TOP_POSE: 0.3,
+    Stage.LIGHTS: 0.4,
+    Stage.RADIANCE: 0.45,
+    Stage.BACKGROUND: 0.48,
+    Stage.BALLS: 0.5,
+    Stage.REFLECTANCE: 0.8,
+    Stage.JOINT: 0.85,
 }
-"""Name of each stage, and how much of the whole work is done when it begins."""
+"""Share of the total work done when a stage begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationRun:
-    """A calibration with the results of every stage, as the pages and the report show them."""
+    """A calibration with the results of every stage, as shown by the wizard and the report."""
 
     calibration: Calibration
     response: ResponseResult
@@ -75,11 +73,11 @@ def calibrate_session(
     Parameters
     ----------
     session : Session
-        What was captured, and what a person decided about it.
+        Captured images and the user's decisions.
     model : str, optional
         The model to calibrate for.
     progress : callable, optional
-        Told the stage's name and the share done, 0..1.
+        Called with the stage name and the share done, 0..1.
 
     Raises
     ------
@@ -90,9 +88,9 @@ def calibrate_session(
     refuse_copies(source_files(session))
     results = StageResults()
     stages = stages_of(model)
-    ends = [_SHARES[stage][1] for stage in stages[1:]] + [1.0]
+    ends = [_BEGINS[stage] for stage in stages[1:]] + [1.0]
     for stage, end in zip(stages, ends, strict=True):
-        name, begin = tr(_SHARES[stage][0]), _SHARES[stage][1]
+        name, begin = stage_title(stage), _BEGINS[stage]
         tell(name, begin)
 
         def within(share: float, name: str = name, begin: float = begin, end: float = end) -> None:
@@ -106,19 +104,20 @@ def calibrate_session(
 
 
 def source_files(session: Session) -> tuple[Path, ...]:
-    """Return the pictures that a calibration is made from, stage by stage.
+    """Return the images that a calibration is made from, stage by stage.
 
     Raises
     ------
     InputError
         If a stage has none.
     """
+    refuse_missing_stages(session.folder, session.decisions.excluded)
     stages = (*session.optional_stages, *STAGES)
     return tuple(path for stage in stages for path in session.files(stage))
 
 
 def _with_edits(calibration: Calibration, session: Session) -> Calibration:
-    """Apply the reflectance curves that a person has drawn."""
+    """Apply the reflectance curves drawn by the user."""
     curves = {
         channel: (np.array([c for c, _ in nodes]), np.array([v for _, v in nodes]))
         for channel, nodes in session.decisions.curves.items()
@@ -128,26 +127,26 @@ def _with_edits(calibration: Calibration, session: Session) -> Calibration:
 
 
 def stages_of(model: str) -> tuple[Stage, ...]:
-    """Return the stages of a model's calibration, in order."""
+    """Return the stages of a calibration for a model, in order."""
     return tuple(stage for stage in Stage if model == "full" or stage is not Stage.JOINT)
 
 
 def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]) -> CalibrationRun:
-    """Put the results of all stages together.
+    """Combine the results of all stages.
 
     Parameters
     ----------
     session : Session
-        What they were made from.
+        The session that they come from.
     results : StageResults
-        Of every stage that the model needs.
+        Results of every stage that the model needs.
     model : str, optional
         The model to calibrate for.
 
     Raises
     ------
     InputError
-        If a stage was not run, or a picture of a ball shows none.
+        If a stage was not run, or no ball capture shows a ball.
     """
     require_balls(results)
     if model != "full":
@@ -161,9 +160,9 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
     assert reflectance is not None and factors is not None
     if bare.model != model:
         raise InputError(
-            tr("the joint refinement has no result"),
+            tr("The joint refinement has no result"),
             where=str(session.folder),
-            advice=tr("Complete the stages that are still open"),
+            advice=tr("Complete the stages that are not done yet"),
         )
     calibration = replace(
         bare,
@@ -174,11 +173,18 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
             "lights": lights.quality,
             "crosstalk": crosstalk.quality,
             "radiance": radiance.quality,
+            "background": results.bare_membrane or QualityTable(),
+            "balls": judge_balls(results),
             "reflectance": reflectance.quality,
             "factors": factors.quality,
             **({} if results.full is None else {"joint": judge_joint(results.full)}),
         },
-        provenance=_provenance(session),
+        provenance=provenance_of(
+            session.folder,
+            source_files(session),
+            session.camera_settings,
+            inputs=all_inputs(session),
+        ),
     )
     calibration = _with_edits(calibration, session)
     return CalibrationRun(
@@ -201,12 +207,12 @@ def judge_joint(full: FullModel) -> QualityTable:
         (
             judge(
                 "joint_misfit_percent",
-                tr("Ball presses and drapes not explained"),
+                tr("Unexplained signal of ball presses and drapes"),
                 100.0 * full.misfit,
                 "%",
                 warn=4.0,
                 fail=12.0,
-                advice=tr("Check ball radii, then repeat the worst presses"),
+                advice=tr("Check the ball radii, then repeat the worst presses"),
             ),
             judge(
                 "joint_led_sd_mm",
@@ -215,12 +221,12 @@ def judge_joint(full: FullModel) -> QualityTable:
                 "mm",
                 warn=0.2,
                 fail=1.0,
-                advice=tr("Press more balls, at more places"),
+                advice=tr("Press more balls at more positions"),
             ),
             *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
-            judge("bounce", tr("Light from the membrane around"), full.membrane.bounce, warn=1.2),
+            judge("bounce", tr("Interreflection of the membrane"), full.membrane.bounce, warn=1.2),
             judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
         )
     )
@@ -230,15 +236,17 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
     scale = full.scale_sd
     if scale is None:
         return ()
+    lengths = tr("Check the ball radii, Z1 and the refractive index")
+    stated_wrong = scale.balls**2 > 0.5 * scale.depth**2
     return (
         judge(
             "ball_height_error_percent",
-            tr("Height of ball presses that are reconstructed"),
+            tr("Height error of reconstructed ball presses"),
             100.0 * scale.balls,
             "%",
             warn=2.0,
             fail=10.0,
-            advice=tr("Check ball radii, Z1 and the refractive index"),
+            advice=lengths,
         ),
         judge(
             "depth_sd_percent",
@@ -247,39 +255,22 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
             "%",
             warn=2.0,
             fail=10.0,
-            advice=tr("Press more balls, at more places"),
+            # More balls reduce scatter, but not an error common to all heights.
+            advice=lengths if stated_wrong else tr("Press more balls at more positions"),
         ),
     )
 
 
 def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
-    """Return which membrane was kept, and by how much; nothing where no press was held out."""
+    """Return which membrane was kept, and the ratio of errors; empty if no press was held out."""
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()
     label = {
-        MEMBRANES[0]: tr("Held-out error, one-dimensional over two-lobe (two-lobe kept)"),
-        MEMBRANES[1]: tr("Held-out error, one-dimensional over two-lobe (one-dim. kept)"),
+        MEMBRANES[0]: tr("Held-out error ratio, one-dimensional over two-lobe (two-lobe kept)"),
+        MEMBRANES[1]: tr(
+            "Held-out error ratio, one-dimensional over two-lobe (one-dimensional kept)"
+        ),
     }
     ratio = one_dimensional / two_lobe
     return (judge("membrane_held_out_ratio", label[full.membrane_kept], ratio),)
-
-
-def _provenance(session: Session) -> Provenance:
-    sources = {
-        as_text(f"{path.parent.name}/{path.name}"): file_hash(path)
-        for path in source_files(session)
-    }
-    for name in ("session.toml", DECISIONS_FILE):
-        if (session.folder / name).is_file():
-            sources[name] = file_hash(session.folder / name)
-    camera = session.camera_settings
-    return Provenance(
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        operator=user_name(),
-        program_version=__version__,
-        session=as_text(session.folder.resolve().name),
-        sources=sources,
-        inputs=all_inputs(session),
-        camera_settings={} if camera is None else camera.as_texts(),
-    )

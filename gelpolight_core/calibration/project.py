@@ -1,7 +1,7 @@
-"""A calibration in the making: a session folder, its results, and which of them are stale.
+"""A calibration being made: a session folder, its results, and which of them are out of date.
 
-Results are made anew from what is on disk. The project may be used by two threads: one that
-captures and decides, one that computes.
+Results are computed from the files on disk. Two threads may use the project: one that captures and
+decides, one that computes.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from gelpolight_core.calibration.calibration import MODELS
+from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.inputs import (
     FOLDERS,
     NEEDS,
@@ -20,19 +20,20 @@ from gelpolight_core.calibration.inputs import (
     changes_between,
     inputs_of,
 )
-from gelpolight_core.calibration.kept_session import KeptSession
 from gelpolight_core.calibration.pipeline import CalibrationRun, assemble, source_files, stages_of
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.status import StageState, StageStatus, judged
 from gelpolight_core.errors import InputError
 from gelpolight_core.quality import QualityTable
-from gelpolight_core.session.copies import RememberedHashes, refuse_copies
+from gelpolight_core.sensor_calibration import MODELS
+from gelpolight_core.session.file_hashes import CachedHashes, refuse_copies
+from gelpolight_core.session.session import Session, read_session
 from gelpolight_core.translation import tr
 
 
 class Cancelled(Exception):
-    """Raised out of a computation that a person has stopped."""
+    """Raised in a computation that the user has stopped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class _Outcome:
     fault: InputError | None
 
 
-class CalibrationProject(KeptSession):
+class CalibrationProject(EditableSession[Session]):
     """One session folder with its results.
 
     Parameters
@@ -56,27 +57,32 @@ class CalibrationProject(KeptSession):
     """
 
     def __init__(self, folder: Path) -> None:
-        super().__init__(folder)
-        self._hashes = RememberedHashes()
+        super().__init__(folder, read_session)
+        self._hashes = CachedHashes()
         self._results = StageResults()
         self._outcomes: dict[Stage, _Outcome] = {}
 
     @property
     def results(self) -> StageResults:
-        """The newest result of every stage, stale or not."""
+        """The newest result of every stage, even if out of date."""
         return self._results
 
     @property
     def all_inputs(self) -> str:
-        """A text that changes with anything that the calibration rests on."""
+        """A text that changes with any input of the calibration."""
         with self._lock:
             return all_inputs(self._session, self._hashes)
 
     def statuses(self) -> dict[Stage, StageStatus]:
-        """Return how every stage stands at present."""
+        """Return the present status of every stage."""
         with self._lock:
             inputs = inputs_of(self._session, self._hashes)
             return {stage: self._status(stage, inputs) for stage in Stage}
+
+    def fault(self, stage: Stage) -> InputError | None:
+        """Return why a stage failed when it was last computed; None if it did not."""
+        outcome = self._outcomes.get(stage)
+        return None if outcome is None else outcome.fault
 
     def stale(self, *, upto: Stage | None = None, model: str = MODELS[-1]) -> tuple[Stage, ...]:
         """Return the stages that can and need to be computed, in order.
@@ -108,17 +114,18 @@ class CalibrationProject(KeptSession):
         return tuple(found)
 
     def compute(self, stage: Stage, tell: Callable[[float], None] | None = None) -> StageStatus:
-        """Run one stage on the present pictures and decisions, and keep its result.
+        """Run one stage on the present images and decisions, and store its result.
 
-        A stage that cannot be completed keeps its fault as its status. One whose earlier stages
-        have to be computed first stays as it is.
+        A stage that cannot be completed stores its error as its status. A stage whose earlier
+        stages must be computed first does not change.
 
         Parameters
         ----------
         stage : Stage
-            Which.
+            The stage.
         tell : callable, optional
-            Told the share done; it may raise :class:`Cancelled`, which leaves all as it was.
+            Called with the share done; it may raise :class:`Cancelled`, which leaves everything
+            unchanged.
         """
         with self._lock:
             session, results, dropped = self._session, self._results, self._dropped
@@ -133,7 +140,7 @@ class CalibrationProject(KeptSession):
         except InputError as error:
             fault = error
         with self._lock:
-            # A picture that came and went meanwhile may be in the result, and in no input.
+            # An image that was added and removed meanwhile may be in the result, but in no input.
             if self._dropped == dropped:
                 if fault is None:
                     self._results = results
@@ -146,7 +153,7 @@ class CalibrationProject(KeptSession):
         Raises
         ------
         InputError
-            If a stage is missing, stale or failed.
+            If a stage is missing, out of date or failed.
         """
         with self._lock:
             for stage, status in self.statuses().items():
@@ -154,11 +161,11 @@ class CalibrationProject(KeptSession):
                     continue
                 if status.state in (StageState.EMPTY, StageState.WAITING, StageState.STALE):
                     raise InputError(
-                        tr("the stage {stage} has no present result").format(stage=stage.value),
+                        tr("The stage {stage} has no up-to-date result").format(stage=stage.value),
                         where=str(self._session.folder),
-                        advice=tr("Complete the stages that are still open"),
+                        advice=tr("Complete the stages that are not done yet"),
                     )
-                fault = self._outcomes[stage].fault
+                fault = self.fault(stage)
                 if fault is not None:
                     raise fault
             session, results = self._session, self._results
@@ -169,20 +176,20 @@ class CalibrationProject(KeptSession):
         outcome = self._outcomes.get(stage)
         nothing = QualityTable()
         if stage in FOLDERS and not inputs[stage].pictures:
-            return StageStatus(stage, StageState.EMPTY, tr("Nothing captured yet"), nothing)
+            return StageStatus(stage, StageState.EMPTY, tr("No images captured yet"), nothing)
         if outcome is None:
             missing = [need for need in NEEDS[stage] if need not in self._outcomes]
-            said = tr("Not computed yet")
+            sentence = tr("Not computed yet")
             if missing:
-                said = tr("Waits for an earlier stage")
+                sentence = tr("Waiting for an earlier stage")
             empty = stage not in FOLDERS and missing
             state = StageState.EMPTY if empty else StageState.WAITING
-            return StageStatus(stage, state, said, nothing)
+            return StageStatus(stage, state, sentence, nothing)
         if outcome.inputs != inputs[stage]:
-            said = tr("Stale: {changes}").format(
+            sentence = tr("Out of date: {changes}").format(
                 changes="; ".join(changes_between(outcome.inputs, inputs[stage]))
             )
-            return StageStatus(stage, StageState.STALE, said, nothing)
+            return StageStatus(stage, StageState.STALE, sentence, nothing)
         if outcome.fault is not None:
             return StageStatus(stage, StageState.FAIL, str(outcome.fault), nothing)
         return judged(stage, self._results)

@@ -1,4 +1,4 @@
-"""The last stage: LEDs and membrane refined on the ball presses, and how sure the result is."""
+"""The last stage: LEDs and membrane refined on the ball presses, with their uncertainty."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import gather_ball_pixels
-from gelpolight_core.calibration.calibration import Calibration, FullModel, Provenance, ScaleSd
 from gelpolight_core.calibration.depth_scale import (
     ball_height_error,
     depth_scale_sd,
@@ -20,20 +19,21 @@ from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, Calibration
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.reflectance.press import BallPress
+from gelpolight_core.sensor_calibration import Calibration, FullModel, Provenance, ScaleSd
 from gelpolight_core.session.session import Session
 
 CHECKED_BALLS = 4
 
 
 def refine(session: Session, results: StageResults) -> StageResults:
-    """Refine LEDs and membrane, and say how sure the lengths are.
+    """Refine LEDs and membrane, and estimate the uncertainty of lengths.
 
     Parameters
     ----------
     session : Session
-        Whose ball pictures are reconstructed to check the result.
+        Its ball images are reconstructed to check the result.
     results : StageResults
-        Of all earlier stages.
+        Results of all earlier stages.
 
     Raises
     ------
@@ -49,14 +49,14 @@ def refine(session: Session, results: StageResults) -> StageResults:
 def refine_with(
     results: StageResults, *, terms: CalibrationTerms = ALL_CALIBRATION_TERMS
 ) -> StageResults:
-    """Refine LEDs and membrane on the presses, and keep the background to compare with.
+    """Refine LEDs and membrane on the presses, and keep the background for comparison.
 
     Parameters
     ----------
     results : StageResults
-        Of all earlier stages.
+        Results of all earlier stages.
     terms : CalibrationTerms, optional
-        What the full model reckons with.
+        The effects that the full model includes.
     """
     table, lights = need(results.table, "balls"), need(results.lights, "balls")
     bare, factors = need(results.background, "balls"), need(results.factors, "balls")
@@ -92,7 +92,7 @@ def refine_with(
 def _scale_sd(
     session: Session, results: StageResults, joint: JointResult, full: FullModel
 ) -> ScaleSd:
-    """Say how sure the lengths of the full model are."""
+    """Estimate the uncertainty of lengths of the full model."""
     calibration = bare_calibration(session, replace(results, full=full))
     lens, pose = need(results.lens, "balls"), need(results.top_pose, "balls")
     covariance = joint.covariance.copy()
@@ -100,7 +100,7 @@ def _scale_sd(
         for k, own in enumerate(calibration.led_covariance_mm2):
             covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = own
     files = [ball.file for ball in results.balls if ball.press is not None]
-    # Evenly over the session, so that one odd press does not decide.
+    # Evenly over the session, so that a single odd press does not decide.
     some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
     unexplained = ball_height_error(
         calibration,
@@ -121,9 +121,10 @@ def bare_calibration(session: Session, results: StageResults) -> Calibration:
     Parameters
     ----------
     session : Session
-        What is stated of the sensor.
+        With the stated sensor data.
     results : StageResults
-        Of all stages; without the joint one the calibration is for the paper's model.
+        Results of all stages; without the joint refinement the calibration is for the paper's
+        model.
 
     Raises
     ------
@@ -149,6 +150,7 @@ def bare_calibration(session: Session, results: StageResults) -> Calibration:
         provenance=Provenance("", "", "", "", {}),
         full=results.full,
         response=need(results.response, where).response,
+        bad=results.bad if results.bad is not None and results.bad.places.size else None,
     )
 
 

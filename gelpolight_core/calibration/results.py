@@ -1,4 +1,4 @@
-"""What the stages of a calibration have come to so far."""
+"""The results of the calibration stages so far."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import FullModel
+from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import FactorResult
@@ -17,10 +17,12 @@ from gelpolight_core.lights.positions import LightResult
 from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import Figure, QualityTable, Verdict, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.response.stage import ResponseResult
+from gelpolight_core.sensor_calibration import FullModel
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -29,32 +31,32 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class SeenBall:
-    """What was made of one picture of a ball press.
+    """The result for one image of a ball press.
 
     Attributes
     ----------
     file : str
         Its name in ``balls``.
     key : str
-        Changes with anything that the finding rests on.
-    picture : (rows, columns, 3) float32
-        Resampled onto the grid.
+        Changes with any input of the result.
+    picture : (rows, columns, 3) float32 or None
+        Resampled onto the grid; None if no ball was found.
     press : BallPress or None
-        The ball; None where none was found.
+        The ball; None if none was found.
     fault : InputError or None
-        Why not.
+        Why no ball was found.
     """
 
     file: str
     key: str
-    picture: Map
+    picture: Map | None
     press: BallPress | None
     fault: InputError | None
 
 
 @dataclass(frozen=True, slots=True)
 class StageResults:
-    """The results of all stages that were run; None where a stage was not."""
+    """The results of all stages that were run; None for the others."""
 
     response: ResponseResult | None = None
     lens: LensResult | None = None
@@ -64,6 +66,8 @@ class StageResults:
     crosstalk: CrosstalkResult | None = None
     radiance: RadianceResult | None = None
     background: Map | None = None
+    bare_membrane: QualityTable | None = None
+    bad: BadPixels | None = None
     balls: tuple[SeenBall, ...] = ()
     reflectance: ReflectanceResult | None = None
     factors: FactorResult | None = None
@@ -72,31 +76,76 @@ class StageResults:
 
     @property
     def presses(self) -> tuple[BallPress, ...]:
-        """The balls that were found."""
+        """The detected balls."""
         return tuple(ball.press for ball in self.balls if ball.press is not None)
 
     @property
     def pictures(self) -> tuple[Map, ...]:
-        """Their pictures, resampled."""
-        return tuple(ball.picture for ball in self.balls if ball.press is not None)
+        """Their images, resampled."""
+        return tuple(ball.picture for ball in self.balls if ball.picture is not None)
 
 
 def require_balls(results: StageResults) -> None:
-    """Raise the fault of the first picture in which no ball was found."""
+    """Refuse results without any ball, with the fault of the background or of the first capture."""
+    if results.presses:
+        return
+    bare = results.bare_membrane or QualityTable()
+    for figure in bare.figures:
+        if figure.verdict is Verdict.FAIL:
+            raise InputError(
+                tr("No ball was found with this background ({label}: {value:.1f} {unit})").format(
+                    label=figure.label, value=figure.value, unit=figure.unit
+                ),
+                where=tr("background"),
+                advice=figure.advice,
+            )
     for ball in results.balls:
         if ball.fault is not None:
             raise ball.fault
 
 
+def judge_balls(results: StageResults) -> QualityTable:
+    """Judge the ball presses together: which captures were left out, and why."""
+    refused = [
+        f"{ball.file}: {ball.fault.found}. {ball.fault.advice}"
+        for ball in results.balls
+        if ball.fault is not None
+    ]
+    return QualityTable(
+        (
+            judge(
+                "balls_left_out",
+                tr("Captures left out"),
+                float(len(refused)),
+                warn=0.0,
+                advice=tr("Left out: {names}").format(names="; ".join(refused)),
+            ),
+        )
+    )
+
+
+def judge_bad_pixels(bad: BadPixels) -> Figure:
+    """Judge how many pixels of the camera do not follow the light."""
+    return judge(
+        "bad_pixels_percent",
+        tr("Dead and hot pixels, left out"),
+        100.0 * len(bad.places) / max(bad.height * bad.width, 1),
+        "%",
+        warn=0.5,
+        fail=5.0,
+        advice=tr("Replace the camera, or lower its gain and temperature"),
+    )
+
+
 def need(value: T | None, what: str) -> T:
-    """Return a result that another stage builds on.
+    """Return a result that another stage uses.
 
     Parameters
     ----------
     value : object or None
-        The result; None where its stage was not run.
+        The result; None if its stage was not run.
     what : str
-        Who asks, for the message.
+        Name of the requesting stage, for the message.
 
     Raises
     ------
@@ -105,7 +154,7 @@ def need(value: T | None, what: str) -> T:
     """
     if value is None:
         raise InputError(
-            tr("an earlier stage has no result yet"),
+            tr("An earlier stage has no result yet"),
             where=what,
             advice=tr("Complete the earlier stages first"),
         )

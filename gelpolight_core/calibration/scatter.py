@@ -1,6 +1,6 @@
-"""The scatter of ball pixels behind a run's reflectance table, gathered anew from the session.
+"""The scatter of ball pixels behind a reflectance table, gathered from the session when needed.
 
-A run does not keep it: it is a million numbers that the session's pictures give at any time.
+A run does not keep it: it is a million numbers that can be computed from the session's images.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.reflectance.stage import ball_scatter
-from gelpolight_core.session.session import Session, read_picture
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import Session
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -21,16 +22,16 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class ReflectanceScatter:
-    """Ball pixels as the reflectance table sees them, of each channel.
+    """Ball pixels as used by the reflectance table, for each channel.
 
     Attributes
     ----------
     cosines, values : tuple of 3 (N,) arrays
         cos(theta) from the ball's normals, and processed pixel values I / (rho |L|).
     presses : tuple of 3 (N,) int arrays
-        Which of `names` each pixel comes from.
+        Index in `names` of the press of each pixel.
     names : tuple of str
-        The presses' pictures.
+        Image names of the presses.
     """
 
     cosines: tuple[Array, Array, Array]
@@ -42,21 +43,21 @@ class ReflectanceScatter:
 def gather_scatter(
     run: CalibrationRun, session: Session, *, progress: Progress | None = None
 ) -> ReflectanceScatter:
-    """Gather the scatter of a run's ball presses, its factors fed back (section V-E).
+    """Gather the scatter of a run's ball presses, with the factors fed back (section V-E).
 
     Parameters
     ----------
     run : CalibrationRun
         Made from `session`.
     session : Session
-        Where the ball pictures are.
+        The session with the ball images.
     progress : callable, optional
-        Told the press's name and the share done, 0..1.
+        Called with the press name and the share done, 0..1.
 
     Raises
     ------
     InputError
-        If a ball's picture cannot be read any more.
+        If a ball image can no longer be read.
     """
     tell = progress or (lambda _name, _share: None)
     table = run.calibration.table

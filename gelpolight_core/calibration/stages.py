@@ -1,8 +1,8 @@
-"""The stages of a calibration: what each needs, and one function that runs it.
+"""The stages of a calibration: the inputs of each, and one function that runs it.
 
-The command line runs them one after the other; the desktop program runs each as soon as it has
-what it needs, keeps the results, and runs again only what a new picture or decision has made
-stale. Both call :func:`run_stage` and therefore come to the same numbers.
+The command line runs all stages in order. The desktop program runs each stage as soon as its inputs
+are available, keeps the results, and repeats only stages that a new image or decision has made out
+of date. Both call :func:`run_stage` and therefore give the same numbers.
 """
 
 from __future__ import annotations
@@ -16,33 +16,41 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import (
-    sensor_stack,
-)
+from gelpolight_core.bad_pixels import find_bad_pixels, no_bad_pixels
 from gelpolight_core.calibration.inputs import NEEDS, Stage, inputs_of
 from gelpolight_core.calibration.refinement import refine
-from gelpolight_core.calibration.results import SeenBall, StageResults, need
+from gelpolight_core.calibration.results import (
+    SeenBall,
+    StageResults,
+    judge_bad_pixels,
+    need,
+)
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import calibrate_factors
+from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.lights.crosstalk import find_crosstalk, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import locate_leds
+from gelpolight_core.masks import saturated
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.lens import LensResult, calibrate_lens
 from gelpolight_core.optics.pose import estimate_top_pose
 from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane
 from gelpolight_core.optics.resampling import build_resampling_table
+from gelpolight_core.parallel import in_parallel
+from gelpolight_core.quality import QualityTable
 from gelpolight_core.radiance.whiteboard import calibrate_radiance
 from gelpolight_core.reflectance.press import PlacedContact, find_ball
 from gelpolight_core.reflectance.stage import calibrate_reflectance
 from gelpolight_core.response.stage import declare_response, measure_response
-from gelpolight_core.session.decisions import PlacedCircle
-from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import (
-    Session,
-    require_colour,
+from gelpolight_core.sensor_calibration import (
+    sensor_stack,
 )
+from gelpolight_core.session.decisions import PlacedCircle
+from gelpolight_core.session.images import require_colour
+from gelpolight_core.session.session import Session
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
@@ -57,25 +65,26 @@ def run_stage(
     Parameters
     ----------
     stage : Stage
-        Which.
+        The stage.
     session : Session
-        Pictures and decisions.
+        Images and decisions.
     results : StageResults
-        Those of all stages that this one needs; balls found earlier are used again where nothing
-        they rest on has changed.
+        Results of all stages that this one needs; balls found earlier are reused if their inputs
+        have not changed.
     tell : callable, optional
-        Told the share of this stage done, 0..1.
+        Called with the share of this stage done, 0..1.
 
     Returns
     -------
     StageResults
-        With this stage's result in place.
+        Including this stage's result.
 
     Raises
     ------
     InputError
-        If the stage's pictures are missing or cannot be used. A picture of a ball without a ball
-        is kept in the results with its fault; :func:`require_balls` raises it.
+        If the stage's images are missing or cannot be used. In a stage of several captures
+        (checkerboard, top_pose, balls) a capture that cannot be used is left out with its reason;
+        the stage is refused only if too few are left.
     """
     if results.response is not None:
         session = replace(session, response=results.response.response)
@@ -91,16 +100,21 @@ def _run_response(session: Session, results: StageResults, _tell: Progress) -> S
 
 
 def _run_lens(session: Session, results: StageResults, _tell: Progress) -> StageResults:
-    lens = calibrate_lens(session.pictures("checkerboard"), session.checkerboard)
+    pictures, refused = session.usable_pictures("checkerboard")
+    lens = calibrate_lens(pictures, session.checkerboard, refused=refused)
     return replace(results, lens=lens)
 
 
 def _run_top_pose(session: Session, results: StageResults, _tell: Progress) -> StageResults:
     lens = need(results.lens, "top_pose")
-    pictures = session.pictures("top_pose")
+    pictures, refused = session.usable_pictures("top_pose")
     _same_size(pictures[0], lens, "top_pose")
     pose = estimate_top_pose(
-        pictures, session.top_pose, lens.camera, focal_sd_px=lens.focal_sd_px[0]
+        pictures,
+        session.top_pose,
+        lens.camera,
+        focal_sd_px=lens.focal_sd_px[0],
+        refused=refused,
     )
     table = build_resampling_table(
         lens.camera,
@@ -114,7 +128,7 @@ def _run_top_pose(session: Session, results: StageResults, _tell: Progress) -> S
 def _run_lights(session: Session, results: StageResults, _tell: Progress) -> StageResults:
     lens, pose = need(results.lens, "mirror"), need(results.top_pose, "mirror")
     spots = find_mirror_spots(
-        _stage_picture(session, "mirror", lens), placed=session.decisions.spots_px
+        _stage_image(session, "mirror", lens), placed=session.decisions.spots_px
     )
     lights = locate_leds(
         spots,
@@ -141,15 +155,28 @@ def _single_led(session: Session, lens: LensResult) -> tuple[Picture, ...]:
 def _run_radiance(session: Session, results: StageResults, _tell: Progress) -> StageResults:
     lens, table = need(results.lens, "whiteboard"), need(results.table, "whiteboard")
     lights = need(results.lights, "whiteboard")
-    whiteboard = _stage_picture(session, "whiteboard", lens)
+    whiteboard = _stage_image(session, "whiteboard", lens)
     return replace(results, radiance=calibrate_radiance(whiteboard, table, lights.led_positions_mm))
 
 
 def _run_background(session: Session, results: StageResults, _tell: Progress) -> StageResults:
     lens, table = need(results.lens, "background"), need(results.table, "background")
-    background = _stage_picture(session, "background", lens)
+    background = _stage_image(session, "background", lens)
     _refuse_unlit(background)
-    return replace(results, background=table.apply(background.rgb))
+    # As encoded by the camera, like the live hint.
+    raw = replace(session, response=None)
+    whiteboard = raw.averaged("whiteboard").rgb if session.found("whiteboard") else None
+    seen = check_bare_membrane(raw.averaged("background").rgb, table=table, whiteboard=whiteboard)
+    bad = no_bad_pixels(*background.rgb.shape[:2])
+    if whiteboard is not None and whiteboard.shape == background.rgb.shape:
+        scenes = [background.rgb, session.averaged("whiteboard").rgb]
+        bad = find_bad_pixels(scenes, noise=0.0)
+    return replace(
+        results,
+        background=table.apply(bad.left_out(background.rgb)),
+        bare_membrane=QualityTable((*seen.quality.figures, judge_bad_pixels(bad))),
+        bad=bad,
+    )
 
 
 def _run_balls(session: Session, results: StageResults, tell: Progress) -> StageResults:
@@ -157,13 +184,18 @@ def _run_balls(session: Session, results: StageResults, tell: Progress) -> Stage
     inputs = inputs_of(session)
     rests_on = tuple(inputs[need].fingerprint for need in NEEDS[Stage.BALLS])
     hashes = dict(inputs[Stage.BALLS].pictures)
-    # A press that is captured at this moment is the next computation's.
+    # A press captured at this moment belongs to the next computation.
     files = [path for path in session.files("balls") if path.name in hashes]
-    balls = []
-    for index, path in enumerate(files):
-        tell(index / len(files))
+    bare = unmix(need(results.background, "balls"), need(results.crosstalk, "balls").matrix)
+
+    def ball(path: Path) -> SeenBall:
         key = _ball_key(path.name, session, (*rests_on, hashes[path.name]))
-        balls.append(known[key] if key in known else _look_for_ball(path, key, session, results))
+        return known[key] if key in known else _find_ball(path, key, session, results, bare)
+
+    balls: list[SeenBall] = []
+    for found in in_parallel(ball, files):
+        tell(len(balls) / len(files))
+        balls.append(found)
     return replace(results, balls=tuple(balls))
 
 
@@ -172,26 +204,27 @@ def _ball_key(name: str, session: Session, rests_on: tuple[str, ...]) -> str:
     return hashlib.sha256(repr((rests_on, stated)).encode()).hexdigest()
 
 
-def _look_for_ball(path: Path, key: str, session: Session, results: StageResults) -> SeenBall:
+def _find_ball(
+    path: Path, key: str, session: Session, results: StageResults, bare: Map
+) -> SeenBall:
     lens, table = need(results.lens, "balls"), need(results.table, "balls")
     lights, radiance = need(results.lights, "balls"), need(results.radiance, "balls")
-    bare = need(results.background, "balls")
     crosstalk = need(results.crosstalk, "balls").matrix
-    picture = session.picture(path)
     radius = session.ball_radius_mm(path.name)
-    require_colour(picture, where=str(path))
-    _same_size(picture, lens, "balls")
-    seen = table.apply(picture.rgb)
     pose = need(results.top_pose, "balls")
     stack = sensor_stack(session.sensor, pose.plane)
     placed = session.decisions.balls.get(path.name)
     try:
+        picture = session.picture(path)
+        require_colour(picture, where=str(path))
+        _same_size(picture, lens, "balls")
+        seen = table.apply(need(results.bad, "balls").left_out(picture.rgb))
         contact = None
         if placed is not None:
             contact = placed_contact(placed, lens.camera, pose.plane, stack)
         press = find_ball(
             unmix(seen, crosstalk),
-            unmix(bare, crosstalk),
+            bare,
             table,
             lights.led_positions_mm,
             radius_mm=radius,
@@ -200,19 +233,19 @@ def _look_for_ball(path: Path, key: str, session: Session, results: StageResults
             placed=contact,
         )
     except InputError as fault:
-        return SeenBall(path.name, key, seen, None, fault)
+        return SeenBall(path.name, key, None, None, fault)
     return SeenBall(path.name, key, seen, press, None)
 
 
 def placed_contact(
     circle: PlacedCircle, camera: Camera, plane: TopPlane, stack: LayerStack
 ) -> PlacedContact:
-    """Return where on the undeformed membrane a circle placed in the raw picture is seen.
+    """Return the circle on the undeformed membrane for a circle set in the raw image.
 
     Raises
     ------
     InputError
-        If it reaches beyond what the camera can see of the membrane.
+        If it extends beyond the visible part of the membrane.
     """
     turns = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
     u = circle.u_px + circle.radius_px * np.cos(turns)
@@ -220,9 +253,9 @@ def placed_contact(
     edge_mm, _ = camera_to_membrane(camera.directions(np.stack([u, v], axis=-1)), plane, stack)
     if not np.isfinite(edge_mm).all():
         raise InputError(
-            tr("the circle placed by hand reaches beyond what the camera sees of the membrane"),
+            tr("The circle set by hand extends beyond the visible membrane"),
             where=tr("balls"),
-            advice=tr("Move it inside the working area, or leave the picture out"),
+            advice=tr("Move it inside the working area, or exclude the image"),
         )
     middle = edge_mm.mean(axis=0)
     radius_mm = float(np.hypot(*(edge_mm - middle).T).mean())
@@ -257,7 +290,7 @@ _RUNS: Mapping[Stage, Callable[[Session, StageResults, Progress], StageResults]]
 )
 
 
-def _stage_picture(session: Session, stage: str, lens: LensResult) -> Picture:
+def _stage_image(session: Session, stage: str, lens: LensResult) -> Picture:
     picture = session.averaged(stage)
     require_colour(picture, where=f"{stage}/{picture.name}")
     _same_size(picture, lens, stage)
@@ -268,11 +301,11 @@ def _same_size(picture: Picture, lens: LensResult, stage: str) -> None:
     width, height = lens.camera.width, lens.camera.height
     if picture.size != (width, height):
         raise InputError(
-            tr("the picture is {w}x{h} pixels, the checkerboard pictures are {cw}x{ch}").format(
+            tr("The image has {w}x{h} pixels, but the checkerboard images have {cw}x{ch}").format(
                 w=picture.size[0], h=picture.size[1], cw=width, ch=height
             ),
             where=f"{stage}/{picture.name}",
-            advice=tr("Capture all stages at one picture size"),
+            advice=tr("Capture all stages at the same image size"),
         )
 
 
@@ -280,14 +313,14 @@ def _refuse_unlit(picture: Picture) -> None:
     brightest = np.percentile(picture.rgb, 99.5, axis=(0, 1))
     if brightest.min() < 0.05:
         raise InputError(
-            tr("the picture is dark (a channel reaches only {v:.1%})").format(v=brightest.min()),
+            tr("The image is dark (a channel only reaches {v:.1%})").format(v=brightest.min()),
             where=f"background/{picture.name}",
-            advice=tr("Switch all three LEDs on, or expose longer"),
+            advice=tr("Switch all three LEDs on, or use a longer exposure"),
         )
-    saturated = float((picture.rgb >= 0.995).any(axis=2).mean())
-    if saturated > 0.2:
+    share = float(saturated(picture.rgb).any(axis=2).mean())
+    if share > 0.2:
         raise InputError(
-            tr("{share:.0%} of the picture is saturated").format(share=saturated),
+            tr("{share:.0%} of the image is saturated").format(share=share),
             where=f"background/{picture.name}",
-            advice=tr("Shorten the exposure"),
+            advice=tr("Use a shorter exposure"),
         )

@@ -1,4 +1,4 @@
-"""How a stage of a calibration stands, and its figures."""
+"""The status of a calibration stage, and its figures."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import judge_joint
-from gelpolight_core.calibration.results import StageResults
+from gelpolight_core.calibration.results import StageResults, judge_balls
 from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
 class StageState(StrEnum):
-    """How a stage stands."""
+    """The state of a stage."""
 
     EMPTY = "empty"
     WAITING = "waiting"
@@ -27,17 +27,17 @@ class StageState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class StageStatus:
-    """How a stage stands, and why.
+    """The state of a stage, and the reason.
 
     Attributes
     ----------
     stage : Stage
-        Which.
+        The stage.
     state : StageState
-        ``waiting``: its pictures are there, a result is not; ``stale``: there is a result, but not
-        of the present pictures.
+        ``waiting``: the images exist, but no result; ``stale``: there is a result, but not for the
+        present images.
     sentence : str
-        What to say to a person.
+        Message for the user.
     quality : QualityTable
         The figures of the present result.
     """
@@ -49,37 +49,41 @@ class StageStatus:
 
 
 def judged(stage: Stage, results: StageResults) -> StageStatus:
-    """Return how a stage with a present result stands: by its figures.
+    """Return the status of a stage with an up-to-date result, judged by its figures.
 
     Parameters
     ----------
     stage : Stage
-        Which.
+        The stage.
     results : StageResults
-        Those of the session so far.
+        Results of the session so far.
     """
     if stage is Stage.BALLS:
-        for ball in results.balls:
-            if ball.fault is not None:
-                return StageStatus(stage, StageState.FAIL, str(ball.fault), QualityTable())
-    table = quality_of(stage, results)
+        fault = next((ball.fault for ball in results.balls if ball.fault is not None), None)
+        if fault is not None and not results.presses:
+            return StageStatus(stage, StageState.FAIL, str(fault), QualityTable())
+    return judged_by(stage, quality_of(stage, results))
+
+
+def judged_by(stage: Stage, table: QualityTable) -> StageStatus:
+    """Return the status of a stage by the figures of its up-to-date result."""
     state = {
         Verdict.PASS: StageState.PASS,
         Verdict.WARN: StageState.WARN,
         Verdict.FAIL: StageState.FAIL,
     }[table.verdict]
-    advice = ". ".join(table.advice)
-    said = f"{advice}." if advice else tr("Everything is within its limits.")
-    return StageStatus(stage, state, said, table)
+    advice = ". ".join(dict.fromkeys(table.advice))
+    sentence = f"{advice}." if advice else tr("Everything is within its limits.")
+    return StageStatus(stage, state, sentence, table)
 
 
 def quality_of(stage: Stage, results: StageResults) -> QualityTable:
-    """Return the quality table of a stage's result; an empty one where there is none.
+    """Return the quality table of a stage's result; empty if there is no result.
 
     Parameters
     ----------
     stage, results
-        As for :func:`judged`. Of the ball presses each figure is given where it is worst.
+        As for :func:`judged`. For the ball presses, the worst value of each figure is given.
     """
     figures: list[Any] = []
     parts: tuple[Any, ...] = {
@@ -96,15 +100,18 @@ def quality_of(stage: Stage, results: StageResults) -> QualityTable:
     for part in parts:
         if part is not None:
             figures += part.quality.figures
+    if stage is Stage.BACKGROUND and results.bare_membrane is not None:
+        figures += results.bare_membrane.figures
     if stage is Stage.JOINT and results.full is not None:
         figures += judge_joint(results.full).figures
     if stage is Stage.BALLS:
+        figures += judge_balls(results).figures
         figures += worst_figures([press.quality for press in results.presses])
     return QualityTable(tuple(figures))
 
 
 def worst_figures(tables: Sequence[QualityTable]) -> list[Any]:
-    """Return each figure of several tables where it is judged worst, in the tables' order."""
+    """Return the worst-judged instance of each figure of several tables, in their order."""
     order = list(Verdict)
     worst: dict[str, Any] = {}
     for table in tables:

@@ -1,4 +1,4 @@
-"""The terms of the full model that are made at calibration, each of which can be left out."""
+"""The terms of the full model that are calibrated, each of which can be switched off."""
 
 from __future__ import annotations
 
@@ -7,23 +7,24 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class CalibrationTerms:
-    """What the joint refinement reckons with; by default everything.
+    """The effects included in the joint refinement; by default all.
 
-    What is left out is held at its neutral value and the rest is fitted anew. The terms of a
-    frame's reconstruction are in :class:`~gelpolight_core.reconstruction.terms.Terms`.
+    A term that is switched off is fixed at its neutral value, and the rest is fitted again. The
+    terms of a frame's reconstruction are in :class:`~gelpolight_core.reconstruction.terms.Terms`.
 
     Attributes
     ----------
     gloss : bool
-        The membrane has a glossy lobe; else it is diffuse only.
+        The membrane has a glossy lobe; otherwise it is diffuse only.
     curves : bool
-        The membrane may be a one-dimensional curve for each channel, where two lobes do no better.
+        The membrane may be a one-dimensional curve for each channel, if two lobes do no better.
     bounce : bool
-        The membrane receives light from the membrane around it.
+        Interreflection: the membrane receives light from the membrane around it.
     crosstalk : bool
-        Each LED's light is removed from the other channels; else the raw channels are believed.
+        Each LED's light is removed from the other channels; otherwise the raw channels are used.
     led_refinement : bool
-        The LEDs are refined on the ball presses; else they stay where the mirror shows them.
+        The LEDs are refined on the ball presses; otherwise they stay at the positions from the
+        mirror.
     """
 
     gloss: bool = True

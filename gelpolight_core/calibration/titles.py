@@ -1,22 +1,26 @@
-"""What the stages of a calibration are called wherever a person reads of them."""
+"""Names of the calibration stages shown to users."""
 
 from __future__ import annotations
 
 from gelpolight_core.translation import tr
 
-TITLES = {
-    "lens": "Lens",
-    "top_pose": "Top surface",
-    "response": "Camera response",
-    "lights": "Lights",
-    "crosstalk": "Crosstalk",
-    "radiance": "Light intensity",
-    "reflectance": "Reflectance",
-    "factors": "Reflectance factors",
-    "joint": "Joint refinement",
-}
-
 
 def stage_title(key: str) -> str:
-    """Return what a stage is called; a stage that is not known here goes by its key."""
-    return tr(TITLES.get(key, key))
+    """Return the name of a stage; an unknown stage is shown by its key."""
+    titles = {
+        "lens": tr("Lens"),
+        "top_pose": tr("Top surface"),
+        "response": tr("Camera response"),
+        "lights": tr("Lights"),
+        "crosstalk": tr("Crosstalk"),
+        "radiance": tr("Light intensity"),
+        "background": tr("Background"),
+        "balls": tr("Ball presses"),
+        "reflectance": tr("Reflectance"),
+        "factors": tr("Reflectance factors"),
+        "joint": tr("Joint refinement"),
+        "scale": tr("Scale"),
+        "in_place": tr("Slopes of presses left out"),
+        "gel": tr("Gel change"),
+    }
+    return titles.get(key, key)

@@ -1,1 +1,1 @@
-"""Sensor designs, and what can be said of one before it is built."""
+"""Sensor designs, and the check of a design before it is built."""

@@ -1,7 +1,7 @@
-"""The parts of a sensor design: camera, layers, LEDs, membrane, photometry, what is pressed.
+"""The parts of a sensor design: camera, layers, LEDs, membrane, photometry, and pressed objects.
 
-Lengths in mm in the sensor frame: origin on the undeformed top surface below the camera's optical
-centre, x to the right, y down, z from the camera outward; heights are measured from the top
+Lengths are in mm in the sensor frame: origin on the undeformed top surface below the camera's
+optical centre, x to the right, y down, z away from the camera; heights are measured from the top
 surface towards the camera.
 """
 
@@ -27,18 +27,18 @@ def _within(default: Any, low: float, high: float) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class CameraDesign:
-    """The camera; pixel centres at whole numbers.
+    """The camera; pixel centres have integer coordinates.
 
     Attributes
     ----------
     width_px, height_px : int
-        Picture size.
+        Image size.
     fx, fy, cx, cy : float
         Focal lengths and principal point in pixels.
     distortion : (k1, k2, p1, p2)
         Brown-Conrady, OpenCV's order.
     blur_sigma_px : float
-        Standard deviation of the lens's and the sensor's Gaussian blur.
+        Standard deviation of the Gaussian blur of lens and image sensor.
     shot_variance : float
         Variance of the noise per unit of signal (signal 0..1).
     read_sd : float
@@ -46,9 +46,9 @@ class CameraDesign:
     bit_depth : int
         8 or 16.
     response : str
-        How light becomes the camera's numbers: "linear", "srgb" (IEC 61966-2-1) or "gamma".
+        How light becomes pixel values: "linear", "srgb" (IEC 61966-2-1) or "gamma".
     gamma : float
-        Of the response "gamma": numbers go as light to the power 1 / gamma.
+        For the response "gamma": pixel values are light to the power 1 / gamma.
     """
 
     width_px: int = _within(1280, 16, 16384)
@@ -68,17 +68,17 @@ class CameraDesign:
 
 @dataclass(frozen=True, slots=True)
 class LayerDesign:
-    """The flat layers and how they stand before the camera.
+    """The flat layers and their pose relative to the camera.
 
     Attributes
     ----------
     top_distance_mm : float
         Perpendicular distance from the optical centre to the top surface.
     tilt_deg, tilt_azimuth_deg : float
-        Angle between the layers' normal and the optical axis, and the picture direction (from x to
-        y) into which the normal leans.
+        Angle between the normal of the layers and the optical axis, and the image direction (from x
+        to y) in which the normal is tilted.
     elastomer_thickness_mm, window_thickness_mm : float
-        Window 0: none.
+        A window thickness of 0 means no window.
     elastomer_refractive_index, window_refractive_index : float
         For visible light.
     """
@@ -111,14 +111,14 @@ class LayerDesign:
 
 @dataclass(frozen=True, slots=True)
 class LedDesign:
-    """One LED: where it is, and how strong.
+    """One LED: position and power.
 
     Attributes
     ----------
     x_mm, y_mm : float
         Sensor frame.
     height_mm : float
-        Of the emitting disc below the top surface.
+        Distance of the emitting disc below the top surface.
     power : float
         Relative radiant power.
     """
@@ -131,19 +131,19 @@ class LedDesign:
 
 @dataclass(frozen=True, slots=True)
 class LedRing:
-    """What the three LEDs have in common.
+    """Common properties of the three LEDs.
 
     Attributes
     ----------
     nominal_height_mm : float
-        The housing's nominal value, as session.toml states it.
+        Nominal value from the housing, as stated in session.toml.
     lobe_exponent : float
-        Radiant intensity goes as cos^exponent of the angle to the upward normal (1: Lambertian,
-        the "120 degree" LED).
+        Radiant intensity is cos^exponent of the angle to the upward normal (1: Lambertian, the "120
+        degree" LED).
     disc_diameter_mm : float
         Diameter of the emitting disc.
     body_diameter_mm : float
-        Diameter of the circle that holds the LED's body and solder, which blocks the view.
+        Diameter of the circle around the LED's body and solder, which blocks the view.
     """
 
     nominal_height_mm: float = _within(13.7, 0.01, 500.0)
@@ -154,18 +154,18 @@ class LedRing:
 
 @dataclass(frozen=True, slots=True)
 class MembraneDesign:
-    """The reflective membrane: a diffuse base with a rough metallic share.
+    """The reflective membrane: a diffuse base with a rough metallic component.
 
     Attributes
     ----------
     working_diameter_mm : float
-        Of the circle that is coated and seen.
+        Diameter of the coated and visible circle.
     diffuse_reflectance : float
-        Of the diffuse share.
+        Reflectance of the diffuse component.
     specular_weight : float
         Share of the metallic lobe, 0..1; 0 is a Lambertian membrane.
     specular_reflectance : float
-        Of the metallic share at normal incidence.
+        Reflectance of the metallic component at normal incidence.
     roughness : float
         Width parameter (alpha) of the metallic lobe, a GGX distribution of facets.
     variation : float
@@ -175,8 +175,7 @@ class MembraneDesign:
     speck_count : int
         Number of dark and bright specks.
     decay_length_mm : float
-        Over which the pressed membrane rises outside the contact (lambda of the elastic
-        foundation).
+        Decay length of the pressed membrane outside the contact (lambda of the elastic foundation).
     """
 
     working_diameter_mm: float = _within(26.0, 0.5, 500.0)
@@ -192,16 +191,16 @@ class MembraneDesign:
 
 @dataclass(frozen=True, slots=True)
 class PhotometryDesign:
-    """How the session is exposed.
+    """Exposure of the session.
 
     Attributes
     ----------
     whiteboard_reflectance : float
-        Of the Lambertian standard.
+        Reflectance of the Lambertian standard.
     whiteboard_peak : float
-        The brightest value of the whiteboard's picture without noise; above 1 it saturates.
+        Brightest value of the whiteboard image without noise; above 1 it saturates.
     mirror_peak : float
-        The same for an LED's disc in the mirror picture, which is exposed for itself.
+        The same for an LED's disc in the mirror image, which has its own exposure.
     crosstalk : 3 x 3
         Row: channel of the camera, column: LED.
     """
@@ -216,16 +215,16 @@ class PhotometryDesign:
 
 @dataclass(frozen=True, slots=True)
 class SessionDesign:
-    """What a simulated session holds beside the stages that every session has.
+    """Optional stages of a simulated session.
 
     Attributes
     ----------
     declares_response : bool
         Whether session.toml declares a response that is not linear.
     response_pictures : int
-        Pictures of the whiteboard at different exposures, from 1/32 to twice its own; 0: none.
+        Images of the whiteboard at different exposures, from 1/32 to twice its own; 0 for none.
     single_led : bool
-        Whether there are pictures of the whiteboard with one LED lit.
+        Whether there are images of the whiteboard with a single LED on.
     """
 
     declares_response: bool = True
@@ -235,7 +234,7 @@ class SessionDesign:
 
 @dataclass(frozen=True, slots=True)
 class BallPress:
-    """One ball of the calibration session; `depth_mm` is how deep its lowest point goes."""
+    """One ball of the calibration session; `depth_mm` is the depth of its lowest point."""
 
     radius_mm: float = _within(3.0, 0.05, 100.0)
     depth_mm: float = _within(1.0, 0.0, 50.0)
@@ -254,9 +253,9 @@ class Press:
     size_mm : float
         Diameter, side, coin diameter, or the nut's width across flats.
     depth_mm : float
-        How deep its foremost face goes.
+        Depth of its front face.
     x_mm, y_mm, yaw_deg : float
-        Where it is pressed and how it is turned.
+        Position and rotation.
     edge_radius_mm : float
         Rounding of the edge of a cylinder or cuboid.
     """

@@ -1,6 +1,6 @@
-"""The design of a sensor: everything that a maker decides, and what the virtual sensor is made of.
+"""The design of a sensor: all decisions of its maker, and the input of the virtual sensor.
 
-A design is written in Python, or read from a TOML file; every unknown key is named, nothing is
+A design is written in Python or read from a TOML file; every unknown key is reported, nothing is
 guessed.
 """
 
@@ -27,8 +27,8 @@ from gelpolight_core.design.parts import (
     SessionDesign,
 )
 from gelpolight_core.errors import InputError
-from gelpolight_core.reading import NAME_LIMIT, brief, parse_toml, plain_text, read_file
-from gelpolight_core.session.wholeness import MAX_PIXELS
+from gelpolight_core.image.file import MAX_PIXELS
+from gelpolight_core.io.reading import NAME_LIMIT, brief, parse_toml, plain_text, read_file
 from gelpolight_core.translation import tr
 
 _THREE_LEDS = (
@@ -36,7 +36,7 @@ _THREE_LEDS = (
     LedDesign(x_mm=-12.0, y_mm=-0.6, height_mm=13.78, power=0.9),
     LedDesign(x_mm=6.4, y_mm=-10.2, height_mm=13.82, power=1.1),
 )
-# Spread over the working circle, so that every light's cosine is seen over its whole range.
+# Spread over the working circle, so that every light's cosine covers its whole range.
 _TEN_BALLS = (
     BallPress(3.0, 1.05, -4.1, -1.6),
     BallPress(4.0, 1.15, 0.2, 1.2),
@@ -61,7 +61,7 @@ _EIGHT_PRESSES = (
 )
 
 
-# No number of a sensor has more digits; larger ones do not fit into the machine's.
+# No number of a sensor has more digits; larger ones overflow.
 MOST = 10**15
 
 
@@ -76,9 +76,16 @@ class SensorDesign:
     camera, layers, leds, ring, membrane, photometry
         The parts; `leds` are the red, the green and the blue one.
     session
-        What a simulated session holds beside the usual stages.
+        Optional stages of a simulated session.
     balls, presses
         What is pressed into it when a session is simulated.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> small = gp.SensorDesign().scaled(0.25)
+    >>> small.camera.width_px, len(small.leds)
+    (320, 3)
     """
 
     serial: str = "virtual-1"
@@ -101,7 +108,7 @@ class SensorDesign:
             height_px=max(16, round(old.height_px * scale)),
             fx=old.fx * scale,
             fy=old.fy * scale,
-            # Pixel centres are at whole numbers, so the picture's corner is at -0.5.
+            # Pixel centres have integer coordinates, so the corner of the image is at -0.5.
             cx=(old.cx + 0.5) * scale - 0.5,
             cy=(old.cy + 0.5) * scale - 0.5,
         )
@@ -114,7 +121,7 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
     Parameters
     ----------
     design : SensorDesign
-        To be checked.
+        The design to check.
     where : str, optional
         File or origin named in the error.
 
@@ -131,13 +138,13 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
     _check_ranges(design, where=where, prefix="")
     if len(design.leds) != 3:
         raise InputError(
-            tr("there are {n} LEDs").format(n=len(design.leds)),
+            tr("There are {n} LEDs").format(n=len(design.leds)),
             where=f"{where} [[leds]]",
-            advice=tr("Give three: the red, the green and the blue one"),
+            advice=tr("Define three LEDs: red, green and blue"),
         )
     if design.layers.air_gap_mm <= 0.0:
         raise InputError(
-            tr("the layers reach the camera: they are {t} mm thick").format(
+            tr("The layers reach the camera: they are {t} mm thick").format(
                 t=design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
             ),
             where=f"{where} [layers]",
@@ -145,7 +152,7 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
         )
     if design.camera.width_px * design.camera.height_px > MAX_PIXELS:
         raise InputError(
-            tr("the camera has {w} x {h} pixels").format(
+            tr("The camera has {w} x {h} pixels").format(
                 w=design.camera.width_px, h=design.camera.height_px
             ),
             where=f"{where} [camera]",
@@ -159,14 +166,14 @@ def validate_design(design: SensorDesign, *, where: str = "design") -> SensorDes
         )
     if design.camera.response not in RESPONSES:
         raise InputError(
-            tr("there is no response {name}").format(name=brief(design.camera.response)),
+            tr("The response {name} does not exist").format(name=brief(design.camera.response)),
             where=f"{where} [camera]",
             advice=tr("Use one of {names}").format(names=", ".join(RESPONSES)),
         )
     for press in design.presses:
         if press.shape not in SHAPES:
             raise InputError(
-                tr("there is no shape {shape}").format(shape=brief(press.shape)),
+                tr("The shape {shape} does not exist").format(shape=brief(press.shape)),
                 where=f"{where} [[presses]]",
                 advice=tr("Use one of {shapes}").format(shapes=", ".join(SHAPES)),
             )
@@ -180,7 +187,7 @@ def _check_ranges(part: Any, *, where: str, prefix: str) -> None:
         if "low" in item.metadata:
             low, high = item.metadata["low"], item.metadata["high"]
             numbers = np.asarray(value, dtype=np.float64)
-            # A NaN compares as false, so it is refused as well.
+            # A comparison with NaN is false, so NaN is refused too.
             if not np.all((numbers >= low) & (numbers <= high)):
                 raise InputError(
                     tr("{name} is {value}").format(name=name, value=brief(value)),
@@ -206,7 +213,7 @@ _LISTS = {"leds": LedDesign, "balls": BallPress, "presses": Press}
 
 
 def read_design(path: Path) -> SensorDesign:
-    """Read a design file; what it leaves out keeps the default sensor's value.
+    """Read a design file; missing values keep those of the default sensor.
 
     The tables are ``[camera]``, ``[layers]``, ``[ring]``, ``[membrane]``, ``[photometry]``,
     ``[session]``, and the lists ``[[leds]]``, ``[[balls]]``, ``[[presses]]``; their keys are the
@@ -225,21 +232,21 @@ def read_design(path: Path) -> SensorDesign:
     Raises
     ------
     InputError
-        If the file is missing, is not TOML, has an unknown key, or a value that is of the wrong
-        kind or out of range.
+        If the file is missing, is not TOML, has an unknown key, or a value of the wrong type or out
+        of range.
     """
     path = Path(path)
     try:
         table = parse_toml(read_file(path))
     except FileNotFoundError as error:
         raise InputError(
-            tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
+            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
         ) from error
     except ValueError as error:
         raise InputError(
-            tr("the file is not valid TOML ({error})").format(error=brief(str(error), 200)),
+            tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
             where=str(path),
-            advice=tr("Correct the line that is named"),
+            advice=tr("Correct the line named in the message"),
         ) from error
     return design_from_table(table, where=str(path))
 
@@ -250,14 +257,15 @@ def design_from_table(table: dict[str, Any], *, where: str) -> SensorDesign:
     Parameters
     ----------
     table : dict
-        As a design file's TOML gives it.
+        Content of a design file.
     where : str
-        What a message names.
+        Name used in error messages.
 
     Raises
     ------
     InputError
-        If a key is unknown, a value has another kind, or the design does not hold together.
+        If a key is unknown, a value has the wrong type, or the parts of the design do not fit
+        together.
     """
     _refuse_unknown(table, {"serial", *_PARTS, *_LISTS}, where=where)
     values: dict[str, Any] = {}
@@ -268,18 +276,22 @@ def design_from_table(table: dict[str, Any], *, where: str) -> SensorDesign:
             values[name] = _part(kind, table[name], where=f"{where} [{name}]")
     for name, kind in _LISTS.items():
         if name in table:
-            place = f"{where} [[{name}]]"
+            entry_name = f"{where} [[{name}]]"
             if not isinstance(table[name], list):
                 raise InputError(
-                    tr("it is not a list of tables"), where=place, advice=tr("Use double brackets")
+                    tr("The value is not a list of tables"),
+                    where=entry_name,
+                    advice=tr("Use double brackets"),
                 )
-            values[name] = tuple(_part(kind, entry, where=place) for entry in table[name])
+            values[name] = tuple(_part(kind, entry, where=entry_name) for entry in table[name])
     return validate_design(SensorDesign(**values), where=where)
 
 
 def _part(kind: type[Any], table: Any, *, where: str) -> Any:
     if not isinstance(table, dict):
-        raise InputError(tr("it is not a table"), where=where, advice=tr("Write keys and values"))
+        raise InputError(
+            tr("The value is not a table"), where=where, advice=tr("Write keys and values")
+        )
     defaults = kind()
     _refuse_unknown(table, {item.name for item in fields(kind)}, where=where)
     return kind(
@@ -301,14 +313,14 @@ def _refuse_unknown(table: dict[str, Any], known: set[str], *, where: str) -> No
     unknown = sorted(set(table) - known)
     if unknown:
         raise InputError(
-            tr("unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
+            tr("Unknown key {keys}").format(keys=brief(", ".join(unknown), 200)),
             where=where,
             advice=tr("Use only {known}").format(known=", ".join(sorted(known))),
         )
 
 
 def _converted(value: Any, like: Any, *, where: str) -> Any:
-    """Return `value` in the kind and layout of the default `like`."""
+    """Return `value` with the type and layout of the default `like`."""
     if isinstance(like, tuple):
         if isinstance(value, list) and len(value) == len(like):
             pairs = zip(value, like, strict=True)
@@ -317,7 +329,7 @@ def _converted(value: Any, like: Any, *, where: str) -> Any:
     elif isinstance(like, str):
         if isinstance(value, str) and _is_plain(value):
             return value
-        kind = tr("a plain text")
+        kind = tr("plain text")
     elif isinstance(like, bool):
         if isinstance(value, bool):
             return value
@@ -331,7 +343,7 @@ def _converted(value: Any, like: Any, *, where: str) -> Any:
             return float(value) if abs(value) < MOST else math.inf
         kind = tr("a number")
     raise InputError(
-        tr("the value is {value}").format(value=brief(value)),
+        tr("The value is {value}").format(value=brief(value)),
         where=where,
-        advice=tr("Give {kind}").format(kind=kind),
+        advice=tr("Use {kind}").format(kind=kind),
     )

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.pipeline import assemble, stages_of
 from gelpolight_core.calibration.refinement import bare_calibration, refine_with
@@ -33,11 +32,13 @@ from gelpolight_core.measurement.score import (
     summarise,
 )
 from gelpolight_core.measurement.truth import PressTruth, read_truth
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
-from gelpolight_core.session.session import Session, require_colour
-from gelpolight_core.translation import tr
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import require_colour
+from gelpolight_core.session.session import Session
+from gelpolight_core.translation import marked, tr
 
 RIM_MM = 1.0
 """What lies nearer to the edge of the working circle is not scored: the truth knows no edge."""
@@ -72,28 +73,40 @@ class Variant:
     model: str = "full"
 
 
-EVERYTHING = Variant("all", "all terms on")
+EVERYTHING = Variant("all", marked("all terms on"))
 VARIANTS = (
-    Variant("near_light_0", "light frozen at the flat membrane", Terms(near_light_rounds=0)),
-    Variant("near_light_1", "near light: 1 coarse round", Terms(near_light_rounds=1)),
-    Variant("near_light_3", "near light: 3 coarse rounds", Terms(near_light_rounds=3)),
-    Variant("ray_true_slopes", "slopes as if rays ran straight", Terms(ray_true_slopes=False)),
-    Variant("true_positions", "depth left at the flat position", Terms(true_positions=False)),
-    Variant("shadows", "dark channels believed", Terms(shadows=False)),
-    Variant("saturation", "saturated channels believed", Terms(saturation=False)),
-    Variant("weights", "plain sine transform, no weights", Terms(weights=False)),
-    Variant("free_rim", "rim always held at depth 0", Terms(free_rim=False)),
-    Variant("denoising", "even parts not averaged", Terms(denoising=False)),
-    Variant("bounce", "no light from around", calibration=CalibrationTerms(bounce=False)),
-    Variant("gloss", "no glossy lobe", calibration=CalibrationTerms(gloss=False)),
-    Variant("curves", "never a one-dimensional curve", calibration=CalibrationTerms(curves=False)),
-    Variant("crosstalk", "crosstalk left in", calibration=CalibrationTerms(crosstalk=False)),
+    Variant(
+        "near_light_0", marked("light frozen at the flat membrane"), Terms(near_light_rounds=0)
+    ),
+    Variant("near_light_1", marked("near light: 1 coarse round"), Terms(near_light_rounds=1)),
+    Variant("near_light_3", marked("near light: 3 coarse rounds"), Terms(near_light_rounds=3)),
+    Variant(
+        "ray_true_slopes", marked("slopes as if rays ran straight"), Terms(ray_true_slopes=False)
+    ),
+    Variant(
+        "true_positions", marked("depth left at the flat position"), Terms(true_positions=False)
+    ),
+    Variant("shadows", marked("dark channels believed"), Terms(shadows=False)),
+    Variant("saturation", marked("saturated channels believed"), Terms(saturation=False)),
+    Variant("weights", marked("plain sine transform, no weights"), Terms(weights=False)),
+    Variant("free_rim", marked("rim always held at depth 0"), Terms(free_rim=False)),
+    Variant("denoising", marked("even parts not averaged"), Terms(denoising=False)),
+    Variant("bounce", marked("no light from around"), calibration=CalibrationTerms(bounce=False)),
+    Variant("gloss", marked("no glossy lobe"), calibration=CalibrationTerms(gloss=False)),
+    Variant(
+        "curves",
+        marked("never a one-dimensional curve"),
+        calibration=CalibrationTerms(curves=False),
+    ),
+    Variant(
+        "crosstalk", marked("crosstalk left in"), calibration=CalibrationTerms(crosstalk=False)
+    ),
     Variant(
         "led_refinement",
-        "LEDs as the mirror shows them",
+        marked("LEDs as the mirror shows them"),
         calibration=CalibrationTerms(led_refinement=False),
     ),
-    Variant("paper", "the paper's model", model="paper"),
+    Variant("paper", marked("the paper's model"), model="paper"),
 )
 
 
@@ -143,8 +156,18 @@ class Ablation:
 
 
 @dataclass(frozen=True, slots=True)
-class _Press:
-    """A press: its row of ``truth.csv``, its picture and its true depth."""
+class TruePress:
+    """A press with its truth.
+
+    Attributes
+    ----------
+    row : PressTruth
+        Its row of ``truth.csv``.
+    rgb : (height, width, 3) float32
+        Its image, linear light.
+    truth : TrueDepth
+        Its true depth.
+    """
 
     row: PressTruth
     rgb: NDArray[np.float32]
@@ -194,7 +217,7 @@ def ablate(
     radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
     seen = run_stage(Stage.RESPONSE, session, StageResults()).response
     linear = session if seen is None else replace(session, response=seen.response)
-    presses = _presses(linear, radius_mm)
+    presses = read_presses(linear, radius_mm)
     candidates = _calibrated(session, (EVERYTHING, *variants), workers, tell)
     for candidate in candidates:
         candidate.reconstruct.depth(presses[0].rgb, normals=False)  # makes maps and kernels ready
@@ -216,21 +239,34 @@ def ablate(
     return Ablation(session.folder.resolve().name, results, repeats)
 
 
-def _presses(session: Session, radius_mm: float) -> list[_Press]:
-    """Read all presses before the long work, so that what is missing is said at once."""
+def read_presses(session: Session, radius_mm: float) -> list[TruePress]:
+    """Read all presses of a session with truth, so that what is missing is reported at once.
+
+    Parameters
+    ----------
+    session : Session
+        With ``presses/truth.csv`` and ``truth/*.npz``.
+    radius_mm : float
+        Within it each press must show its plateau.
+
+    Raises
+    ------
+    InputError
+        If a press has no image, no truth or no plateau in view.
+    """
     folder = session.folder / "presses"
     presses = []
     for row in read_truth(folder / "truth.csv").rows:
         picture = session.picture(folder / row.file)
         require_colour(picture, where=str(folder / row.file))
         truth = read_true_depth((session.folder / "truth" / row.file).with_suffix(".npz"))
-        press = _Press(row, picture.rgb, truth)
+        press = TruePress(row, picture.rgb, truth)
         _score(press, truth, radius_mm)
         presses.append(press)
     return presses
 
 
-def _score(press: _Press, found: TrueDepth | HeightMap, radius_mm: float) -> DepthScore:
+def _score(press: TruePress, found: TrueDepth | HeightMap, radius_mm: float) -> DepthScore:
     height_mm = press.row.truth.height_mm
     try:
         return score_depth(
@@ -252,7 +288,7 @@ def _score(press: _Press, found: TrueDepth | HeightMap, radius_mm: float) -> Dep
 
 
 def _take_in_turn(
-    candidates: Sequence[_Candidate], press: _Press, repeats: int, radius_mm: float
+    candidates: Sequence[_Candidate], press: TruePress, repeats: int, radius_mm: float
 ) -> None:
     """Reconstruct one press by every candidate, round by round."""
     for repeat in range(repeats):

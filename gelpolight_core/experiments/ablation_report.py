@@ -12,8 +12,8 @@ from typing import Any
 
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS
 from gelpolight_core.experiments.ablation import Ablation, TermResult
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.translation import tr
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.translation import tr, translated
 
 COLUMNS = (
     "sensor",
@@ -41,7 +41,7 @@ def ablation_rows(ablation: Ablation) -> list[dict[str, Any]]:
         {
             "sensor": ablation.sensor,
             "left_out": result.variant.name,
-            "instead": tr(result.variant.label),
+            "instead": translated(result.variant.label),
             "height_percent": result.score.height_percent,
             "size_percent": result.score.size_percent,
             "rms_um": result.score.rms_um,

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.calibration.calibration import Calibration, FullModel, Provenance, sensor_stack
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import light_directions
@@ -23,6 +22,7 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import cosine_table
+from gelpolight_core.sensor_calibration import Calibration, FullModel, Provenance, sensor_stack
 from gelpolight_core.session.session import SensorData
 from gelpolight_core.simulation.exposure import exposed
 from gelpolight_core.simulation.indenters import Indenter, press

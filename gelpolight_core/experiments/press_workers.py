@@ -22,10 +22,9 @@ import numpy as np
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.measurement.evaluation import measure_press
-from gelpolight_core.measurement.presses import picture_reconstruction
+from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.result import Measurement, Truth
-from gelpolight_core.reconstruction.heightmap import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.capture import write_picture
 from gelpolight_core.simulation.indenters import Cuboid, Cylinder, Settled
@@ -94,7 +93,7 @@ class PressWorker:
         """Make the picture where it has still to be made; measure it."""
         if task.press is not None:
             self.make(task.press, task.picture)
-        return measure_press(task.picture, task.shape, self._reconstruct)
+        return measure_press(task.picture, task.shape, self._measure_press)
 
     def make(self, press: PressWanted, picture: Path) -> None:
         """Press an object into the virtual sensor as a hand would, and write the picture."""
@@ -113,11 +112,9 @@ class PressWorker:
         return VirtualSensor(self._equipment.design, self._equipment.seed)
 
     @cached_property
-    def _reconstruct(self) -> Callable[[Path], HeightMap]:
+    def _measure_press(self) -> Callable[[Path, str], Measurement]:
         calibration = read_calibration(self._equipment.calibration)
-        return picture_reconstruction(
-            Reconstructor(calibration, model=self._equipment.model, workers=1)
-        )
+        return press_measurement(Reconstructor(calibration, model=self._equipment.model, workers=1))
 
     def _settled_on(self, indenter: Cuboid) -> Settled:
         if indenter not in self._settled:

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import MODELS
+from gelpolight_core.experiments.plain_paper import plain_depth, plain_slopes
 from gelpolight_core.experiments.stability import Case, Seen
 from gelpolight_core.experiments.stability_grids import LARGE, bump
 from gelpolight_core.experiments.stability_trial import (
@@ -15,10 +15,10 @@ from gelpolight_core.experiments.stability_trial import (
     standard_press,
     standard_sensor,
 )
-from gelpolight_core.reconstruction.heightmap import HeightMap
-from gelpolight_core.reconstruction.plain import plain_depth, plain_slopes
-from gelpolight_core.reconstruction.poisson import PoissonSolver
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import MODELS
 from gelpolight_core.translation import tr
 
 SUBJECT = "numbers"

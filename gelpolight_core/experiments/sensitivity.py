@@ -1,7 +1,7 @@
 """What an error of each calibration parameter does to the depth: the tornado chart's numbers.
 
-Each parameter is changed by itself, the pictures stay as they are, and everything that the
-calibration derives from pictures (background, light) is taken from them anew. A fit of several
+Each parameter is changed by itself, the images stay as they are, and everything that the
+calibration derives from images (background, light) is computed from them again. A fit of several
 parameters on ball presses makes up for part of it; here nothing does.
 """
 
@@ -14,12 +14,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.experiments.known_sensor import KnownPress, KnownSensor, exact_calibration
 from gelpolight_core.experiments.stability_trial import rms_um
 from gelpolight_core.measurement.score import score_depth
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.translation import tr
 

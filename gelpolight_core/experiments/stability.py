@@ -30,6 +30,38 @@ class Outcome(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class ModeSeen:
+    """What one mode made of a case.
+
+    Attributes
+    ----------
+    mode : str
+        ``best``, ``balanced``, ``fast`` or ``paper``.
+    error_um, bound_um : float or None
+        As in :class:`Seen`; None where nothing was measured.
+    doubt : str
+        What the result says of itself where it is not to be trusted; empty where it trusts itself.
+    said : str
+        What happened, in a few words.
+    """
+
+    mode: str
+    error_um: float | None
+    bound_um: float | None
+    doubt: str = ""
+    said: str = ""
+
+    @property
+    def outcome(self) -> Outcome:
+        """How this mode ended."""
+        if self.error_um is not None and self.error_um <= (
+            math.inf if self.bound_um is None else self.bound_um
+        ):
+            return Outcome.PASSED
+        return Outcome.REFUSED if self.doubt else Outcome.FAILED
+
+
+@dataclass(frozen=True, slots=True)
 class Seen:
     """What a case saw.
 
@@ -52,6 +84,8 @@ class Seen:
         Near-light rounds, or those of the solver.
     doubt : str
         What the result says of itself where it is not to be trusted; empty where it trusts itself.
+    modes : tuple of ModeSeen
+        What each mode made of it, where several were run; the case ends as the worst of them.
     """
 
     right: bool
@@ -63,6 +97,7 @@ class Seen:
     condition: float | None = None
     rounds: int | None = None
     doubt: str = ""
+    modes: tuple[ModeSeen, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +181,18 @@ def _outcome(case: Case) -> tuple[Outcome, str, Seen | None]:
         return Outcome.FAILED, f"{type(error).__name__}: {error}", None
     if not seen.finite:
         return Outcome.FAILED, tr("the result is not finite; {said}").format(said=seen.said), seen
-    if seen.right and _within_bound(seen):
+    wrong = [mode for mode in seen.modes if mode.outcome is not Outcome.PASSED]
+    if seen.right and not wrong and (seen.modes or _within_bound(seen)):
         return Outcome.PASSED, seen.said, seen
     if seen.doubt:
         return Outcome.REFUSED, f"{seen.said}; {seen.doubt}", seen
-    return Outcome.FAILED, seen.said, seen
+    failed = [mode.mode for mode in wrong if mode.outcome is Outcome.FAILED]
+    if failed or not wrong or not seen.right:
+        said = seen.said
+        if failed:
+            said += "; " + tr("wrong without a note: {modes}").format(modes=", ".join(failed))
+        return Outcome.FAILED, said, seen
+    return Outcome.REFUSED, f"{seen.said}; {'; '.join(dict.fromkeys(m.doubt for m in wrong))}", seen
 
 
 def _within_bound(seen: Seen) -> bool:

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.known_sensor import KnownSensor
@@ -22,9 +21,10 @@ from gelpolight_core.experiments.stability_trial import (
     standard_sensor,
 )
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.sensor_calibration import Calibration, FullModel
 from gelpolight_core.translation import tr
 
 SUBJECT = "calibrations"

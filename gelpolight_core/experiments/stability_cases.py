@@ -8,6 +8,7 @@ from gelpolight_core.experiments.stability_calibrations import calibration_cases
 from gelpolight_core.experiments.stability_grids import grid_cases
 from gelpolight_core.experiments.stability_pictures import picture_cases
 from gelpolight_core.experiments.stability_sensors import sensor_cases
+from gelpolight_core.experiments.stability_sessions import session_cases
 
 
 def all_cases() -> tuple[Case, ...]:
@@ -16,6 +17,7 @@ def all_cases() -> tuple[Case, ...]:
         *picture_cases(),
         *sensor_cases(),
         *calibration_cases(),
+        *session_cases(),
         *grid_cases(),
         *number_cases(),
     )

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.experiments.stability import Case, Seen
 from gelpolight_core.experiments.stability_trial import rms_um
-from gelpolight_core.reconstruction.poisson import PoissonSolver, integrate_slopes
-from gelpolight_core.reconstruction.weighted import integrate_weighted
+from gelpolight_core.reconstruction.integration.poisson import PoissonSolver, integrate_slopes
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]

@@ -14,11 +14,13 @@ from gelpolight_core.experiments.report_page import Page, write_page
 from gelpolight_core.experiments.sensitivity import Sensitivity
 from gelpolight_core.experiments.stability import CaseResult, Outcome
 from gelpolight_core.experiments.stability_figures import draw_outcomes, draw_tornado
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.experiments.stability_sessions import LengthCost
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.report.document import Drawing, Listing, Section
 from gelpolight_core.translation import tr
 
+MODE_NAMES = ("best", "balanced", "fast", "paper")
 COLUMNS = (
     "subject",
     "case",
@@ -28,12 +30,19 @@ COLUMNS = (
     "finite",
     "error_um",
     "bound_um",
+    *(f"{mode}_um" for mode in MODE_NAMES),
     "flags",
     "condition",
     "rounds",
     "seconds",
     "memory_mb",
     "said",
+)
+LENGTH_COLUMNS = (
+    "length",
+    "height_percent_per_percent",
+    "size_percent_per_percent",
+    "verdict",
 )
 SENSITIVITY_COLUMNS = (
     "parameter",
@@ -62,6 +71,7 @@ def result_rows(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
                 "finite": None if seen is None else seen.finite,
                 "error_um": _finite(None if seen is None else seen.error_um),
                 "bound_um": _finite(None if seen is None else seen.bound_um),
+                **_mode_errors(result),
                 "flags": {} if seen is None else {k: round(v, 3) for k, v in seen.flags},
                 "condition": _finite(None if seen is None else seen.condition),
                 "rounds": None if seen is None else seen.rounds,
@@ -71,6 +81,38 @@ def result_rows(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def _mode_errors(result: CaseResult) -> dict[str, float | None]:
+    modes = {} if result.seen is None else {mode.mode: mode for mode in result.seen.modes}
+    return {
+        f"{name}_um": _finite(modes[name].error_um) if name in modes else None
+        for name in MODE_NAMES
+    }
+
+
+def length_rows(costs: Sequence[LengthCost]) -> list[dict[str, Any]]:
+    """Return one row for each stated length, by the names of :data:`LENGTH_COLUMNS`."""
+    return [
+        {
+            "length": cost.length.key,
+            "height_percent_per_percent": _finite(cost.height_percent),
+            "size_percent_per_percent": _finite(cost.size_percent),
+            "verdict": cost.verdict,
+        }
+        for cost in costs
+    ]
+
+
+def length_table(costs: Sequence[LengthCost]) -> str:
+    """Return what 1 % of each stated length costs as lines of text."""
+    head = f"{tr('1 % wrong'):<38}{tr('height %'):>10}{tr('size %'):>10}  {tr('calibration')}"
+    lines = [
+        f"{cost.length.label:<38}{cost.height_percent:+10.2f}{cost.size_percent:+10.2f}"
+        f"  {cost.verdict}"
+        for cost in costs
+    ]
+    return "\n".join([head, *lines])
 
 
 def sensitivity_rows(found: Sequence[Sensitivity]) -> list[dict[str, Any]]:
@@ -123,9 +165,27 @@ def summary_line(results: Sequence[CaseResult]) -> str:
 
 
 def write_stability(
-    results: Sequence[CaseResult], found: Sequence[Sensitivity], folder: Path
+    results: Sequence[CaseResult],
+    found: Sequence[Sensitivity],
+    costs: Sequence[LengthCost],
+    folder: Path,
 ) -> list[Path]:
-    """Write ``stability.html``, ``.csv``, ``.json`` and ``sensitivity.csv``; return the paths.
+    """Write ``stability.html``, ``.csv``, ``.json``, ``sensitivity.csv`` and ``lengths.csv``.
+
+    Parameters
+    ----------
+    results : sequence of CaseResult
+        Of the cases.
+    found : sequence of Sensitivity
+        Of the calibration parameters; empty where not asked for.
+    costs : sequence of LengthCost
+        Of the stated lengths; empty where not asked for.
+    folder : Path
+        Where to write.
+
+    Returns
+    -------
+    list of Path
 
     Raises
     ------
@@ -133,7 +193,13 @@ def write_stability(
         If a file cannot be written.
     """
     rows, others = result_rows(results), sensitivity_rows(found)
-    content = {"summary": summary_line(results), "cases": rows, "sensitivity": others}
+    lengths = length_rows(costs)
+    content = {
+        "summary": summary_line(results),
+        "cases": rows,
+        "sensitivity": others,
+        "lengths": lengths,
+    }
     flat = [{**row, "flags": _flag_text(row["flags"])} for row in rows]
     texts = {
         "stability.csv": _csv_text(COLUMNS, flat),
@@ -141,15 +207,19 @@ def write_stability(
     }
     if others:
         texts["sensitivity.csv"] = _csv_text(SENSITIVITY_COLUMNS, others)
+    if lengths:
+        texts["lengths.csv"] = _csv_text(LENGTH_COLUMNS, lengths)
     for name, text in texts.items():
         write_atomically(folder / name, lambda out, text=text: out.write(text.encode()))  # type: ignore[misc]
     page = folder / "stability.html"
-    write_page(stability_page(results, found), page)
+    write_page(stability_page(results, found, costs), page)
     return [page, *(folder / name for name in texts)]
 
 
-def stability_page(results: Sequence[CaseResult], found: Sequence[Sensitivity]) -> Page:
-    """Return the report as a page: a section for each subject, and the tornado chart."""
+def stability_page(
+    results: Sequence[CaseResult], found: Sequence[Sensitivity], costs: Sequence[LengthCost] = ()
+) -> Page:
+    """Return the report as a page: a section for each subject, tornado chart, stated lengths."""
     subjects = list(dict.fromkeys(result.case.subject for result in results))
     sections = [_section(s, [r for r in results if r.case.subject == s]) for s in subjects]
     if found:
@@ -160,7 +230,22 @@ def stability_page(results: Sequence[CaseResult], found: Sequence[Sensitivity]) 
                 "sensitivity", tr("Sensitivity"), said, QualityTable(), (), (drawing,), (listing,)
             )
         )
+    if costs:
+        said = tr("What 1 % in each length of session.toml does to a measured cylinder")
+        listing = _length_listing(costs)
+        sections.append(
+            Section("lengths", tr("Stated lengths"), said, QualityTable(), (), (), (listing,))
+        )
     return Page(tr("Stability"), summary_line(results), tuple(sections))
+
+
+def _length_listing(costs: Sequence[LengthCost]) -> Listing:
+    heads = (tr("1 % wrong"), tr("Height, %"), tr("Size, %"), tr("Calibration's verdict"))
+    rows = tuple(
+        (c.length.label, f"{c.height_percent:+.2f}", f"{c.size_percent:+.2f}", c.verdict)
+        for c in costs
+    )
+    return Listing("", heads, rows, (3.0, 1.0, 1.0, 1.0))
 
 
 def _section(subject: str, results: Sequence[CaseResult]) -> Section:
@@ -176,14 +261,14 @@ def _section(subject: str, results: Sequence[CaseResult]) -> Section:
         (
             tr("Case"),
             tr("Verdict"),
-            tr("Error um"),
+            tr("Error um: best, balanced, fast, paper"),
             tr("Condition"),
             tr("Rounds"),
             tr("s"),
             tr("What was seen"),
         ),
         tuple(_cells(result) for result in results),
-        (3.0, 1.0, 1.0, 1.0, 0.8, 0.6, 4.0),
+        (3.0, 1.0, 1.6, 1.0, 0.8, 0.6, 4.0),
     )
     return Section(subject, subject.capitalize(), "", quality, (), drawings, (listing,))
 
@@ -203,12 +288,23 @@ def _cells(result: CaseResult) -> tuple[str, ...]:
             what=result.case.label, required=result.case.required
         ),
         result.outcome.value,
-        "" if seen is None else _number(seen.error_um),
+        _error_text(result),
         "" if seen is None else _number(seen.condition),
         "" if seen is None or seen.rounds is None else str(seen.rounds),
         f"{result.seconds:.1f}",
         said,
     )
+
+
+def _error_text(result: CaseResult) -> str:
+    """Return the error, or that of each mode where several were run."""
+    seen = result.seen
+    if seen is None:
+        return ""
+    if not seen.modes:
+        return _number(seen.error_um)
+    errors = _mode_errors(result)
+    return ", ".join(_number(errors[f"{name}_um"]) or "-" for name in MODE_NAMES)
 
 
 def _sensitivity_listing(found: Sequence[Sensitivity]) -> Listing:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -10,26 +11,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import MODELS, Calibration
 from gelpolight_core.experiments.known_sensor import (
     KnownPress,
     KnownSensor,
     known_sensor,
     matt_design,
 )
-from gelpolight_core.experiments.stability import Seen
+from gelpolight_core.experiments.stability import ModeSeen, Seen
 from gelpolight_core.lights.positions import direction_condition
+from gelpolight_core.measurement.indenter_tools import mode_error
 from gelpolight_core.measurement.score import TrueDepth
-from gelpolight_core.reconstruction.acceptance import accepted, rim_let_go
-from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
-from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, Flag, HeightMap
+from gelpolight_core.measurement.spread import BALL_SLOPE
+from gelpolight_core.reconstruction.checks import accepted, free_boundary_note
+from gelpolight_core.reconstruction.height_map import FLAG_NAMES, Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.trace import EFFORTS
+from gelpolight_core.sensor_calibration import MODELS, Calibration
 from gelpolight_core.simulation.indenters import Ball
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
 RIM_MM = 1.0
 SCALE = 0.25
+MOST_OWN_SHARE = 0.1
 BALL = Ball(4.0, 1.0)
 BALL_AT_MM = (1.2, -0.8)
 
@@ -111,11 +115,10 @@ def condition_of(calibration: Calibration) -> float:
     return direction_condition(leds, points)
 
 
-def rounds_of(calibration: Calibration, frame: NDArray[Any]) -> int:
-    """Return how many near-light rounds the full model took, the last one at full scale."""
-    full = calibration.full
-    assert full is not None
-    return len(reconstruct_full(as_linear(accepted(frame, name="")), calibration, full).changes_mm)
+def rounds_of(reconstructor: Reconstructor, frame: NDArray[Any]) -> int:
+    """Return how many near-light rounds a frame needed, the last one at full scale."""
+    rounds = reconstructor.near_light.depth(accepted(frame, name=""), normals=False).rounds
+    return 0 if rounds is None else len(rounds.changes_mm) + 1
 
 
 def judged(
@@ -144,16 +147,36 @@ def judged(
     needs : sequence of Flag, optional
         Flags that must be raised somewhere by every model.
     models : sequence of str, optional
-        ``paper`` has to be finite and flagged, but not right: its lights are frozen.
+        The full one is run at each effort. Efforts and the paper's model may exceed the bound by
+        their own error (:func:`own_share`).
     radius_mm : float, optional
         Of the compared area; by default the working circle less its rim.
     """
     picture = press.frame if frame is None else frame
     calibration = known.calibration
     radius = radius_mm or 0.5 * calibration.sensor.working_diameter_mm - RIM_MM
-    found = {m: Reconstructor(calibration, model=m).depth(picture) for m in models}
+    by = {m: Reconstructor(calibration, model=m) for m in models}
+    found = {m: reconstructor.depth(picture) for m, reconstructor in by.items()}
     best = found["full"] if "full" in found else found[models[0]]
-    error = rms_um(depth_error(best, press.truth, radius_mm=radius, spare=spare))
+    ways = {"best" if m == "full" else m: h for m, h in found.items()}
+    if "full" in found:
+        others = [effort for effort in EFFORTS if effort != "best"]
+        ways |= {effort: by["full"].at_effort(effort).depth(picture) for effort in others}
+
+    def error_of(heightmap: HeightMap) -> float:
+        return rms_um(depth_error(heightmap, press.truth, radius_mm=radius, spare=spare))
+
+    peak_um = 1e3 * float(press.truth.depth_mm.max())
+    modes = tuple(
+        ModeSeen(
+            mode,
+            error_of(heightmap),
+            bound_um + (0.0 if mode == "best" else own_share(heightmap) * peak_um),
+            "; ".join([*doubts_of(heightmap), *_raised(heightmap, needs)]),
+        )
+        for mode, heightmap in ways.items()
+    )
+    error = error_of(best)
     missing = [str(f.name) for f in needs for h in found.values() if not flagged(h, f).any()]
     said = tr("{e:.1f} um RMS on a press of {h:.2f} mm").format(
         e=error, h=float(press.truth.depth_mm.max())
@@ -163,16 +186,38 @@ def judged(
     return Seen(
         right=not missing,
         said=said,
-        finite=all(is_finite(h) for h in found.values()),
+        finite=all(is_finite(h) for h in ways.values()),
         error_um=error,
         bound_um=bound_um,
         flags=flag_shares(best),
         condition=condition_of(calibration),
-        rounds=rounds_of(calibration, picture) if "full" in found else None,
-        doubt="; ".join(doubts_of(best)),
+        rounds=rounds_of(by["full"], picture) if "full" in found else None,
+        # A note counts for the mode that gives it, and for no other.
+        doubt="",
+        modes=modes,
     )
+
+
+def _raised(heightmap: HeightMap, needs: Sequence[Flag]) -> list[str]:
+    """Return the flags of a spoilt area, where a case requires them and all are raised."""
+    if not needs or not all(flagged(heightmap, flag).any() for flag in needs):
+        return []
+    return [tr("flagged: {flags}").format(flags=", ".join(str(flag.name) for flag in needs))]
+
+
+def own_share(heightmap: HeightMap) -> float:
+    """Return what a mode may add to the bound, as a share of the deepest place.
+
+    Coarse nodes and frozen lights err even with an exact calibration, by what is part of the
+    stated standard deviation. More than `MOST_OWN_SHARE` has to be noted on the map.
+    """
+    own = mode_error(heightmap)
+    return min(math.hypot(own.depth, own.depth_per_slope * BALL_SLOPE), MOST_OWN_SHARE)
 
 
 def doubts_of(found: HeightMap) -> tuple[str, ...]:
     """Return the notes of a map that say its depth is not to be trusted."""
-    return tuple(note for note in found.notes if note != rim_let_go())
+    harmless = {free_boundary_note()}
+    if found.health is not None:
+        harmless |= {finding.line for finding in found.health.findings if finding.corrected}
+    return tuple(note for note in found.notes if note not in harmless)

@@ -13,10 +13,10 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import calibrate_session
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.experiments.press_workers import Equipment, PressTask, work_through
-from gelpolight_core.export.atomic import make_folder
+from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.measurement.evaluation import Evaluation, evaluate_presses
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.presses import open_ledger, picture_reconstruction
+from gelpolight_core.measurement.presses import open_ledger, press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.protocol_run import ProtocolRun
 from gelpolight_core.measurement.truth import read_truth
@@ -183,7 +183,7 @@ def evaluate_run(run: ProtocolRun, reconstructor: Reconstructor, ledger: Ledger)
     """
     return evaluate_presses(
         run.presses,
-        picture_reconstruction(reconstructor),
+        press_measurement(reconstructor),
         crossing=run.protocol.crossing,
         ledger=ledger,
     )

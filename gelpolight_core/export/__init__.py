@@ -1,1 +1,1 @@
-"""Height maps as files that other programs read."""
+"""Export of height maps to files for other programs."""

@@ -1,4 +1,4 @@
-"""A checkerboard to print: an A4 page at true scale, with a ruler that shows what a printer did."""
+"""A checkerboard to print: an A4 page at true scale, with a ruler to check the printed size."""
 
 from __future__ import annotations
 
@@ -11,46 +11,46 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from gelpolight_core.drawing_thread import in_drawing_thread
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.export.drawing_thread import in_drawing_thread
-from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 A4_MM = (210.0, 297.0)
 MM_PER_INCH = 25.4
 ENDING = ".pdf"
 RULER_MM = 50.0
-# Printers leave this much white; ruler and text stand in a strip of this height at the foot.
+# Margin that printers leave white; ruler and text are in a strip of this height at the foot.
 MARGIN_MM = 10.0
 FOOT_MM = 38.0
-# The detector needs light around the board: cut no closer than this many squares.
+# The detector needs light around the board: cut no closer than this number of squares.
 QUIET_SQUARES = 1.5
 CUT_MM = 4.0
 
 
 @in_drawing_thread
 def write_board(board: BoardSpec, path: Path) -> None:
-    """Write a checkerboard as a PDF page at true scale, whole or not at all.
+    """Write a checkerboard as a PDF page at true scale, completely or not at all.
 
     Parameters
     ----------
     board : BoardSpec
         Corners and squares.
     path : Path
-        Its name ends in ``.pdf``.
+        Its name must end in ``.pdf``.
 
     Raises
     ------
     InputError
-        If the board does not fit the paper, the name ends otherwise, or the file cannot be
+        If the board does not fit the paper, the name has another extension, or the file cannot be
         written.
     """
     if path.suffix.lower() != ENDING:
         raise InputError(
-            tr("a board is written as PDF"),
+            tr("A board can only be written as PDF"),
             where=str(path),
-            advice=tr("Let the file's name end in .pdf"),
+            advice=tr("Use a file name that ends in .pdf"),
         )
     stream = io.BytesIO()
     information = {"Title": caption(board), "Creator": "GelPoLight Studio", "CreationDate": None}
@@ -60,7 +60,7 @@ def write_board(board: BoardSpec, path: Path) -> None:
 
 
 def caption(board: BoardSpec) -> str:
-    """Return what a board is, in words."""
+    """Return a description of a board."""
     return tr("Checkerboard: {w} x {h} inner corners, squares of {s:g} mm").format(
         w=board.inner_corners[0], h=board.inner_corners[1], s=board.square_mm
     )
@@ -87,7 +87,7 @@ def draw_board(board: BoardSpec) -> Figure:
         for column in range(row % 2, across, 2):
             corner = left + column * board.square_mm, top + row * board.square_mm
             side = board.square_mm
-            # Snapped to a raster's pixels, squares would differ in size.
+            # If snapped to raster pixels, squares would differ in size.
             axes.add_patch(Rectangle(corner, side, side, color="black", linewidth=0, snap=False))
     quiet = QUIET_SQUARES * board.square_mm
     _cut_marks(axes, (left - quiet, top - quiet), (left + width + quiet, top + height + quiet))
@@ -96,13 +96,13 @@ def draw_board(board: BoardSpec) -> Figure:
 
 
 def _paper(width_mm: float, height_mm: float, board: BoardSpec) -> tuple[float, float]:
-    """Return the size of the page, upright where the board fits it so."""
+    """Return the size of the page, in portrait format if the board fits."""
     around = 2.0 * (MARGIN_MM + QUIET_SQUARES * board.square_mm)
     for page in (A4_MM, A4_MM[::-1]):
         if width_mm + around <= page[0] and height_mm + around + FOOT_MM <= page[1]:
             return page
     raise InputError(
-        tr("a board of {w:.0f} x {h:.0f} mm does not fit an A4 page").format(
+        tr("A board of {w:.0f} x {h:.0f} mm does not fit on an A4 page").format(
             w=width_mm, h=height_mm
         ),
         where=caption(board),
@@ -111,7 +111,7 @@ def _paper(width_mm: float, height_mm: float, board: BoardSpec) -> tuple[float, 
 
 
 def _cut_marks(axes: Axes, first: tuple[float, float], last: tuple[float, float]) -> None:
-    """Mark the corners of what is to be cut out, with nothing dark near the squares."""
+    """Mark the corners of the area to cut out, with nothing dark near the squares."""
     for x, outward_x in ((first[0], -CUT_MM), (last[0], CUT_MM)):
         for y, outward_y in ((first[1], -CUT_MM), (last[1], CUT_MM)):
             for ends in (((x, x + outward_x), (y, y)), ((x, x), (y, y + outward_y))):
@@ -119,7 +119,7 @@ def _cut_marks(axes: Axes, first: tuple[float, float], last: tuple[float, float]
 
 
 def _foot(axes: Axes, page: tuple[float, float], board: BoardSpec) -> None:
-    """Draw the ruler and say how to print."""
+    """Draw the ruler and the printing instructions."""
     left, y = 0.5 * (page[0] - RULER_MM), page[1] - FOOT_MM + 8.0
     axes.add_line(
         Line2D((left, left + RULER_MM), (y, y), color="black", linewidth=0.6, solid_capstyle="butt")
@@ -131,8 +131,11 @@ def _foot(axes: Axes, page: tuple[float, float], board: BoardSpec) -> None:
     lines = (
         tr("{mm:.0f} mm").format(mm=RULER_MM),
         caption(board),
-        tr("Print at 100 %, without fitting it to the page: the line above must be 50.0 mm long."),
-        tr("Glue it onto something flat, measure all its squares together, and state one's size."),
+        tr("Print at 100 %, not fitted to the page: the line above must be 50.0 mm long."),
+        tr(
+            "Glue the board onto a flat plate, measure all squares together, and enter the side "
+            "of one square."
+        ),
     )
     for number, text in enumerate(lines):
         axes.text(0.5 * page[0], y + 5.0 + 5.0 * number, text, ha="center", va="center", fontsize=8)

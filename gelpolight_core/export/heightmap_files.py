@@ -1,4 +1,4 @@
-"""A height map into files, one per format, named after its picture."""
+"""Write a height map to files, one per format, named after its image."""
 
 from __future__ import annotations
 
@@ -8,42 +8,52 @@ from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
-from gelpolight_core.export.mesh import Mesh, mesh_of, write_ply, write_stl, write_vtp
-from gelpolight_core.export.raster import describe, write_gsf, write_npz, write_png16, write_tiff
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.export.mesh import Mesh, mesh_of, write_gltf, write_ply, write_stl, write_vtp
+from gelpolight_core.export.raster import (
+    describe,
+    write_csv,
+    write_gsf,
+    write_npz,
+    write_png16,
+    write_tiff,
+    write_xyz,
+)
+from gelpolight_core.io.atomic import make_folder, write_atomically
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Writer = Callable[[BinaryIO], object]
 
-RASTER_FORMATS = ("npz", "tif", "png", "gsf")
-MESH_FORMATS = ("vtp", "ply", "stl")
+RASTER_FORMATS = ("npz", "tif", "png", "gsf", "csv", "xyz")
+MESH_FORMATS = ("vtp", "ply", "stl", "glb")
 FORMATS = (*RASTER_FORMATS, *MESH_FORMATS)
 
 
 def ending(name: str) -> str:
-    """Return the ending of a format's files, without its first dot."""
+    """Return the extension of a format's files, without its first dot."""
     return "depth.png" if name == "png" else name
 
 
 def write_heightmap(
     heightmap: HeightMap, folder: Path, *, formats: Sequence[str], stride: int = 1
 ) -> list[Path]:
-    """Write a height map as ``<folder>/<picture without ending>.<format>``, a file per format.
+    """Write a height map as ``<folder>/<image without extension>.<format>``, one file per format.
 
     Parameters
     ----------
     heightmap : HeightMap
-        What to write.
+        The height map.
     folder : Path
-        Made when it is not there. Files of the same name are replaced, each whole or not at all.
+        Created if it does not exist. Files of the same name are replaced, each completely or not at
+        all.
     formats : sequence of str
-        Out of :data:`FORMATS`: ``npz`` (everything), ``tif``, ``gsf`` and ``png`` (the
-        depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera's
-        picture may stand beside it), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
-        same), ``stl`` (bare mesh).
+        Out of :data:`FORMATS`: ``npz`` (everything), ``csv`` (the depth as a table, with the
+        places of columns and rows), ``xyz`` (one point a line), ``tif``, ``gsf`` and ``png`` (the
+        depth; ``png`` in 16 bits with their scale, and named ``.depth.png``, since the camera image
+        may be in the same folder), ``vtp`` (mesh with depth, flags and normals), ``ply`` (the
+        same), ``stl`` (bare mesh), ``glb`` (glTF, in metres).
     stride : int, optional
-        The meshes take every so many-th row and column only.
+        Meshes use only every n-th row and column.
 
     Returns
     -------
@@ -53,12 +63,12 @@ def write_heightmap(
     Raises
     ------
     InputError
-        Where a format is unknown, a file cannot be written, or a mesh would be empty.
+        If a format is unknown, a file cannot be written, or a mesh would be empty.
     """
     for name in formats:
         if name not in FORMATS:
             raise InputError(
-                tr("the format {name} is not known").format(name=repr(name)),
+                tr("The format {name} is unknown").format(name=repr(name)),
                 where=tr("export"),
                 advice=tr("Choose from {names}").format(names=", ".join(FORMATS)),
             )
@@ -75,9 +85,16 @@ def write_heightmap(
 
 def _writer(name: str, heightmap: HeightMap, surface: Mesh | None, stride: int) -> Writer:
     if surface is None or name in RASTER_FORMATS:
-        writers = {"npz": write_npz, "tif": write_tiff, "png": write_png16, "gsf": write_gsf}
+        writers = {
+            "npz": write_npz,
+            "tif": write_tiff,
+            "png": write_png16,
+            "gsf": write_gsf,
+            "csv": write_csv,
+            "xyz": write_xyz,
+        }
         return partial(writers[name], heightmap)
     if name == "vtp":
         pitch_mm = heightmap.pitch_mm * stride
         return partial(write_vtp, surface, pitch_mm=pitch_mm, about=describe(heightmap))
-    return partial({"ply": write_ply, "stl": write_stl}[name], surface)
+    return partial({"ply": write_ply, "stl": write_stl, "glb": write_gltf}[name], surface)

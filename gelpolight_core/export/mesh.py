@@ -1,4 +1,4 @@
-"""The surface of a height map as triangles, and the files that hold triangles."""
+"""The surface of a height map as triangles, and mesh files."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.reading import as_text
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.io.reading import as_text
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """Triangles of the membrane in the sensor frame.
+    """Triangle mesh of the membrane in the sensor frame.
 
     Attributes
     ----------
@@ -48,14 +48,14 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
     heightmap : HeightMap
         The surface.
     stride : int, optional
-        Take every so many-th row and column only, for smaller files.
+        Use only every n-th row and column, for smaller files.
 
     Raises
     ------
     ValueError
-        Where `stride` is below 1.
+        If `stride` is below 1.
     InputError
-        Where no cell is left.
+        If no cell is left.
     """
     if stride < 1:
         raise ValueError(f"stride = {stride}, expected 1 or more")
@@ -63,7 +63,7 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
     used = ~_bad_cells(heightmap, stride)
     if not used.any():
         raise InputError(
-            tr("no part of the surface lies in the working area"),
+            tr("No part of the surface is in the working area"),
             where=heightmap.source,
             advice=tr("Check the working area in the calibration"),
         )
@@ -90,7 +90,7 @@ def mesh_of(heightmap: HeightMap, *, stride: int = 1) -> Mesh:
 
 
 def _bad_cells(heightmap: HeightMap, stride: int) -> NDArray[np.bool_]:
-    """Cells of the thinned grid with any pixel, corners included, that has no place in a mesh."""
+    """Cells of the thinned grid with any pixel, corners included, that cannot be part of a mesh."""
     bad = (heightmap.flags & Flag.OUTSIDE.value).astype(bool) | ~np.isfinite(heightmap.depth_mm)
     for _ in range(2):
         cells = max((bad.shape[0] - 1) // stride, 0)
@@ -109,9 +109,9 @@ def write_vtp(mesh: Mesh, file: BinaryIO, *, pitch_mm: float, about: dict[str, s
     file : binary file
         Open for writing.
     pitch_mm : float
-        Kept as field data.
+        Stored as field data.
     about : dict
-        Names and texts that are kept as field data too.
+        Names and texts that are also stored as field data.
     """
     store = _AppendedArrays()
     fields = store.add("pitch_mm", np.array([pitch_mm]), "Float64", 'NumberOfTuples="1"')
@@ -169,11 +169,11 @@ def write_ply(mesh: Mesh, file: BinaryIO) -> None:
     Parameters
     ----------
     mesh : Mesh
-        What is written.
+        The mesh.
     file : binary file
         Open for writing.
     """
-    from trimesh.exchange.ply import export_ply  # heavy, and needed for this alone
+    from trimesh.exchange.ply import export_ply  # slow to import, and only needed here
 
     surface = _as_trimesh(mesh)
     surface.vertex_attributes["depth_mm"] = mesh.depth_mm
@@ -182,18 +182,39 @@ def write_ply(mesh: Mesh, file: BinaryIO) -> None:
 
 
 def write_stl(mesh: Mesh, file: BinaryIO) -> None:
-    """Write a binary STL: the bare triangles.
+    """Write a binary STL: triangles only.
 
     Parameters
     ----------
     mesh : Mesh
-        What is written.
+        The mesh.
     file : binary file
         Open for writing.
     """
     from trimesh.exchange.stl import export_stl
 
     file.write(export_stl(_as_trimesh(mesh)))
+
+
+def write_gltf(mesh: Mesh, file: BinaryIO) -> None:
+    """Write a binary glTF. The vertices are in mm; the node scales them to metres.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+    file : binary file
+        Open for writing.
+    """
+    import trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    scene = trimesh.Scene()
+    scene.add_geometry(
+        _as_trimesh(mesh), node_name="membrane", transform=np.diag([1e-3, 1e-3, 1e-3, 1.0])
+    )
+    content = export_glb(scene, include_normals=mesh.normals is not None)  # type: ignore[no-untyped-call]
+    file.write(content)
 
 
 def _as_trimesh(mesh: Mesh):  # type: ignore[no-untyped-def]

@@ -1,4 +1,4 @@
-"""A height map as one picture for people: camera picture, shaded depth, cross-section."""
+"""A height map as one overview image: camera image, shaded depth, cross-section."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.export.drawing_thread import in_drawing_thread
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.drawing_thread import in_drawing_thread
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
 COLOURS = "viridis"
 
 
 def preview_figure(heightmap: HeightMap, frame: NDArray[np.floating[Any]]) -> Figure:
-    """Draw the camera picture, the hill-shaded depth with its scale, and a cross-section.
+    """Draw the camera image, the shaded depth with its scale, and a cross-section.
 
-    The cross-section runs along x through the middle of what is deep.
+    The cross-section runs along x through the centre of the indentation.
 
     Parameters
     ----------
     heightmap : HeightMap
         The depth map.
     frame : (height, width, 3)
-        The raw picture, 0..1.
+        The raw image, 0..1.
     """
     figure = Figure(figsize=(13.0, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.2, 1.1))
     left.imshow(np.clip(frame, 0.0, 1.0) ** (1 / 2.2))
-    left.set_title(tr("What the camera sees"))
+    left.set_title(tr("Camera image"))
     left.set_axis_off()
     depth = np.where(heightmap.flags & int(Flag.OUTSIDE), np.nan, heightmap.depth_mm)
     top = max(float(np.nanmax(depth)), 1e-3)
@@ -71,7 +71,7 @@ def _draw_depth(
 
 @in_drawing_thread
 def write_preview(heightmap: HeightMap, frame: NDArray[np.floating[Any]], path: Path) -> None:
-    """Write the preview as a PNG file, whole or not at all.
+    """Write the preview as a PNG file, completely or not at all.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A profile as a table that spreadsheets read."""
+"""Write a profile as a table for spreadsheets."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import io
 import math
 from pathlib import Path
 
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.profile import Profile
 
 COLUMNS = ("along_mm", "x_mm", "y_mm", "depth_mm", "depth_sd_mm", "flags")
 
 
 def write_profile(profile: Profile, path: Path) -> None:
-    """Write a profile as CSV (UTF-8, points for decimals), whole or not at all.
+    """Write a profile as CSV (UTF-8, decimal points), completely or not at all.
 
-    One row for each point: distance from the start, place, depth, its standard deviation and the
-    flags. A cell is empty where the depth or its deviation is not known.
+    One row per point: distance from the start, position, depth, its standard deviation and the
+    flags. A cell is empty if the depth or its deviation is unknown.
 
     Parameters
     ----------
     profile : Profile
-        What is written.
+        The profile.
     path : Path
         The file.
 

@@ -5,27 +5,41 @@ from __future__ import annotations
 import io
 import json
 import struct
+import zipfile
 import zlib
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, HeightMap
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import read_file
+from gelpolight_core.reconstruction.height_map import (
+    FLAG_NAMES,
+    SD_MAPS,
+    SENSOR_NUMBERS,
+    Flag,
+    HeightMap,
+)
+from gelpolight_core.translation import tr
 
 GREY_LEVELS = 65_535
-"""Of 16 bits, without the one that stands for an unknown depth."""
+"""Largest 16-bit value, as one value is reserved for unknown depths."""
+NPZ_LIMIT = 4_000_000_000
+"""Bytes of a height map of a hundred million pixels with all its maps."""
 LEAST_STEP_MM = 1e-6
-"""Step of a map without any difference of depth."""
+"""Step for a map with constant depth."""
 
 
 def flag_names() -> list[str]:
-    """Return the flags as they stand in files, such as ``dark=4``."""
+    """Return the flags as written to files, such as ``dark=4``."""
     return [f"{name}={value}" for name, value in FLAG_NAMES.items()]
 
 
 def describe(heightmap: HeightMap) -> dict[str, str]:
-    """Return where the height map comes from, for formats that keep texts beside the data."""
+    """Return the origin of the height map, for formats with text metadata."""
     return {
         "calibration_id": heightmap.calibration_id,
         "model": heightmap.model,
@@ -35,7 +49,7 @@ def describe(heightmap: HeightMap) -> dict[str, str]:
 
 
 def _about(heightmap: HeightMap) -> dict[str, str | float]:
-    """Return unit, scale and origin of the depth, for formats that keep texts."""
+    """Return unit, scale and origin of the depth, for formats with text metadata."""
     return {
         "quantity": "depth_mm",
         "unit": "mm",
@@ -47,15 +61,14 @@ def _about(heightmap: HeightMap) -> dict[str, str | float]:
 
 
 def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write what the height map holds; what it does not hold (None) is left out.
+    """Write the contents of the height map; missing parts (None) are left out.
 
-    The standard deviations are described in :class:`HeightMap`. The examples of noise stay in the
-    program.
+    The standard deviations are described in :class:`HeightMap`. The noise samples are not written.
 
     Parameters
     ----------
     heightmap : HeightMap
-        What is written.
+        The height map.
     file : binary file
         Open for writing.
     """
@@ -76,29 +89,81 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         values = getattr(heightmap, name)
         if values is not None:
             arrays[name] = values.astype(np.float32, copy=False)
-    for name in ("depth_scale_sd", "lateral_scale_sd"):
+    for name in SENSOR_NUMBERS:
         if getattr(heightmap, name) is not None:
             arrays[name] = np.float64(getattr(heightmap, name))
     np.savez(file, **arrays)
 
 
+def read_npz(path: Path) -> HeightMap:
+    """Return the height map of a file that :func:`write_npz` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is not a height map.
+    """
+    try:
+        stream = io.BytesIO(read_file(path, NPZ_LIMIT))
+        with np.load(stream, allow_pickle=False) as stored:
+            # Check the sizes declared by the archive before anything is decompressed.
+            if sum(entry.file_size for entry in stored.zip.infolist()) > NPZ_LIMIT:
+                raise ValueError("too large")
+            known = set(stored.files)
+            optional: dict[str, Any] = {
+                name: stored[name].astype(np.float32)
+                for name in ("normals", *SD_MAPS)
+                if name in known
+            } | {name: float(stored[name]) for name in SENSOR_NUMBERS if name in known}
+            heightmap = HeightMap(
+                depth_mm=stored["depth_mm"].astype(np.float32),
+                x_mm=stored["x_mm"].astype(np.float64),
+                y_mm=stored["y_mm"].astype(np.float64),
+                pitch_mm=float(stored["pitch_mm"]),
+                flags=stored["flags"].astype(np.uint8),
+                calibration_id=str(stored["calibration_id"]),
+                model=str(stored["model"]),
+                source=str(stored["source"]),
+                **{"normals": None} | optional,
+            )
+        if not heightmap.pitch_mm > 0.0:
+            raise ValueError("pitch_mm")
+    except FileNotFoundError as error:
+        raise _no_heightmap(path, tr("The file does not exist")) from error
+    except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error,
+            NotImplementedError) as error:  # fmt: skip
+        raise _no_heightmap(path, tr("The file is not a height map in npz format")) from error
+    return heightmap
+
+
+def _no_heightmap(path: Path, found: str) -> InputError:
+    return InputError(
+        found, where=str(path), advice=tr("Choose an .npz file exported by this program")
+    )
+
+
 def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
     """Write the depth in mm, one float32 channel.
 
-    The pitch is in the resolution tags (pixels per centimetre), and, with the place of the first
+    The pitch is in the resolution tags (pixels per centimetre), and, with the position of the first
     pixel and the calibration, in the description as JSON.
 
     Parameters
     ----------
     heightmap : HeightMap
-        What is written.
+        The height map.
     file : binary file
         Open for writing.
     """
     import tifffile
 
     per_centimetre = 10.0 / heightmap.pitch_mm
-    # Not into the file: NumPy's own writing does not say when the disk is full.
+    # Not directly into the file: NumPy's own writing does not report a full disk.
     held = io.BytesIO()
     tifffile.imwrite(
         held,
@@ -115,16 +180,16 @@ def write_tiff(heightmap: HeightMap, file: BinaryIO) -> None:
 
 
 def write_png16(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write the depth as a grey PNG of 16 bits, with its scale.
+    """Write the depth as a 16-bit grey PNG, with its scale.
 
-    ``depth = offset_mm + step_mm * value``, right to within half a step; the value 0 stands for a
-    depth that is not known. The scale is in the picture's text (keyword ``GelPoLight``) as JSON,
-    with what a TIFF says too; the pitch is in its resolution as well.
+    ``depth = offset_mm + step_mm * value``, with an error of at most half a step; the value 0 means
+    an unknown depth. The scale is in the text metadata of the image (keyword ``GelPoLight``) as
+    JSON, with the same data as in a TIFF; the pitch is also in its resolution.
 
     Parameters
     ----------
     heightmap : HeightMap
-        What is written.
+        The height map.
     file : binary file
         Open for writing.
 
@@ -143,7 +208,7 @@ def write_png16(heightmap: HeightMap, file: BinaryIO) -> None:
     per_metre = round(1e3 / heightmap.pitch_mm)
     chunks = _chunk(b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1))
     chunks += _chunk(b"tEXt", b"GelPoLight\0" + json.dumps(about).encode("ascii"))
-    # After the signature and the header (8 + 25 bytes), where the standard wants them.
+    # After the signature and the header (8 + 25 bytes), as required by the standard.
     file.write(data[:33] + chunks + data[33:])
 
 
@@ -153,14 +218,14 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def write_gsf(heightmap: HeightMap, file: BinaryIO) -> None:
-    """Write a Gwyddion Simple Field: the depth in metres, as its format asks for.
+    """Write a Gwyddion Simple Field: the depth in metres, as required by the format.
 
-    Its lengths are those of the pixels' outline, half a pixel beyond the outermost centres.
+    Its lengths include half a pixel beyond the outermost pixel centres.
 
     Parameters
     ----------
     heightmap : HeightMap
-        What is written.
+        The height map.
     file : binary file
         Open for writing.
 
@@ -191,3 +256,32 @@ def write_gsf(heightmap: HeightMap, file: BinaryIO) -> None:
 
 def _one_line(text: str) -> str:
     return "".join(character if character.isprintable() else " " for character in text)
+
+
+def write_csv(heightmap: HeightMap, file: BinaryIO) -> None:
+    """Write the depth as a table: x in mm in the first row, y in mm in the first column.
+
+    Places without depth are empty.
+    """
+    header = ",".join(["depth_mm", *(f"{x:.6g}" for x in heightmap.x_mm)])
+    file.write(f"{header}\n".encode())
+    there = _known(heightmap)
+    for y, depths, known in zip(heightmap.y_mm, heightmap.depth_mm, there, strict=True):
+        cells = (f"{d:.6g}" if k else "" for d, k in zip(depths, known, strict=True))
+        file.write(f"{y:.6g},{','.join(cells)}\n".encode())
+
+
+def write_xyz(heightmap: HeightMap, file: BinaryIO) -> None:
+    """Write x, y and height of every point in mm, one point a line. The height is minus the depth.
+
+    Places without depth are left out.
+    """
+    there = _known(heightmap)
+    x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
+    points = np.column_stack([x[there], y[there], -heightmap.depth_mm[there]])
+    np.savetxt(file, points, fmt="%.6g")
+
+
+def _known(heightmap: HeightMap) -> NDArray[np.bool_]:
+    out = np.uint8(Flag.OUTSIDE | Flag.INVALID)
+    return np.asarray(np.isfinite(heightmap.depth_mm) & ((heightmap.flags & out) == 0))

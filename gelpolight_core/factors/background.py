@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
@@ -16,20 +17,19 @@ from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-SATURATED = 0.995
 LEAST_FACTOR = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class FactorResult:
-    """How bright each membrane node is against the theory for an even membrane.
+    """Brightness of each membrane node relative to the theory for a uniform membrane.
 
     Attributes
     ----------
     factors : (rows, columns, 3) float32
-        rho = I / I_t of Eq. (9), per channel; 0 where it is unknown.
+        rho = I / I_t of Eq. (9), per channel; 0 if unknown.
     usable : (rows, columns) bool
-        Nodes with light and a membrane that answers it.
+        Nodes with light and a reflecting membrane.
     quality : QualityTable
         Figures, limits and advice.
     """
@@ -45,7 +45,7 @@ def flat_cosines(table: ResamplingTable, led_positions_mm: Array) -> Array:
     Parameters
     ----------
     table : ResamplingTable
-        Whose grid the membrane has.
+        Table with the membrane grid.
     led_positions_mm : (3, 3)
         Sensor frame.
     """
@@ -62,14 +62,14 @@ def calibrate_factors(
     radiance: RadianceResult,
     reflectance: ReflectanceTable,
 ) -> FactorResult:
-    """Compare the background with what an even, flat membrane would show.
+    """Compare the background with the theory for a uniform, flat membrane.
 
     Parameters
     ----------
     background : (rows, columns, 3) float32
         The contact-free membrane, resampled onto the grid.
     table, led_positions_mm, radiance, reflectance
-        Earlier stages.
+        Results of earlier stages.
     """
     cosines = flat_cosines(table, led_positions_mm)
     factors = np.zeros(background.shape, dtype=np.float32)
@@ -104,7 +104,7 @@ def _judge(factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_]) -> Q
                 "%",
                 warn=15.0,
                 fail=40.0,
-                advice=tr("The membrane is uneven: spray it again, or repeat the whiteboard stage"),
+                advice=tr("The membrane is uneven: coat it again, or repeat the whiteboard stage"),
             ),
             judge(
                 "membrane_unusable_percent",
@@ -113,7 +113,7 @@ def _judge(factors: Map, usable: NDArray[np.bool_], lit: NDArray[np.bool_]) -> Q
                 "%",
                 warn=2.0,
                 fail=20.0,
-                advice=tr("Look for holes, dirt or saturation in the background picture"),
+                advice=tr("Check the background image for holes, dirt or saturation"),
             ),
         )
     )

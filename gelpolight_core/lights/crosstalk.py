@@ -1,6 +1,6 @@
-"""How much of each LED's light the camera's other channels see.
+"""How much of each LED's light the other camera channels see.
 
-From pictures with one LED lit each, where a session has them; else from the mirror spots.
+Measured from images with one LED each if a session has them; otherwise from the mirror spots.
 """
 
 from __future__ import annotations
@@ -11,26 +11,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
-from gelpolight_core.lights.mirror import CHANNEL_NAMES, MirrorSpots
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.lights.mirror import MirrorSpots
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.quality import QualityTable, judge
-from gelpolight_core.session.picture import Picture
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-# Values that hold light worth a ratio: above a tenth of the brightest, below the end of the scale.
+# Values with enough light for a ratio: above a tenth of the brightest, below saturation.
 WELL_EXPOSED = 0.1
-SATURATED = 0.97
 LEAST_LIGHT = 0.1
 LEAST_BLOCKS = 50
 BLOCKS = 4800
-# A ratio and a dark offset can be told apart where the light varies by this factor; where it is
-# more even, the offset is taken as none.
+# A ratio and a dark offset can be separated if the light varies by this factor; if it is more
+# uniform, the offset is assumed to be zero.
 LEAST_RANGE = 1.5
 TUKEY = 4.7
 ROUNDS = 8
-# A colour filter that passes more of its neighbour is no filter: two LEDs were lit, or a white one.
+# No colour filter passes more of its neighbour: two LEDs were on, or a white one.
 LARGEST_LEAK = 0.6
 
 
@@ -54,79 +55,112 @@ class CrosstalkResult:
 
 
 def find_crosstalk(spots: MirrorSpots, single_led: Sequence[Picture] = ()) -> CrosstalkResult:
-    """Find the crosstalk, from single-LED pictures where there are any, else from mirror spots.
+    """Find the crosstalk, from single-LED images if there are any, otherwise from mirror spots.
 
     Parameters
     ----------
     spots : MirrorSpots
-        Of the three LEDs.
+        Spots of the three LEDs.
     single_led : sequence of 3 Picture, optional
-        The whiteboard or bare membrane with the red, the green, the blue LED lit alone.
+        The whiteboard or bare membrane with only the red, the green or the blue LED on.
 
     Raises
     ------
     InputError
-        If a single-LED picture is dark, saturated, or lit by another LED than its name says.
+        If a single-LED image is dark, saturated, or lit by another LED than its name says.
     """
-    mirror = crosstalk_from_spots(spots)
+    mirror, measured = crosstalk_from_spots(spots)
     if not single_led:
-        figure = judge(
-            "crosstalk_percent",
-            tr("Crosstalk, largest, from the mirror spots"),
-            _largest(mirror),
-            "%",
-        )
-        return CrosstalkResult(mirror, "mirror", QualityTable((figure,)))
+        return CrosstalkResult(mirror, "mirror", _judge_mirror(mirror, measured))
     columns = [_column(picture, k) for k, picture in enumerate(single_led)]
     matrix = np.stack([column for column, _ in columns], axis=1)
-    figures = (
+    figures = [
         judge(
             "crosstalk_percent",
-            tr("Crosstalk, largest, from the single-LED pictures"),
+            tr("Largest crosstalk, from the single-LED images"),
             _largest(matrix),
             "%",
         ),
         judge(
             "crosstalk_scatter_percent",
-            tr("Crosstalk over the picture, scatter"),
+            tr("Scatter of the crosstalk over the image"),
             100.0 * max(scatter for _, scatter in columns),
             "%",
             warn=2.0,
-            advice=tr("Darken the room and light one LED only for each picture"),
+            advice=tr("Darken the room and switch on only one LED for each image"),
         ),
+    ]
+    if measured.any():
+        figures.append(
+            judge(
+                "crosstalk_difference_percent",
+                tr("Crosstalk from the mirror spots minus this value (which is used)"),
+                _largest(np.eye(3) + np.where(measured, mirror - matrix, 0.0)),
+                "%",
+                warn=2.0,
+                advice=tr(
+                    "Check that each image shows one LED alone, and the exposure of the mirror "
+                    "image"
+                ),
+            )
+        )
+    return CrosstalkResult(matrix, "single_led", QualityTable(tuple(figures)))
+
+
+def _judge_mirror(matrix: Array, measured: NDArray[np.bool_]) -> QualityTable:
+    """Judge crosstalk from the mirror spots; a spot without readable colour is a warning."""
+    figures = [
         judge(
-            "crosstalk_difference_percent",
-            tr("Crosstalk from the mirror spots less this (which is used)"),
-            _largest(np.eye(3) + mirror - matrix),
-            "%",
-            warn=2.0,
+            "crosstalk_unmeasured",
+            tr("LEDs with unknown crosstalk"),
+            float(np.count_nonzero(~measured)),
+            warn=0.0,
             advice=tr(
-                "Check that each picture shows one LED alone, and the mirror spots' exposure"
+                "The mirror spots are too small or too bright to show their colour, so crosstalk "
+                "is not corrected. Add single_led images, use larger images, or use a shorter "
+                "exposure for the mirror"
             ),
-        ),
-    )
-    return CrosstalkResult(matrix, "single_led", QualityTable(figures))
+        )
+    ]
+    if measured.any():
+        figures.append(
+            judge(
+                "crosstalk_percent",
+                tr("Largest crosstalk, from the mirror spots"),
+                _largest(matrix),
+                "%",
+            )
+        )
+    return QualityTable(tuple(figures))
 
 
 def _largest(matrix: Array) -> float:
     return 100.0 * float(np.abs(matrix - np.eye(3)).max())
 
 
-def crosstalk_from_spots(spots: MirrorSpots) -> Array:
-    """Return the matrix M (3, 3) of ``I_raw = M I_true``; column k is LED k, diagonal 1.
+def crosstalk_from_spots(spots: MirrorSpots) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the matrix M of ``I_raw = M I_true``, and which of its columns were measured.
 
-    A spot without unsaturated pixels says nothing of the ratio; its column is left without
-    crosstalk.
+    A spot with too few unsaturated pixels does not show its colour; its column has no crosstalk and
+    counts as not measured.
+
+    Returns
+    -------
+    matrix : (3, 3)
+        Column k is LED k, diagonal 1.
+    measured : (3,) bool
+        For each LED.
     """
-    matrix = np.eye(3)
+    matrix, measured = np.eye(3), np.zeros(3, np.bool_)
     for k, spot in enumerate(spots.spots):
-        if np.isfinite(spot.colour).all():
+        if np.isfinite(spot.colour).all() and spot.colour[k] > 0.0:
             matrix[:, k] = np.maximum(np.asarray(spot.colour) / spot.colour[k], 0.0)
-    return matrix
+            measured[k] = True
+    return matrix, measured
 
 
 def _column(picture: Picture, led: int) -> tuple[Array, float]:
-    """Return what each channel sees of one LED, and how much that scatters over the picture."""
+    """Return the response of each channel to one LED, and its scatter over the image."""
     blocks = _block_means(picture.rgb.astype(np.float64))
     own = blocks[:, led]
     _refuse_unfit(blocks, led, f"single_led/{picture.name}")
@@ -141,7 +175,7 @@ def _column(picture: Picture, led: int) -> tuple[Array, float]:
 
 
 def _block_means(rgb: Array) -> Array:
-    """Return (blocks, 3) means; a block with a saturated pixel is given the value 1."""
+    """Return (blocks, 3) means; a block with a saturated pixel gets the value 1."""
     rows, columns, _ = rgb.shape
     side = max(2, round(np.sqrt(rows * columns / BLOCKS)))
     cut = rgb[: rows // side * side, : columns // side * side]
@@ -151,9 +185,9 @@ def _block_means(rgb: Array) -> Array:
 
 
 def _robust_ratio(own: Array, other: Array) -> tuple[float, float]:
-    """Return d(other)/d(own) by a line with Tukey's biweight, and the scatter about it over own.
+    """Return d(other)/d(own) from a line fit with Tukey's biweight, and the relative scatter.
 
-    The line's offset is what the channels show in the dark; it is no crosstalk.
+    The offset of the line is the dark signal of the channels; it is not crosstalk.
     """
     low, high = np.quantile(own, [0.02, 0.98])
     terms = np.stack([own, np.ones_like(own)], axis=1)
@@ -170,31 +204,31 @@ def _robust_ratio(own: Array, other: Array) -> tuple[float, float]:
 
 
 def _refuse_unfit(blocks: Array, led: int, where: str) -> None:
-    name = tr(CHANNEL_NAMES[led])
+    name = channel_name(led)
     if float(np.quantile(blocks, 0.99)) < LEAST_LIGHT:
         raise InputError(
-            tr("the picture is dark (brightest {v:.1%})").format(v=np.quantile(blocks, 0.99)),
+            tr("The image is dark (brightest value {v:.1%})").format(v=np.quantile(blocks, 0.99)),
             where=where,
-            advice=tr("Light the {name} LED alone, or expose longer").format(name=name),
+            advice=tr("Switch on only the {name} LED, or use a longer exposure").format(name=name),
         )
     clear = blocks[(blocks < SATURATED).all(axis=1)]
     lit = clear[clear.max(axis=1, initial=0.0) > LEAST_LIGHT / 2.0]
     if len(lit) < LEAST_BLOCKS:
         raise InputError(
-            tr("the picture is saturated nearly everywhere that is lit"),
+            tr("The image is saturated in nearly all lit areas"),
             where=where,
-            advice=tr("Shorten the exposure"),
+            advice=tr("Use a shorter exposure"),
         )
     shares = np.median(lit / np.maximum(lit[:, led : led + 1], 1e-6), axis=0)
     strongest = int(np.argmax(shares))
     rival = int(np.argmax(np.where(np.arange(3) == led, 0.0, shares)))
     if strongest != led or shares[rival] > LARGEST_LEAK:
         raise InputError(
-            tr("the {other} channel has {x:.0%} of the {name} channel's light").format(
-                other=tr(CHANNEL_NAMES[rival]), x=min(shares[rival], 1e3), name=name
+            tr("The {other} channel has {x:.0%} of the {name} channel's light").format(
+                other=channel_name(rival), x=min(shares[rival], 1e3), name=name
             ),
             where=where,
-            advice=tr("Light the {name} LED alone for this picture").format(name=name),
+            advice=tr("Switch on only the {name} LED for this image").format(name=name),
         )
 
 
@@ -204,7 +238,7 @@ def unmix(rgb: NDArray[np.float32], crosstalk: Array) -> NDArray[np.float32]:
     Parameters
     ----------
     rgb : (..., 3) float32
-        Linear light as the camera's channels saw it.
+        Linear light as seen by the camera channels.
     crosstalk : (3, 3)
         M of ``I_raw = M I_true``.
     """

@@ -10,29 +10,32 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.quality import QualityTable, judge
-from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import require_colour
+from gelpolight_core.session.images import require_colour
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
-CHANNEL_NAMES = ("red", "green", "blue")
-SATURATED = 0.995
 BRIGHT_SHARE_LIMIT = 0.02
 RIVAL_FLUX = 0.5
 MERGED_SHARE = 0.6
+# Signal-to-noise ratio of a spot.
+LEAST_SPOT = 8.0
 COLOUR_TOP = 0.97
 COLOUR_SHARES = (0.5, 0.15)
 COLOUR_PIXELS = 5
-# A place that was read off a found spot names it; a hand on a magnified picture is as sure as this.
+# A position read from a detected spot identifies that spot; a click in a magnified image is this
+# accurate.
 SAME_PLACE_PX = 0.05
 PLACED_SD_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """One bright spot of the mirror picture.
+    """One bright spot of the mirror image.
 
     Attributes
     ----------
@@ -47,12 +50,12 @@ class Spot:
     flux : tuple of 3 floats
         Light above the local background, summed over the spot, per channel.
     colour : tuple of 3 floats
-        Light of each channel over the brightest channel's, from pixels that are not saturated; NaN
-        where there are too few.
+        Light of each channel relative to the brightest channel, from unsaturated pixels; NaN if
+        there are too few.
     elongation : float
-        Long over short axis of the spot.
+        Ratio of long to short axis of the spot.
     touches_border : bool
-        Whether the spot is cut by the picture's border.
+        Whether the spot is cut by the image border.
     """
 
     centre_px: tuple[float, float]
@@ -74,7 +77,7 @@ class MirrorSpots:
     spots : tuple of 3 Spot
         Spot k belongs to LED k.
     rejected : tuple of (Spot, str)
-        Glints and reflections of reflections, each with the reason.
+        Glints and multiple reflections, each with the reason.
     quality : QualityTable
         Figures, limits and advice.
     """
@@ -92,21 +95,21 @@ class MirrorSpots:
 def find_mirror_spots(
     picture: Picture, *, placed: Mapping[int, tuple[float, float]] | None = None
 ) -> MirrorSpots:
-    """Find the three LEDs' reflections in the mirror picture.
+    """Find the reflections of the three LEDs in the mirror image.
 
     Parameters
     ----------
     picture : Picture
         The mirror on the top surface, all three LEDs on, room dark.
     placed : mapping of int to (u, v), optional
-        Spots that a person has placed, by LED, in pixels. One placed on the centroid of what was
-        found is that spot; elsewhere the place itself is taken, as sure as a hand is.
+        Spots set by the user, by LED, in pixels. A position on the centroid of a detected spot
+        selects that spot; otherwise the position itself is used, with the uncertainty of a click.
 
     Raises
     ------
     InputError
-        If the picture is grey, black or flooded with light, or if a spot is missing, merged with
-        another, cut by the border, or has a rival of like brightness in its own colour.
+        If the image is grey, black or flooded with light, or if a spot is missing, merged with
+        another, cut by the border, or has a rival of similar brightness in its own colour.
     """
     where = f"mirror/{picture.name}"
     require_colour(picture, where=where)
@@ -129,22 +132,23 @@ def find_mirror_spots(
         rejected += others
     spots = (chosen[0], chosen[1], chosen[2])
     rejected = [(spot, reason) for spot, reason in rejected if spot not in spots]
-    return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected))
+    light = _weakest_light(spots, rgb) / noise
+    return MirrorSpots(spots, tuple(rejected), _judge(spots, rejected, light))
 
 
 def spot_near(
     picture: Picture, place_px: tuple[float, float], *, reach_px: float = 8.0
 ) -> tuple[float, float] | None:
-    """Return the centroid of the spot at a place, of whatever colour, or None where there is none.
+    """Return the centroid of the spot near a position, of any colour, or None if there is none.
 
     Parameters
     ----------
     picture : Picture
         The mirror.
     place_px : (u, v)
-        Where a person points.
+        Position set by the user.
     reach_px : float, optional
-        How far off a centroid may be.
+        Largest distance of the centroid.
     """
     rgb = picture.rgb.astype(np.float64)
     centres = [spot.centre_px for spot in _find_candidates(rgb, _noise(rgb))]
@@ -155,25 +159,26 @@ def spot_near(
 def _refuse_hopeless(brightest: Array, where: str) -> None:
     if brightest.max() < 0.05:
         raise InputError(
-            tr("the picture is black (brightest value {v:.0%})").format(v=brightest.max()),
+            tr("The image is black (brightest value {v:.0%})").format(v=brightest.max()),
             where=where,
-            advice=tr("Switch the LEDs on, or expose longer"),
+            advice=tr("Switch the LEDs on, or use a longer exposure"),
         )
     share = float((brightest > 0.25 * brightest.max()).mean())
     if share > BRIGHT_SHARE_LIMIT:
         raise InputError(
-            tr("{share:.0%} of the picture is bright, where three small spots are expected").format(
-                share=share
-            ),
+            tr(
+                "{share:.0%} of the image is bright, but only three small spots are expected"
+            ).format(share=share),
             where=where,
             advice=tr(
-                "Put the mirror in place of the membrane, darken the room and shorten the exposure"
+                "Put the mirror in place of the membrane, darken the room and use a shorter "
+                "exposure"
             ),
         )
 
 
 def _noise(rgb: Array) -> float:
-    """Return the noise of the dark part, never less than an 8-bit step's rounding."""
+    """Return the noise of the dark part, but at least the rounding of an 8-bit step."""
     deviation = np.abs(rgb - np.median(rgb, axis=(0, 1)))
     return max(1.4826 * float(np.median(deviation)), 1.0 / 255.0 / math.sqrt(12.0))
 
@@ -182,7 +187,7 @@ def _find_candidates(rgb: Array, noise: float) -> list[Spot]:
     background = np.median(rgb, axis=(0, 1))
     excess = rgb - background
     brightest = excess.max(axis=2)
-    threshold = max(8.0 * noise, 0.04 * float(brightest.max()))
+    threshold = max(LEAST_SPOT * noise, 0.04 * float(brightest.max()))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(
         (brightest > threshold).astype(np.uint8), connectivity=8
     )
@@ -194,7 +199,7 @@ def _describe(
 ) -> Spot:
     left, top, width, height = (int(stat[i]) for i in range(4))
     rows, columns = labels.shape
-    # Two pixels of margin take in the blurred rim, whose light belongs to the centroid.
+    # A margin of two pixels includes the blurred rim, whose light belongs to the centroid.
     box = np.s_[max(top - 2, 0) : top + height + 2, max(left - 2, 0) : left + width + 2]
     near = cv2.dilate((labels[box] == label).astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     mine = near & ((labels[box] == label) | (labels[box] == 0))
@@ -232,9 +237,9 @@ def _describe(
 
 
 def _colour(excess: Array, brightest: Array, total: Array) -> Array:
-    """Return the channels' sums over unsaturated pixels, brightest 1; noise is not cut off at 0.
+    """Return the channel sums over unsaturated pixels, brightest 1; negative noise is kept.
 
-    Of a saturated spot only its flanks are left, which a lens always blurs over some pixels.
+    A saturated spot still has unsaturated flanks, because a lens always blurs it over some pixels.
     """
     for share in COLOUR_SHARES:
         clear = (brightest < COLOUR_TOP) & (total > share * total.max())
@@ -252,34 +257,36 @@ def _dominant(spot: Spot) -> int:
     return int(np.argmax(spot.flux))
 
 
-def _placed_spot(candidates: list[Spot], place: tuple[float, float], rgb: Array) -> Spot:
-    """Return the spot that a person points at; no colour is read where none was found."""
+def _placed_spot(candidates: list[Spot], position: tuple[float, float], rgb: Array) -> Spot:
+    """Return the spot set by the user; its colour is unknown if none was detected there."""
     for spot in candidates:
-        if math.dist(spot.centre_px, place) < SAME_PLACE_PX:
+        if math.dist(spot.centre_px, position) < SAME_PLACE_PX:
             return spot
     rows, columns = rgb.shape[:2]
-    v = min(max(round(place[1]), 0), rows - 1)
-    u = min(max(round(place[0]), 0), columns - 1)
+    v = min(max(round(position[1]), 0), rows - 1)
+    u = min(max(round(position[0]), 0), columns - 1)
     nothing = (math.nan, math.nan, math.nan)
-    return Spot(place, PLACED_SD_PX, 1, _triple(rgb[v, u]), (0.0, 0.0, 0.0), nothing, 1.0, False)
+    return Spot(position, PLACED_SD_PX, 1, _triple(rgb[v, u]), (0.0, 0.0, 0.0), nothing, 1.0, False)
 
 
 def _refuse_merged(candidates: list[Spot], where: str) -> None:
-    """Two LEDs in one spot show as two strong channels where a channel has no spot of its own."""
+    """Two LEDs in one spot appear as two strong channels while one channel has no own spot."""
     missing = {0, 1, 2} - {_dominant(s) for s in candidates}
     for spot in candidates:
         flux = np.array(spot.flux) / max(spot.flux)
         merged = [k for k in missing if flux[k] > MERGED_SHARE]
         if merged and max(spot.flux) > 0.1 * max(max(s.flux) for s in candidates):
             raise InputError(
-                tr("the {a} and {b} spots are merged near ({u:.0f}, {v:.0f})").format(
-                    a=tr(CHANNEL_NAMES[_dominant(spot)]),
-                    b=tr(CHANNEL_NAMES[merged[0]]),
+                tr("The {a} and {b} spots are merged near ({u:.0f}, {v:.0f})").format(
+                    a=channel_name(_dominant(spot)),
+                    b=channel_name(merged[0]),
                     u=spot.centre_px[0],
                     v=spot.centre_px[1],
                 ),
                 where=where,
-                advice=tr("Shorten the exposure; if they stay merged, the LEDs are too close"),
+                advice=tr(
+                    "Use a shorter exposure; if they stay merged, the LEDs are too close together"
+                ),
             )
 
 
@@ -287,39 +294,71 @@ def _choose(
     candidates: list[Spot], channel: int, where: str
 ) -> tuple[Spot, list[tuple[Spot, str]]]:
     own = sorted((s for s in candidates if _dominant(s) == channel), key=lambda s: -s.flux[channel])
-    name = tr(CHANNEL_NAMES[channel])
+    name = channel_name(channel)
     if not own:
         raise InputError(
-            tr("the {name} LED has no spot").format(name=name),
+            tr("The {name} LED has no spot").format(name=name),
             where=where,
             advice=tr(
-                "Check that the {name} LED is on and its mirror image in view; expose longer"
+                "Check that the {name} LED is on and its reflection is in view, or use a "
+                "longer exposure"
             ).format(name=name),
         )
     best, others = own[0], own[1:]
     if others and others[0].flux[channel] > RIVAL_FLUX * best.flux[channel]:
         raise InputError(
-            tr("there are {n} {name} spots of like brightness").format(
+            tr("There are {n} {name} spots of similar brightness").format(
                 n=1 + sum(s.flux[channel] > RIVAL_FLUX * best.flux[channel] for s in others),
                 name=name,
             ),
             where=where,
-            advice=tr("Remove the source of the extra spot: room light, a second reflection, dust"),
+            advice=tr(
+                "Remove the cause of the extra spot: room light, a second reflection, or dust"
+            ),
         )
     if best.touches_border:
         raise InputError(
-            tr("the {name} spot is cut by the picture's border").format(name=name),
+            tr("The {name} spot is cut by the image border").format(name=name),
             where=where,
-            advice=tr("The LED's mirror image must be in view: use a wider lens or lower LEDs"),
+            advice=tr("The LED's reflection must be in view: use a wider lens or lower LEDs"),
         )
-    reason = tr("fainter than the {name} LED's own spot: a glint or second reflection")
+    reason = tr("Fainter than the main spot of the {name} LED: a glint or second reflection")
     return best, [(s, reason.format(name=name)) for s in others]
 
 
-def _judge(spots: tuple[Spot, Spot, Spot], rejected: list[tuple[Spot, str]]) -> QualityTable:
+def _weakest_light(spots: tuple[Spot, Spot, Spot], rgb: Array) -> float:
+    """Return the smallest signal of an LED's own colour at its spot, above the background.
+
+    If another LED's colour is far brighter there, the signal does not belong to this LED.
+    """
+    background = np.median(rgb, axis=(0, 1))
+    light = []
+    for k, spot in enumerate(spots):
+        column, row = round(spot.centre_px[0]), round(spot.centre_px[1])
+        reach = np.s_[max(row - 1, 0) : max(row, 0) + 2, max(column - 1, 0) : max(column, 0) + 2]
+        excess = (rgb[reach] - background).reshape(-1, 3).max(axis=0, initial=0.0)
+        light.append(float(excess[k]) if excess[k] > 0.5 * excess.max() else 0.0)
+    return min(light)
+
+
+def _judge(
+    spots: tuple[Spot, Spot, Spot], rejected: list[tuple[Spot, str]], light: float
+) -> QualityTable:
     saturated = max(s.peak[k] for k, s in enumerate(spots))
     return QualityTable(
         (
+            judge(
+                "spot_light",
+                tr("Weakest spot, signal-to-noise ratio"),
+                light,
+                warn=2.0 * LEAST_SPOT,
+                fail=LEAST_SPOT,
+                higher_is_better=True,
+                advice=tr(
+                    "An LED's spot is dark or has another LED's colour: drag it onto the LED's "
+                    "reflection, or use a longer exposure"
+                ),
+            ),
             judge(
                 "centroid_sd_px",
                 tr("Spot centroid, standard deviation"),
@@ -327,14 +366,14 @@ def _judge(spots: tuple[Spot, Spot, Spot], rejected: list[tuple[Spot, str]]) -> 
                 "px",
                 warn=0.1,
                 fail=0.5,
-                advice=tr("Average more frames, or expose longer"),
+                advice=tr("Average more frames, or use a longer exposure"),
             ),
             judge(
                 "spot_peak",
                 tr("Brightest spot"),
                 saturated,
                 warn=SATURATED,
-                advice=tr("The spots are saturated: shorten the exposure until they are not"),
+                advice=tr("The spots are saturated: use a shorter exposure"),
             ),
             judge(
                 "spot_elongation",
@@ -342,14 +381,16 @@ def _judge(spots: tuple[Spot, Spot, Spot], rejected: list[tuple[Spot, str]]) -> 
                 max(s.elongation for s in spots),
                 warn=1.5,
                 fail=3.0,
-                advice=tr("A spot is drawn out: hold the mirror still and flat, shorten exposure"),
+                advice=tr(
+                    "A spot is elongated: hold the mirror still and flat, or use a shorter exposure"
+                ),
             ),
             judge(
                 "spots_rejected",
-                tr("Further spots rejected"),
+                tr("Other spots rejected"),
                 float(len(rejected)),
                 warn=3.0,
-                advice=tr("Many glints: darken the room and clean the mirror"),
+                advice=tr("There are many glints: darken the room and clean the mirror"),
             ),
         )
     )

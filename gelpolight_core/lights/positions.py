@@ -17,12 +17,13 @@ from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 CONDITION_LIMIT = 50.0
-"""Of the light directions at the sensor's middle: beyond it 1 % of noise is half of a normal."""
+"""Condition number of the light directions at the sensor's centre: above it, 1 % of noise changes a
+normal by half."""
 
 
 @dataclass(frozen=True, slots=True)
 class LightResult:
-    """Where the three light-emitting points are.
+    """Positions of the three LEDs (light-emitting points).
 
     Attributes
     ----------
@@ -31,9 +32,9 @@ class LightResult:
     led_covariance_mm2 : (3, 3, 3)
         Covariance of each position, propagated.
     bright_points_mm : (3, 2)
-        Where on the mirror each LED is reflected, sensor frame.
+        Points on the mirror where each LED is reflected, sensor frame.
     spots : MirrorSpots
-        What was found in the mirror picture.
+        Spots found in the mirror image.
     condition_number : float
         Of the three light directions at the sensor frame's origin.
     quality : QualityTable
@@ -53,8 +54,8 @@ def locate_led(
 ) -> tuple[Array, Array]:
     """Return an LED's position and its bright point, both (3,) in the sensor frame.
 
-    The mirror lies on the top surface, in air: the camera's ray meets it at the bright point and
-    leaves it mirrored; the LED is where that line reaches `led_height_mm` below the surface.
+    The mirror lies on the top surface, in air: the camera ray is reflected at the bright point; the
+    LED is where the reflected ray reaches `led_height_mm` below the surface.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def locate_led(
     camera, plane
         Lens and top surface.
     led_height_mm : float
-        Z1: the light-emitting point to the top surface.
+        Z1: distance from the light-emitting point to the top surface.
     """
     ray = plane.rotation @ camera.directions(np.asarray(spot_px))
     bright = ray * (plane.distance_mm / ray[2]) - np.array([0.0, 0.0, plane.distance_mm])
@@ -91,14 +92,15 @@ def locate_leds(
     camera, plane
         Lens and top surface.
     led_height_mm : float
-        Z1: light-emitting points to the top surface, from the housing.
+        Z1: distance from the light-emitting points to the top surface, from the housing.
     led_height_sd_mm, plane_distance_sd_mm, plane_normal_sd_rad : float, optional
-        Standard deviations that are propagated into the positions, beside the centroids' own.
+        Standard deviations that are propagated into the positions, in addition to those of the
+        centroids.
 
     Raises
     ------
     InputError
-        If the LEDs lie so close together in angle that normals cannot be solved.
+        If the light directions are too similar to solve for normals.
     """
     leds, brights, covariances = [], [], []
     for spot in spots.spots:
@@ -117,9 +119,9 @@ def locate_leds(
     condition = direction_condition(positions, np.zeros(2))
     if not condition <= CONDITION_LIMIT:
         raise InputError(
-            tr("the three light directions are nearly in one plane (condition {c:.0f})").format(
-                c=condition
-            ),
+            tr(
+                "The three light directions lie nearly in one plane (condition number {c:.0f})"
+            ).format(c=condition),
             where=tr("mirror"),
             advice=tr("Place the LEDs wider apart around the sensor's axis"),
         )
@@ -136,7 +138,7 @@ def locate_leds(
 def _disturbed(
     spot_px: tuple[float, float], camera: Camera, plane: TopPlane, height_mm: float
 ) -> Callable[[Array], Array]:
-    """Return the LED position as a function of small disturbances of all that it rests on."""
+    """Return the LED position as a function of small disturbances of all its inputs."""
 
     def led(delta: Array) -> Array:
         normal = plane.rotation.T @ np.array([delta[4], delta[5], 1.0])
@@ -148,7 +150,7 @@ def _disturbed(
         position, _ = locate_led(
             np.array(spot_px) + delta[:2], camera, tilted, led_height_mm=height_mm + delta[2]
         )
-        # Expressed in the undisturbed frame, so that a tilt counts as what it moves.
+        # Expressed in the undisturbed frame, so that a tilt counts by the shift it causes.
         return plane.to_sensor(tilted.to_camera(position))
 
     return led
@@ -212,12 +214,12 @@ def _judge(
             *spots.quality.figures,
             judge(
                 "led_lateral_sd_mm",
-                tr("LED position, sideways, standard deviation"),
+                tr("LED position, lateral, standard deviation"),
                 lateral,
                 "mm",
                 warn=0.3,
                 fail=1.0,
-                advice=tr("Repeat the top pose and the mirror picture"),
+                advice=tr("Repeat the top pose and the mirror image"),
             ),
             judge(
                 "led_sd_mm",
@@ -226,11 +228,11 @@ def _judge(
                 "mm",
                 warn=0.5,
                 fail=1.5,
-                advice=tr("Measure the LEDs' height below the top surface again"),
+                advice=tr("Measure the height of the LEDs below the top surface again"),
             ),
             judge(
                 "direction_condition",
-                tr("Light directions, condition number at the centre"),
+                tr("Condition number of the light directions at the centre"),
                 condition,
                 warn=8.0,
                 fail=20.0,
@@ -238,7 +240,7 @@ def _judge(
             ),
             judge(
                 "led_radius_ratio",
-                tr("LED distances from the axis, largest over smallest"),
+                tr("Ratio of largest to smallest LED distance from the axis"),
                 float(radii.max() / max(radii.min(), 1e-9)),
                 warn=2.0,
                 advice=tr("Check that each spot belongs to its LED"),

@@ -26,7 +26,7 @@ _ROUNDING = 0.07
 solution of the obstacle problem (the tests solve it again)."""
 
 
-def corner_drape(x: Array, y: Array, *, edge: float = 0.0) -> Array:
+def corner_drape(x: Array, y: Array, *, edge: float = 0.0, rounding: float = 0.0) -> Array:
     """Return the membrane's depth outside the quarter plane x <= 0, y <= 0 that is pressed to 1.
 
     The solution of laplacian(w) = w with w = 1 on the two faces; lengths in decay lengths.
@@ -37,7 +37,10 @@ def corner_drape(x: Array, y: Array, *, edge: float = 0.0) -> Array:
     x, y : arrays of one shape
         Distances beyond the two faces, in decay lengths.
     edge : float, optional
-        Radius of the fillet that the corner's three edges carry, in decay lengths.
+        Radius of the fillet of the two edges, in decay lengths; nearer to the corner the rounding
+        grows no further.
+    rounding : float, optional
+        Strength of the corner's own rounding, from :func:`fillet_rounding` or from a fit.
 
     Notes
     -----
@@ -46,9 +49,9 @@ def corner_drape(x: Array, y: Array, *, edge: float = 0.0) -> Array:
         w(r, t) = 2/pi int_0^inf K_i tau(r) cosh(pi tau / 2) cosh(t tau) / cosh(alpha tau / 2) d tau
 
     with t the angle from the wedge's bisector. It is tabulated once over r**(2/3), the power with
-    which w leaves the corner, so that the table is smooth there. A small rounding of the corner
-    takes away the one solution that is zero on both faces and falls off outwards,
-    K_2/3(r) cos(2 t / 3), in proportion to edge ** (4/3).
+    which w leaves the corner, so that the table is smooth there. Whatever a corner looks like on a
+    scale below the decay length, farther out it changes only the strength of the one solution that
+    is zero on both faces and falls off outwards, K_2/3(r) cos(2 t / 3).
     """
     radius = np.hypot(x, y)
     # Angle from the bisector of the free membrane, which points along (1, 1).
@@ -59,12 +62,23 @@ def corner_drape(x: Array, y: Array, *, edge: float = 0.0) -> Array:
     straight = np.exp(-np.clip(np.maximum(x, y), 0.0, _REACH))
     far = np.where((x > 0.0) & (y > 0.0), 0.0, straight)
     drape = np.clip(np.where(radius < _REACH, depth, far), 0.0, 1.0)
-    if edge <= 0.0:
+    if rounding == 0.0:
         return np.asarray(drape)
     nodes, bessel = _bessel_table()
     fall = np.interp(np.maximum(radius, edge), nodes, bessel, right=0.0)
-    rounding = _ROUNDING * edge ** (4.0 / 3.0) * fall * np.cos(2.0 * angle / 3.0)
-    return np.asarray(drape - np.where((x > 0.0) | (y > 0.0), rounding, 0.0))
+    lost = rounding * fall * np.cos(2.0 * angle / 3.0)
+    return np.asarray(drape - np.where((x > 0.0) | (y > 0.0), lost, 0.0))
+
+
+def fillet_rounding(edge: float) -> float:
+    """Return the strength of the rounding of a corner whose three edges carry one fillet.
+
+    Parameters
+    ----------
+    edge : float
+        Radius of the fillet, in decay lengths.
+    """
+    return float(_ROUNDING * edge ** (4.0 / 3.0))
 
 
 @lru_cache(maxsize=1)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gelpolight_core.measurement.fit import EdgePrior, FitResult, WindowData, fit_indenter
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.segmentation import PressedRegion
+from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.translation import tr
 
 GOOD_RESIDUAL = 0.005
@@ -54,6 +56,21 @@ def find_doubt(
         _cut_drape(window),
     ]
     return "; ".join(reason for reason in reasons if reason)
+
+
+def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> str:
+    """Return why an object's height means nothing; an empty text where its map has an anchor.
+
+    Parameters
+    ----------
+    flags : (rows, columns) uint8 or None
+        Of the height map.
+    region : PressedRegion
+        The segmented bump.
+    """
+    if flags is None or not (flags[region.core] & np.uint8(Flag.UNANCHORED)).any():
+        return ""
+    return tr("the contact leaves too little of the boundary free, so the height has no zero level")
 
 
 def _no_end(fit: FitResult) -> str:

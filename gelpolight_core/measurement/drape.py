@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import brentq
 from scipy.special import k0e, k1e
 
-from gelpolight_core.measurement.corner import corner_drape
+from gelpolight_core.measurement.corner import corner_drape, fillet_rounding
 
 Array = NDArray[np.float64]
 
@@ -56,9 +56,10 @@ def cylinder_depth(
     )
 
     def sharp(r: Array) -> Array:
-        free = np.maximum(r, contact_mm)
-        outside = contact_depth * _radial_drape(free, contact_mm, decay_mm)
-        return np.where(r > contact_mm, outside, _filleted(r - cylinder_radius_mm, height_mm, edge))
+        depth = _filleted(r - cylinder_radius_mm, height_mm, edge)
+        free = r > contact_mm
+        depth[free] = contact_depth * _radial_drape(r[free], contact_mm, decay_mm)
+        return depth
 
     depth = sharp(radius_mm)
     if blur_mm > 0.0:
@@ -82,6 +83,7 @@ def cuboid_depth(
     decay_mm: float,
     edge_radius_mm: float = 0.0,
     blur_mm: float = 0.0,
+    corner_rounding: float | None = None,
 ) -> Array:
     """Return the membrane's depth around a flat cuboid whose sides lie along the axes.
 
@@ -93,6 +95,10 @@ def cuboid_depth(
         Sides along x and y.
     height_mm, decay_mm, edge_radius_mm, blur_mm : float
         As in :func:`cylinder_depth`.
+    corner_rounding : float, optional
+        Strength of the corners' rounding, as for
+        :func:`~gelpolight_core.measurement.corner.corner_drape`; by default that of corners whose
+        three edges carry the same fillet.
 
     Notes
     -----
@@ -108,13 +114,15 @@ def cuboid_depth(
     qx, qy = ax - half[0] + edge, ay - half[1] + edge
     beyond = np.hypot(np.maximum(qx, 0.0), np.maximum(qy, 0.0)) - edge
     beyond = np.where((qx <= 0.0) & (qy <= 0.0), np.maximum(qx, qy) - edge, beyond)
-    free = contact_depth * _rectangle_drape(
-        ax / decay_mm,
-        ay / decay_mm,
+    depth = _filleted(beyond, height_mm, edge)
+    free = beyond > inset
+    depth[free] = contact_depth * _rectangle_drape(
+        ax[free] / decay_mm,
+        ay[free] / decay_mm,
         ((half[0] + inset) / decay_mm, (half[1] + inset) / decay_mm),
         edge / decay_mm,
+        fillet_rounding(edge / decay_mm) if corner_rounding is None else corner_rounding,
     )
-    depth = np.where(beyond > inset, free, _filleted(beyond, height_mm, edge))
     if blur_mm > 0.0:
 
         def straight(d: Array) -> Array:
@@ -219,10 +227,12 @@ def _filleted(beyond_mm: Array, height_mm: float, edge_mm: float) -> Array:
     return np.asarray(height_mm - edge_mm + np.sqrt(np.maximum(edge_mm**2 - into**2, 0.0)))
 
 
-def _rectangle_drape(x: Array, y: Array, half: tuple[float, float], edge: float) -> Array:
+def _rectangle_drape(
+    x: Array, y: Array, half: tuple[float, float], edge: float, rounding: float
+) -> Array:
     """Return the drape outside a rectangle for x, y >= 0; lengths in decay lengths."""
     dx, dy = x - half[0], y - half[1]
-    drape = corner_drape(dx, dy, edge=edge)
+    drape = corner_drape(dx, dy, edge=edge, rounding=rounding)
     # What the corners at the far ends of the two edges take away; nothing beside the edge itself.
     above = (dy > 0.0) & (x + half[0] < FAR_CORNER)
     beside = (dx > 0.0) & (y + half[1] < FAR_CORNER)

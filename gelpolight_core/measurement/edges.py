@@ -22,7 +22,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
 from gelpolight_core.measurement.measured import depth_at
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]

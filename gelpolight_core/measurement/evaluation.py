@@ -7,16 +7,15 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.truth import PressTruth, read_truth
+from gelpolight_core.measurement.variances import variance_between, variance_within
 from gelpolight_core.translation import tr
 
 PAPER_PERCENT = {"planar": 5.0, "depth": 8.0}
@@ -25,26 +24,6 @@ DIRECTIONS = ("planar", "depth")
 SAME, RANDOM, ALL = "same region", "random regions", "all"
 
 Progress = Callable[[str, float], None]
-
-
-class HeightMapLike(Protocol):
-    """What the evaluation needs of a reconstruction."""
-
-    @property
-    def depth_mm(self) -> NDArray[np.float32]:
-        """(rows, columns) depth."""
-
-    @property
-    def x_mm(self) -> NDArray[np.floating]:
-        """(columns,) sensor frame."""
-
-    @property
-    def y_mm(self) -> NDArray[np.floating]:
-        """(rows,) sensor frame."""
-
-    @property
-    def flags(self) -> NDArray[np.uint8]:
-        """(rows, columns) flags."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +202,7 @@ class Evaluation:
 
 def evaluate_presses(
     folder: Path,
-    reconstruct: Callable[[Path], HeightMapLike],
+    measure: Callable[[Path, str], Measurement],
     *,
     progress: Progress | None = None,
     crossing: Crossing | None = None,
@@ -235,8 +214,8 @@ def evaluate_presses(
     ----------
     folder : Path
         Pictures and ``truth.csv``.
-    reconstruct : callable (picture's path) -> height map
-        The reconstruction under test.
+    measure : callable (image's path, shape) -> Measurement
+        From :func:`~gelpolight_core.measurement.presses.press_measurement`.
     progress : callable, optional
         Told the file's name and the share done, 0..1.
     crossing : Crossing, optional
@@ -264,7 +243,7 @@ def evaluate_presses(
     for k, row in enumerate(table.rows):
         if progress is not None:
             progress(row.file, k / len(table.rows))
-        outcomes.append(measure_press(folder / row.file, row.truth.shape, reconstruct, ledger))
+        outcomes.append(measure_press(folder / row.file, row.truth.shape, measure, ledger))
     if progress is not None:
         progress("", 1.0)
     return evaluate(table.rows, outcomes, skipped=table.skipped, crossing=crossing)
@@ -298,7 +277,7 @@ def evaluate(
 def measure_press(
     path: Path,
     shape: str,
-    reconstruct: Callable[[Path], HeightMapLike],
+    measure: Callable[[Path, str], Measurement],
     ledger: Ledger | None = None,
 ) -> Measurement | str:
     """Measure the object in a picture, or return as a sentence why it cannot be measured.
@@ -309,8 +288,8 @@ def measure_press(
         The picture.
     shape : str
         What is pressed.
-    reconstruct : callable (picture's path) -> height map
-        The reconstruction.
+    measure : callable (image's path, shape) -> Measurement
+        As for :func:`evaluate_presses`.
     ledger : Ledger, optional
         Holds what was measured before.
     """
@@ -319,23 +298,14 @@ def measure_press(
         known = ledger.find(key)
         if known is not None:
             return known
-    outcome = _measured(path, shape, reconstruct)
+    outcome: Measurement | str
+    try:
+        outcome = measure(path, shape)
+    except InputError as error:  # a press that fails is a finding of the evaluation, not its end
+        outcome = str(error)
     if ledger is not None and key is not None:
         ledger.keep(key, outcome)
     return outcome
-
-
-def _measured(
-    path: Path, shape: str, reconstruct: Callable[[Path], HeightMapLike]
-) -> Measurement | str:
-    # A press that fails is a finding of the evaluation, not its end.
-    try:
-        heights = reconstruct(path)
-        return measure_object(
-            heights.depth_mm, heights.x_mm, heights.y_mm, shape=shape, flags=heights.flags
-        )
-    except InputError as error:
-        return str(error)
 
 
 def _result(row: PressTruth, outcome: Measurement | str) -> PressResult:
@@ -487,34 +457,6 @@ def lengths_by_place(results: Iterable[PressResult], direction: str) -> list[lis
             key = f"{said} {result.press.file}" if said.lower() == "random" else said
             places[key].append(value)
     return list(places.values())
-
-
-def variance_within(places: Sequence[Sequence[float]]) -> float:
-    """Return the variance (mm**2) of repeats at one place, pooled; NaN without repeats.
-
-    Parameters
-    ----------
-    places : sequence of sequences of float
-        Lengths (mm) from :func:`lengths_by_place`, of one object or of several.
-    """
-    freedom = sum(len(values) - 1 for values in places)
-    squares = sum(float(np.var(values)) * len(values) for values in places)
-    return squares / freedom if freedom else math.nan
-
-
-def variance_between(places: Sequence[Sequence[float]], within: float) -> float:
-    """Return the variance (mm**2) that going to another place adds, below 0 where it adds none.
-
-    Parameters
-    ----------
-    places : sequence of sequences of float
-        Lengths (mm) of one object from :func:`lengths_by_place`, of two places or more.
-    within : float
-        Variance (mm**2) of repeats at one place.
-    """
-    # The means of few repeats scatter by themselves; only what exceeds that is due to the place.
-    share = float(np.mean([1.0 / len(values) for values in places]))
-    return float(np.var([np.mean(values) for values in places], ddof=1)) - share * within
 
 
 def _measured_mm(result: PressResult, direction: str) -> float:

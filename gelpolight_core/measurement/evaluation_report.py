@@ -17,8 +17,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.export.drawing_thread import in_drawing_thread
+from gelpolight_core.drawing_thread import in_drawing_thread
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.fft import irfft2, next_fast_len, rfft2
-from scipy.optimize import least_squares
 
+from gelpolight_core.least_squares import fit_least_squares, forward_differences
 from gelpolight_core.measurement.indenter import SMALLEST_SIZE_MM, IndenterModel
 
 Array = NDArray[np.float64]
@@ -26,10 +26,20 @@ HUBER = 2.5
 MODEL_ERROR = 0.001
 """Share of the height by which the closed forms of the drape may be wrong (near corners); finer
 scales for the residual would only throw out the edges that carry the size."""
+BLUR_SD_MM = 0.1
+"""Root of the sd of the squared blur: camera, denoising and coarse nodes blur a map by 0.02 to
+0.12 mm. If a fit is allowed less blur than there is, it finds a rounder edge instead: with 0.2 mm
+in place of 0.1 mm, a press of 0.5 mm comes out 0.1 mm too wide."""
+CORNER_SD = 0.05
+"""Strength of a corner's rounding, either sign: a sharp corner holds the membrane further out."""
+CORNER_MM = 0.6
+"""Pixels this near to a corner are not used: there, the strength alone is no description."""
 MOST_ROUNDS = 6
 """Rounds of reweighting before a fit counts as not coming to an end."""
 CORRELATION_SIZE = 250
 """Pixels along a side of the map that residuals are correlated on."""
+FIT_TOLERANCE = 1e-4
+"""Share by which the cost changes when a round's fit ends; later rounds start from there."""
 SETTLED = 0.3
 """Rounds stop when no parameter moves by more than this share of its sd."""
 
@@ -46,8 +56,8 @@ class EdgePrior:
     edge_radius_mm, edge_radius_sd_mm : float
         Fillet of the object.
     blur_mm : float
-        Scale of the map's blur (sigma of a Gaussian). The fit takes its square, in which the map
-        is linear; it is known to within itself.
+        Scale of the map's blur (sigma of a Gaussian), if nothing but the grid blurs it. The fit
+        uses its square, in which the map is linear.
     """
 
     edge_radius_mm: float
@@ -69,6 +79,8 @@ class WindowData:
         Distance of pixels.
     seen_share : float
         Share of the drape's first millimetre and a half that the map holds.
+    reach_mm : float
+        Length over which the map's errors hang together at least; 0 where they may be white.
     """
 
     x_mm: Array
@@ -78,6 +90,7 @@ class WindowData:
     near_wall: Mask
     pitch_mm: float
     seen_share: float
+    reach_mm: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,12 +189,14 @@ def fit_indenter(
     first = dict.fromkeys(BASELINE, 0.0) | {k: m for k, (m, _) in prior.items()} | dict(start)
     vector = np.array([first[name] for name in names])
     weight = window.weight[chosen]
+    least_together = max(np.pi * (window.reach_mm / window.pitch_mm) ** 2, 1.0)
     # Until the residuals are known, a twentieth of the height stands for their scale.
     sigma, together, robust = 0.05 * start["height_mm"], 30.0, np.ones(weight.shape)
-    for _ in range(most_rounds):
+    for n in range(most_rounds):
         before = vector
         inflation = 1.0 + (together - 1.0) * density
-        scale = np.sqrt(weight * robust / inflation) / sigma
+        clear = _clear_of_corners(problem, vector)
+        scale = np.sqrt(weight * robust * clear / inflation) / sigma
         vector, jacobian, converged = _solve(problem, vector, scale)
         left = problem.depth_mm - problem.depth(vector, problem.x_mm, problem.y_mm)
         sigma = max(_robust_scale(left * np.sqrt(weight)), MODEL_ERROR * start["height_mm"])
@@ -189,11 +204,12 @@ def fit_indenter(
         robust = 1.0 / np.maximum(ratio, 1.0)
         residual = window.depth_mm - problem.depth(vector, window.x_mm, window.y_mm)
         residual = np.where(window.weight > 0.0, residual, np.nan)
-        together = correlated_pixels(residual)
+        together = max(correlated_pixels(residual), least_together)
         actual = 1.0 + (together - 1.0) * density
         covariance = _covariance(jacobian, inflation, actual, len(prior))
         sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        settled = bool(np.all(np.abs(vector - before) <= SETTLED * sd + 1e-5))
+        # The first round's sd follow from a guess of the residual's scale.
+        settled = n > 0 and bool(np.all(np.abs(vector - before) <= SETTLED * sd + 1e-5))
         if settled:
             break
     return FitResult(
@@ -206,6 +222,14 @@ def fit_indenter(
         correlated_pixels=together,
         converged=converged and settled,
     )
+
+
+def _clear_of_corners(problem: _Problem, vector: Array) -> Array:
+    """Return 1 for points that the corners' shape does not reach, 0 for the others."""
+    clear = np.ones(problem.x_mm.shape)
+    for x, y in problem.model.corners(dict(zip(problem.names, vector, strict=True))):
+        clear[np.hypot(problem.x_mm - x, problem.y_mm - y) < CORNER_MM] = 0.0
+    return clear
 
 
 def correlated_pixels(residual_mm: Array) -> float:
@@ -268,8 +292,8 @@ def _priors(model: IndenterModel, edge: EdgePrior) -> dict[str, tuple[float, flo
         return {}
     return {
         "edge_radius_mm": (edge.edge_radius_mm, edge.edge_radius_sd_mm),
-        "blur_mm2": (edge.blur_mm**2, edge.blur_mm**2),
-    }
+        "blur_mm2": (edge.blur_mm**2, BLUR_SD_MM**2),
+    } | ({"corner_rounding": (0.0, CORNER_SD)} if "corner_rounding" in model.names else {})
 
 
 def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
@@ -290,7 +314,7 @@ def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
 
 
 def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array, bool]:
-    """Return the parameters, the Jacobian of the scaled residuals, and whether it converged."""
+    """Return the parameters, the slopes of the scaled residuals, and whether it converged."""
     keys = list(problem.prior)
     places = [problem.names.index(key) for key in keys]
     means = np.array([problem.prior[key][0] for key in keys])
@@ -302,12 +326,20 @@ def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array
 
     low, high = _bounds(problem.names, vector)
     inside = np.clip(vector, low + 1e-9, high - 1e-9)
-    solution = least_squares(
-        residuals, inside, bounds=(low, high), x_scale="jac", ftol=1e-4, xtol=1e-7, max_nfev=15
-    )
-    jacobian = solution.jac
-    assert isinstance(jacobian, np.ndarray), "the residuals' Jacobian is dense"
-    return solution.x, jacobian, bool(solution.status > 0)
+
+    level, *tilts = (problem.names.index(name) for name in BASELINE)
+    curved = [k for k, name in enumerate(problem.names) if name not in BASELINE]
+
+    def jacobian(p: Array) -> Array:
+        slopes = forward_differences(residuals, p, curved)
+        slopes[: scale.size, level] = scale
+        slopes[: scale.size, tilts[0]] = scale * (problem.x_mm - problem.centre_mm[0])
+        slopes[: scale.size, tilts[1]] = scale * (problem.y_mm - problem.centre_mm[1])
+        return slopes
+
+    fit = fit_least_squares(residuals, jacobian, inside, (low, high), tolerance=FIT_TOLERANCE)
+    assert fit.slopes is not None, "the fit is not robust in itself"
+    return fit.x, fit.slopes, fit.converged
 
 
 def _covariance(jacobian: Array, used: float, actual: float, priors: int) -> Array:

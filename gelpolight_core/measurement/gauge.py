@@ -16,10 +16,9 @@ from gelpolight_core.measurement.evaluation import (
     PressResult,
     lengths_by_place,
     region_kinds,
-    variance_between,
-    variance_within,
 )
 from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.variances import variance_between, variance_within
 
 
 @dataclass(frozen=True, slots=True)

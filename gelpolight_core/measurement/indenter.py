@@ -42,6 +42,8 @@ class IndenterModel:
         First guess from the segmented bump.
     outline : callable (values) -> (N, 2)
         The contact region's outline, (x, y) in mm.
+    corners : callable (values) -> (N, 2)
+        Its corners, (x, y) in mm. What they look like in detail is not known.
     """
 
     shape: str
@@ -49,6 +51,7 @@ class IndenterModel:
     depth: Callable[[Values, Array, Array], Array]
     start: Callable[[PressedRegion], dict[str, float]]
     outline: Callable[[Values], Array]
+    corners: Callable[[Values], Array]
 
 
 def _cylinder(values: Values, x_mm: Array, y_mm: Array) -> Array:
@@ -72,6 +75,7 @@ def _cuboid(values: Values, x_mm: Array, y_mm: Array) -> Array:
         decay_mm=values["drape_decay_mm"],
         edge_radius_mm=values["edge_radius_mm"],
         blur_mm=math.sqrt(max(values["blur_mm2"], 0.0)),
+        corner_rounding=values["corner_rounding"],
     )
 
 
@@ -118,6 +122,10 @@ def _start_cuboid(region: PressedRegion) -> dict[str, float]:
     }
 
 
+def _no_corners(_: Values) -> Array:
+    return np.empty((0, 2))
+
+
 def _start_ball(region: PressedRegion) -> dict[str, float]:
     start = _shared_start(region)
     half_radius = _sharp(2.0 * float(np.sqrt(region.area_mm2 / np.pi))) / 2.0
@@ -162,13 +170,17 @@ MODELS: Mapping[str, IndenterModel] = {
         _cylinder,
         _start_cylinder,
         lambda values: _circle(values, values["diameter_mm"] / 2.0),
+        _no_corners,
     ),
     "cuboid": IndenterModel(
         "cuboid",
-        (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE),
+        (*_PLACE, "side_a_mm", "side_b_mm", "yaw", *_EDGE, "corner_rounding"),
         _cuboid,
         _start_cuboid,
         _rectangle,
+        lambda values: _rectangle(values)[:-1],
     ),
-    "ball": IndenterModel("ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline),
+    "ball": IndenterModel(
+        "ball", (*_PLACE, "diameter_mm"), _ball, _start_ball, _ball_outline, _no_corners
+    ),
 }

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
+from gelpolight_core.measurement.measure import SHAPES, measure_object
 from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.proposal import propose
 from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.spread import MODE_ERRORS, MODE_PITCH_MM, ModeError
 from gelpolight_core.measurement.tool import Point, ToolResult
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.near_light.settings import SETTINGS
+from gelpolight_core.translation import tr
+
+AUTO = "auto"
+"""The shape that asks for the shape to be found."""
 
 
 def measure_heightmap(
@@ -21,14 +30,18 @@ def measure_heightmap(
     ----------
     heightmap : HeightMap
         Reconstructed with its uncertainty, where the result shall hold noise and calibration.
-    shape, seed_mm
-        As for :func:`~gelpolight_core.measurement.measure.measure_object`.
+    shape : {"auto", "ball", "cylinder", "cuboid"}
+        What is pressed; ``auto`` fits all three.
+    seed_mm : (float, float), optional
+        A point (x, y) on the object; needed where several objects are pressed.
 
     Raises
     ------
     InputError
-        As :func:`~gelpolight_core.measurement.measure.measure_object`.
+        As :func:`~gelpolight_core.measurement.measure.measure_object`, or the shape is unclear.
     """
+    if shape == AUTO:
+        shape = _found_shape(heightmap, seed_mm)
     return measure_object(
         heightmap.depth_mm,
         heightmap.x_mm,
@@ -39,7 +52,44 @@ def measure_heightmap(
         noise_mm=heightmap.noise_mm,
         depth_scale_sd=heightmap.depth_scale_sd,
         lateral_scale_sd=heightmap.lateral_scale_sd,
+        mode=mode_error(heightmap),
+        reach_mm=TYPICAL_DECAY_MM,
     )
+
+
+def _found_shape(heightmap: HeightMap, seed_mm: Point | None) -> str:
+    """Return the shape that is pressed."""
+    proposal = propose(heightmap, seed_mm=seed_mm)
+    if proposal is not None and proposal.shape in SHAPES:
+        return proposal.shape
+    if proposal is None:
+        found = tr("no ball, cylinder or cuboid is pressed")
+    else:
+        found = tr("the object may be a {first} or a {second}").format(
+            first=proposal.candidates[0], second=proposal.candidates[1]
+        )
+    raise InputError(
+        found,
+        where=heightmap.source or tr("height map"),
+        advice=tr("State its shape, or measure it with another tool"),
+    )
+
+
+def mode_error(heightmap: HeightMap) -> ModeError:
+    """Return what the model and effort of a height map leave of a press.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        Where it does not say at which effort it was made, the fastest is assumed.
+    """
+    if heightmap.model == "paper":
+        return replace(MODE_ERRORS["paper"], lateral_per_mm=heightmap.lateral_per_mm)
+    effort = "fast" if heightmap.trace is None else heightmap.trace.effort
+    found, finer = MODE_ERRORS[effort], heightmap.pitch_mm / MODE_PITCH_MM
+    factor = SETTINGS[effort].factor if heightmap.model == "full" else 1
+    node_mm = factor * heightmap.pitch_mm
+    return replace(found, depth_per_slope=found.depth_per_slope * finer**2, node_mm=node_mm)
 
 
 @dataclass(frozen=True, slots=True)

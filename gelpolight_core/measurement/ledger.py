@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.appending import append_durably
+from gelpolight_core.io.appending import append_durably
+from gelpolight_core.io.reading import parse_json, plain_text, read_file
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.reading import parse_json, plain_text, read_file
 from gelpolight_core.translation import tr
 
 SIZE_LIMIT = 100_000_000

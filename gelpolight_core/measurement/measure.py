@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.doubt import find_doubt
+from gelpolight_core.measurement.doubt import find_doubt, no_anchor
 from gelpolight_core.measurement.fit import (
     EdgePrior,
     FitResult,
@@ -26,7 +26,14 @@ from gelpolight_core.measurement.segmentation import (
     PressedRegion,
     find_pressed_regions,
 )
-from gelpolight_core.measurement.spread import Spread, calibration_sd, combined, noise_of_fit
+from gelpolight_core.measurement.spread import (
+    ModeError,
+    Spread,
+    calibration_sd,
+    combined,
+    mode_sd,
+    noise_of_fit,
+)
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -57,10 +64,12 @@ def measure_object(
     shape: str,
     seed_mm: tuple[float, float] | None = None,
     flags: NDArray[np.uint8] | None = None,
-    depth_sd_mm: NDArray[np.floating] | float | None = None,
+    depth_sd_mm: NDArray[np.floating] | None = None,
     noise_mm: NDArray[np.float32] | None = None,
     depth_scale_sd: float | None = None,
     lateral_scale_sd: float | None = None,
+    mode: ModeError | None = None,
+    reach_mm: float = 0.0,
     edge_radius_mm: float = EDGE_RADIUS_MM,
 ) -> Measurement:
     """Measure the object that is pressed into the membrane, its drape fitted with it.
@@ -77,13 +86,19 @@ def measure_object(
         A point on the object (x, y); needed where several objects are pressed.
     flags : (rows, columns) uint8, optional
         Bit 1: outside the working area, left out; any other bit: doubtful, weighted down.
-    depth_sd_mm : float or (rows, columns), optional
-        Uncertainty of the map; a map of them weights the pixels against each other.
+    depth_sd_mm : (rows, columns), optional
+        Standard deviation of each pixel; it weights the pixels against each other. One number for
+        all of them would change nothing, and is refused.
     noise_mm : (examples, rows / 4, columns / 4), optional
         Errors that the map's noise could have made, as a height map holds them: with them the
         result says what repeats would scatter by.
     depth_scale_sd, lateral_scale_sd : float, optional
         Relative standard deviations of the calibration's depths and lengths; part of the sd.
+    mode : ModeError, optional
+        What the map's model and effort leave; part of the sd.
+    reach_mm : float, optional
+        Length over which the map's errors hang together at least. Errors of maps that were
+        integrated from slopes hang together over the drape; 0 where they may be white.
     edge_radius_mm : float, optional
         Fillet of the object's edge where the map does not show it, known to about half of
         itself. Edges of printed and machined indenters are broken by 0.05 to 0.1 mm.
@@ -107,11 +122,13 @@ def measure_object(
         seed_mm=seed_mm,
         flags=flags,
         depth_sd_mm=depth_sd_mm,
+        reach_mm=reach_mm,
         edge_radius_mm=edge_radius_mm,
     )
     window, region, prior = found.window, found.region, found.edge
     fit = _fit(shape, window, region, prior)
-    reason = find_doubt(shape, fit, window, region, prior)
+    reasons = (find_doubt(shape, fit, window, region, prior), no_anchor(flags, region))
+    reason = "; ".join(found for found in reasons if found)
     face = _face(shape, fit, window)
     noise = (
         {}
@@ -123,7 +140,9 @@ def measure_object(
     scale = {}
     if depth_scale_sd is not None and lateral_scale_sd is not None:
         scale = calibration_sd(shape, fit.values, depth_scale_sd, lateral_scale_sd)
-    return _measurement(shape, fit, _plateau_shift_mm(fit, face), (noise, scale), reason)
+    of_mode = {} if mode is None else mode_sd(shape, fit.values, mode)
+    parts = (noise, scale, of_mode)
+    return _measurement(shape, fit, _plateau_shift_mm(fit, face), parts, reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,14 +171,15 @@ def find_object(
     *,
     seed_mm: tuple[float, float] | None = None,
     flags: NDArray[np.uint8] | None = None,
-    depth_sd_mm: NDArray[np.floating] | float | None = None,
+    depth_sd_mm: NDArray[np.floating] | None = None,
+    reach_mm: float = 0.0,
     edge_radius_mm: float = EDGE_RADIUS_MM,
 ) -> FoundObject:
     """Find the object that is to be measured; parameters and errors as :func:`measure_object`.
 
     Parameters
     ----------
-    depth_mm, x_mm, y_mm, seed_mm, flags, depth_sd_mm, edge_radius_mm
+    depth_mm, x_mm, y_mm, seed_mm, flags, depth_sd_mm, reach_mm, edge_radius_mm
         As for :func:`measure_object`.
 
     Raises
@@ -178,7 +198,7 @@ def find_object(
             where=tr("depth map"),
             advice=tr("Press it nearer to the middle of the sensor"),
         )
-    window = _window(depth, x, y, weight, region, regions)
+    window = replace(_window(depth, x, y, weight, region, regions), reach_mm=reach_mm)
     return FoundObject(
         window, region, EdgePrior(edge_radius_mm, 0.5 * edge_radius_mm, window.pitch_mm)
     )
@@ -189,13 +209,14 @@ def _checked(
     x_mm: NDArray[np.floating],
     y_mm: NDArray[np.floating],
     flags: NDArray[np.uint8] | None,
-    depth_sd_mm: NDArray[np.floating] | float | None,
+    depth_sd_mm: NDArray[np.floating] | None,
 ) -> tuple[Array, Array, Array, Array]:
     """Return depth (finite), x, y and weights in [0, 1]."""
     depth = np.asarray(depth_mm, dtype=np.float64)
     x, y = np.asarray(x_mm, dtype=np.float64), np.asarray(y_mm, dtype=np.float64)
     fits = depth.ndim == 2 and depth.shape == (y.size, x.size) and min(depth.shape) >= 8
-    if not fits or (flags is not None and flags.shape != depth.shape):
+    beside = (m for m in (flags, depth_sd_mm) if m is not None)
+    if not fits or any(np.shape(m) != depth.shape for m in beside):
         raise InputError(
             tr("a depth map of shape {shape} with {x} columns and {y} rows named").format(
                 shape=depth.shape, x=x.size, y=y.size
@@ -213,7 +234,7 @@ def _checked(
             where=tr("depth map"),
             advice=tr("Check the picture and the working area"),
         )
-    if isinstance(depth_sd_mm, np.ndarray) and depth_sd_mm.ndim == 2:
+    if depth_sd_mm is not None:
         usable = (weight > 0.0) & np.isfinite(depth_sd_mm) & (depth_sd_mm > 0.0)
         typical = float(np.median(depth_sd_mm[usable])) if usable.any() else 1.0
         # A pixel that claims to be far better than its neighbours must not decide alone.
@@ -339,10 +360,10 @@ def _measurement(
     shape: str,
     fit: FitResult,
     shift_mm: float,
-    parts: tuple[dict[str, float], dict[str, float]],
+    parts: tuple[dict[str, float], dict[str, float], dict[str, float]],
     reason: str,
 ) -> Measurement:
-    values, (noise, scale) = fit.values, parts
+    values, (noise, scale, of_mode) = fit.values, parts
     # Rim and face disagree by the shift: their height is known to no better than half of it.
     fitted = {**fit.sd, "height_mm": math.hypot(fit.sd["height_mm"], 0.5 * shift_mm)}
     diameter, side, yaw = None, None, None
@@ -358,11 +379,13 @@ def _measurement(
         centre_mm=(values["x_mm"], values["y_mm"]),
         yaw_deg=yaw,
         drape_decay_mm=values["drape_decay_mm"],
-        sd=_spread(shape, values, combined(fitted, noise, scale)),
+        sd=_spread(shape, values, combined(fitted, noise, scale, of_mode)),
         noise_sd=_spread(shape, values, noise) if noise else None,
         calibration_sd=_spread(shape, values, scale) if scale else None,
+        mode_sd=_spread(shape, values, of_mode) if of_mode else None,
         edge_radius_mm=values.get("edge_radius_mm"),
         blur_mm=math.sqrt(values["blur_mm2"]) if "blur_mm2" in values else None,
+        corner_rounding=values.get("corner_rounding"),
         baseline_mm=values["offset_mm"],
         residual_rms_mm=fit.residual_rms_mm,
         correlated_pixels=fit.correlated_pixels,
@@ -382,7 +405,7 @@ def _spread(shape: str, values: Mapping[str, float], sd: Mapping[str, float]) ->
     }
     if shape == "cuboid":
         first, second = _side_keys(values)
-        # The calibration turns nothing.
+        # Neither calibration nor mode turns anything.
         spread |= {
             "side_mm": (sd[first], sd[second]),
             "yaw_deg": float(np.degrees(sd.get("yaw", 0.0))),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.measurement.indenter import TYPICAL_DECAY_MM
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
@@ -79,6 +79,9 @@ def figure_labels() -> dict[str, str]:
         "mean_depth": tr("mean depth"),
         "deepest": tr("deepest place"),
         "tilt": tr("tilt"),
+        "ra": tr("roughness Ra of the line"),
+        "rq": tr("roughness Rq of the line"),
+        "rz": tr("roughness Rz of the line"),
         "sa": tr("roughness Sa"),
         "sq": tr("roughness Sq"),
         "sz": tr("roughness Sz"),

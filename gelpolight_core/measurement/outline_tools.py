@@ -19,7 +19,7 @@ from gelpolight_core.measurement.edges import (
 from gelpolight_core.measurement.measured import Measured, flags_at, map_errors, measured
 from gelpolight_core.measurement.roughness import ERROR_NODES, fit_plane, roughness
 from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from gelpolight_core.measurement.measured import (
 )
 from gelpolight_core.measurement.roughness import ERROR_NODES
 from gelpolight_core.measurement.tool import Point, ToolResult, tool_result
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]

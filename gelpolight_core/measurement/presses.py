@@ -1,4 +1,4 @@
-"""Pictures of presses as the evaluation takes them: read, reconstructed, and named for a ledger."""
+"""Images of presses as the evaluation takes them: read, measured, and named for a ledger."""
 
 from __future__ import annotations
 
@@ -6,27 +6,32 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gelpolight_core import __version__
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.ledger import Ledger
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.measurement.measurable import measurable_depth
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture, require_colour
+from gelpolight_core.session.images import read_picture, require_colour
 
 
-def picture_reconstruction(reconstructor: Reconstructor) -> Callable[[Path], HeightMap]:
-    """Return the function that reads a picture's file and reconstructs it.
+def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, str], Measurement]:
+    """Return the function that measures the object of a given shape in an image file.
 
     Parameters
     ----------
     reconstructor : Reconstructor
-        With the calibration under test.
+        With the calibration under test, whose verdict is part of the measurement's.
     """
+    calibration = reconstructor.calibration
 
-    def reconstruct(path: Path) -> HeightMap:
-        picture = read_picture(path, response=reconstructor.calibration.response)
+    def measure(path: Path, shape: str) -> Measurement:
+        picture = read_picture(path, response=calibration.response)
         require_colour(picture, where=str(path))
-        return reconstructor.depth(picture.rgb, name=path.name, normals=False)
+        heightmap = measurable_depth(reconstructor, picture.rgb, name=path.name, where=str(path))
+        return judged(measure_heightmap(heightmap, shape=shape), heightmap)
 
-    return reconstruct
+    return measure
 
 
 def open_ledger(path: Path | None, reconstructor: Reconstructor) -> Ledger:
@@ -44,5 +49,6 @@ def open_ledger(path: Path | None, reconstructor: Reconstructor) -> Ledger:
     InputError
         If the file cannot be read.
     """
-    name = f"{reconstructor.calibration.identity} {reconstructor.model} {__version__}"
+    calibration = reconstructor.calibration
+    name = f"{calibration.identity} {calibration.verdict} {reconstructor.model} {__version__}"
     return Ledger(path, name)

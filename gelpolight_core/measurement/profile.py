@@ -18,7 +18,7 @@ from gelpolight_core.measurement.measured import (
     measured,
     value_at,
 )
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]

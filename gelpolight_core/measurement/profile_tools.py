@@ -17,7 +17,7 @@ from gelpolight_core.measurement.profile import (
     width_ends,
 )
 from gelpolight_core.measurement.tool import Point, Tool, ToolResult, tool_result
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from gelpolight_core.measurement.fit import fit_indenter
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measure import OUTSIDE_FLAG, find_object
 from gelpolight_core.measurement.segmentation import PressedRegion, find_pressed_regions
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 UNCLEAR = "unclear"
 

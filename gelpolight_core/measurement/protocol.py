@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.truth import PressTruth
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.translation import tr
 
 SHAPES = ("cylinder", "cuboid")
@@ -159,7 +159,7 @@ def room_mm(truth: Truth, reach_mm: float) -> float:
     return reach_mm - half - ROOM_MM
 
 
-def protocol_reach_mm(calibration: Calibration) -> float:
+def protocol_reach_mm(calibration: AnyCalibration) -> float:
     """Return the radius about the origin in which every point of the membrane is seen."""
     table = calibration.table
     grid = table.grid

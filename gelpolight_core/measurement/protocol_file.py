@@ -9,9 +9,9 @@ from typing import Any, BinaryIO
 import tomli_w
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.reading import brief, parse_toml, read_file
 from gelpolight_core.measurement.protocol import Protocol, check_protocol
-from gelpolight_core.reading import brief, parse_toml, read_file
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
 

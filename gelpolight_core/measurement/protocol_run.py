@@ -20,8 +20,9 @@ from typing import Any
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.appending import append_durably
-from gelpolight_core.export.atomic import cannot_write, make_folder, write_atomically
+from gelpolight_core.io.appending import append_durably
+from gelpolight_core.io.atomic import cannot_write, make_folder, write_atomically
+from gelpolight_core.io.reading import brief, read_file
 from gelpolight_core.measurement.evaluation import Crossing
 from gelpolight_core.measurement.protocol import PressWanted, Protocol, check_protocol
 from gelpolight_core.measurement.protocol_file import (
@@ -30,7 +31,6 @@ from gelpolight_core.measurement.protocol_file import (
     read_protocol_file,
     write_protocol_file,
 )
-from gelpolight_core.reading import brief, read_file
 from gelpolight_core.session.capture import average_frames, write_picture
 from gelpolight_core.translation import tr
 
@@ -335,7 +335,7 @@ def _read_rows(path: Path) -> list[list[str]]:
         return []
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(
-            tr("the file cannot be read ({reason})").format(reason=error),
+            tr("The file cannot be read ({reason})").format(reason=error),
             where=str(path),
             advice=tr("Mend it; the pictures beside it are whole"),
         ) from error

@@ -37,7 +37,7 @@ class Measurement:
         Decay length of the membrane around the object.
     sd : dict
         Standard deviation under the same names, of the same form: the fit's residual, or the
-        noise where that is larger, together with the calibration.
+        noise where that is larger, together with calibration and mode.
     edge_radius_mm, blur_mm : float or None
         Fillet of the object and blur of the map as fitted; None for a ball.
     baseline_mm : float
@@ -57,6 +57,19 @@ class Measurement:
     calibration_sd : dict or None
         The part that is common to all measurements with this calibration; None where it is not
         known.
+    mode_sd : dict or None
+        The part that the model and effort leave with any calibration; None where it is not known.
+    corner_rounding : float or None
+        How strongly a cuboid's corners were rounded, as fitted; None for the other shapes.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> sensor = gp.Reconstructor(gp.read_calibration("sensor.gplcal"))
+    >>> image = gp.read_image("session/presses/cylinder_s5_d100.png")
+    >>> found = gp.measure(sensor.depth(image, uncertainty=True), shape="cylinder")
+    >>> abs(found.diameter_mm - 5.0) < 3 * found.sd["diameter_mm"] + 0.1
+    True
     """
 
     shape: str
@@ -77,6 +90,8 @@ class Measurement:
     reason: str
     noise_sd: dict[str, Any] | None = None
     calibration_sd: dict[str, Any] | None = None
+    mode_sd: dict[str, Any] | None = None
+    corner_rounding: float | None = None
 
     @property
     def size_mm(self) -> float:
@@ -119,6 +134,7 @@ class Measurement:
             "calibration_sd": (
                 None if self.calibration_sd is None else _plain(self.calibration_sd)
             ),
+            "mode_sd": None if self.mode_sd is None else _plain(self.mode_sd),
             "truth": None if comparison is None else comparison.truth.as_json(),
             "error_percent": None if comparison is None else dict(comparison.error_percent),
             "verdict": self.verdict,

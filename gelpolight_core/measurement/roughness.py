@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.measurement.area import Rectangle, nodes_inside
 from gelpolight_core.measurement.measured import Measured, map_errors, measured
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 Array = NDArray[np.float64]
 Levelled = Literal["plane", "none"]

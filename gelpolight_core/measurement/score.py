@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.manifest import UNREADABLE, read_member
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.npy import array_of
-from gelpolight_core.reading import open_file
+from gelpolight_core.io.npy import array_of
+from gelpolight_core.io.reading import open_file
 from gelpolight_core.translation import tr
 
 PLATEAU = 0.98
@@ -154,7 +154,7 @@ def read_true_depth(path: Path) -> TrueDepth:
             )
     except FileNotFoundError as error:
         raise InputError(
-            tr("there is no such file"),
+            tr("The file does not exist"),
             where=str(path),
             advice=tr("Use a session that holds the true depth of its presses"),
         ) from error

@@ -62,9 +62,15 @@ def ground_level_mm(depth_mm: Array, valid: Mask) -> tuple[float, float]:
     valid : (rows, columns) bool
         Where it may be used.
     """
-    values = depth_mm[valid]
-    low = values[values <= np.median(values) + 0.2 * np.ptp(values)]
+    values = np.sort(depth_mm[valid])
+    low = values[: np.searchsorted(values, np.median(values) + 0.2 * np.ptp(values), "right")]
     level = float(np.median(low))
+    if np.median(values) > values[0] + 0.05 * np.ptp(values):
+        # An object and its drape cover most of the map: the ground is where depths lie densest.
+        low = values[: max(values.size // 2, 1)]
+        half = max(low.size // 2, 1)
+        start = int(np.argmin(low[half - 1 :] - low[: low.size - half + 1]))
+        level = float(np.median(low[start : start + half]))
     # Drape tails only raise the ground, so the scatter is taken from below the level.
     below = level - low[low <= level]
     return level, 1.4826 * float(np.median(below)) if below.size else 0.0
@@ -107,8 +113,11 @@ def find_pressed_regions(
 
 def _smoothed_over_gaps(depth_mm: Array, valid: Mask, sigma_px: float) -> Array:
     """Return the map smoothed by a Gaussian that leaves out what is not valid."""
-    share = ndimage.gaussian_filter(valid.astype(np.float64), sigma_px)
-    total = ndimage.gaussian_filter(np.where(valid, depth_mm, 0.0), sigma_px)
+    side = 2 * int(4.0 * sigma_px + 0.5) + 1
+    share, total = (
+        cv2.GaussianBlur(values, (side, side), sigma_px, borderType=cv2.BORDER_REFLECT)
+        for values in (valid.astype(np.float64), np.where(valid, depth_mm, 0.0))
+    )
     return np.asarray(np.divide(total, share, out=np.zeros_like(total), where=share > 1e-6))
 
 

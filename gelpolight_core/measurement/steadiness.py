@@ -1,7 +1,7 @@
 """Is something pressed, at the right place, and does it hold still? Judged by the camera's noise.
 
-A press is told from the bare membrane by what it changes in the picture; so that neither needs a
-calibration, and the answer is there at the camera's rate.
+A press is recognised by what it changes in the image of the bare membrane. This needs no
+calibration and keeps up with the camera.
 """
 
 from __future__ import annotations

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.measurement.result import Measurement
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
 Point = tuple[float, float]
 
-UNKNOWN = int(Flag.SATURATED | Flag.NOT_OBSERVABLE | Flag.INVALID)
+UNKNOWN = int(Flag.SATURATED | Flag.NOT_OBSERVABLE | Flag.INVALID | Flag.UNANCHORED)
 """Flags of places whose depth is a guess. Walls lie in the shadow of a light, which the model knows
 how to do without."""
 FLAGGED_SHARE = 0.1

@@ -8,13 +8,13 @@ from types import MappingProxyType
 from typing import Any, cast
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import brief
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.measurement.indenter_tools import Ball, Cuboid, Cylinder
 from gelpolight_core.measurement.outline_tools import EDGES, Circle, RectangleTool
 from gelpolight_core.measurement.point_tools import Angle, Distance, StepHeight
 from gelpolight_core.measurement.profile_tools import ProfileAngle, ProfileStep, ProfileWidth
 from gelpolight_core.measurement.tool import Tool, ToolResult
-from gelpolight_core.reading import brief
 from gelpolight_core.translation import tr
 
 __all__ = [

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import brief, is_file_name, read_file
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Truth
-from gelpolight_core.reading import brief, is_file_name, read_file
 from gelpolight_core.translation import tr
 
 LONGEST_MM = 1000.0
@@ -111,7 +111,7 @@ def _records(path: Path) -> list[tuple[int, dict[str, str]]]:
         text = read_file(path).decode("utf-8-sig")
     except FileNotFoundError as error:
         raise InputError(
-            tr("there is no such file"),
+            tr("The file does not exist"),
             where=str(path),
             advice=tr("Put a truth.csv with the columns {names} there").format(
                 names="file,shape,diameter_mm,side_mm,height_mm"

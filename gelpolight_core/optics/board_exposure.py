@@ -1,4 +1,4 @@
-"""Whether a picture of a checkerboard is lit and sharp enough to place corners in it."""
+"""Check that an image of a checkerboard is bright and sharp enough to locate its corners."""
 
 from __future__ import annotations
 
@@ -9,64 +9,63 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-# Ten steps of an 8-bit picture: below it rounding alone moves an edge by 1/20 pixel.
+# Ten steps of an 8-bit image: below this, rounding alone moves an edge by 1/20 pixel.
 MIN_CONTRAST = 10.0 / 255.0
-# A value that the camera may have cut off.
-SATURATED = 254.5 / 255.0
-# An edge over more than 1/200 of the picture's width resolves fewer than 100 line pairs across
-# it, too few for a depth map.
+# The camera may have clipped values from here on. An edge wider than 1/200 of the image resolves
+# fewer than 100 line pairs across it, too few for a depth map.
 MAX_EDGE_OF_WIDTH = 1.0 / 200.0
-# Three pixels are sharp to any fit, however small the picture.
+# Three pixels are sharp enough for any fit, however small the image.
 MAX_EDGE_AT_LEAST_PX = 3.0
 # 10 % to 90 % of an edge blurred by a Gaussian of sd 1.
 EDGE_OF_SIGMA = 2.563
 
 
 def check_exposure(grey: NDArray[np.float32], name: str) -> None:
-    """Refuse a picture that shows nothing.
+    """Refuse an image without content.
 
     Parameters
     ----------
     grey : (height, width) float32
-        The picture, 0..1.
+        The image, 0..1.
     name : str
-        The picture's name.
+        Name of the image.
 
     Raises
     ------
     InputError
-        If the picture holds pixels that are no numbers, or is black, saturated or even.
+        If the image contains invalid pixels, or is black, saturated or uniform.
     """
     finite = np.isfinite(grey)
     if not finite.all():
         raise InputError(
-            tr("{n} pixels hold no number").format(n=int(np.count_nonzero(~finite))),
+            tr("{n} pixels have no valid value").format(n=int(np.count_nonzero(~finite))),
             where=name,
-            advice=tr("Capture the picture again"),
+            advice=tr("Capture the image again"),
         )
-    # One pixel in 200 of each end may be a glint or a hole.
+    # One pixel in 200 at each end may be a glint or a hole.
     low, high = np.percentile(grey[::2, ::2], [0.5, 99.5])
     if high - low >= MIN_CONTRAST:
         return
     if low >= SATURATED - MIN_CONTRAST:
-        found, advice = tr("the picture is saturated"), tr("Shorten the exposure")
+        found, advice = tr("The image is saturated"), tr("Use a shorter exposure")
     elif high < 3.0 * MIN_CONTRAST:
-        found, advice = tr("the picture is black"), tr("Light the board, or lengthen the exposure")
+        found, advice = tr("The image is black"), tr("Light the board, or use a longer exposure")
     else:
         found, advice = (
-            tr("the picture is all of one brightness"),
-            tr("Show the board to the camera"),
+            tr("The image has the same brightness everywhere"),
+            tr("Place the board in view of the camera"),
         )
     raise InputError(found, where=name, advice=advice)
 
 
 def saturated_share(picture: Picture, corners: Array) -> float:
-    """Return the share of the lighter half of the board that is at the end of the scale.
+    """Return the saturated share of the lighter half of the board.
 
     Parameters
     ----------
@@ -93,47 +92,47 @@ def saturated_share(picture: Picture, corners: Array) -> float:
 
 
 def edge_limit_px(width_px: int) -> float:
-    """Return the width from 10 % to 90 % of an edge up to which a picture counts as sharp.
+    """Return the largest edge width, 10 % to 90 %, at which an image counts as sharp.
 
     Parameters
     ----------
     width_px : int
-        Of the picture.
+        Width of the image.
     """
     return max(MAX_EDGE_AT_LEAST_PX, MAX_EDGE_OF_WIDTH * width_px)
 
 
 def sharpest_edge_px(grey: NDArray[np.float32]) -> float:
-    """Return the 10 % to 90 % width of the picture's steepest edges, as if of full contrast.
+    """Return the 10 % to 90 % width of the steepest edges of the image, scaled to full contrast.
 
     Parameters
     ----------
     grey : (height, width) float32
-        The picture.
+        The image.
     """
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
     low, high = np.percentile(smooth, [1.0, 99.0])
     steepest = float(np.percentile(np.hypot(*np.gradient(smooth)), 99.8))
-    # A Gaussian edge of sd s and height H is at most H / (s sqrt(2 pi)) steep; of s, the
-    # smoothing's own pixel is taken off again.
+    # A Gaussian edge of sd s and height H has a slope of at most H / (s sqrt(2 pi)); the one pixel
+    # of smoothing is subtracted from s.
     sigma = (high - low) / (math.sqrt(2.0 * math.pi) * max(steepest, 1e-9))
     return float(EDGE_OF_SIGMA * math.sqrt(max(sigma**2 - 1.0, 0.0)))
 
 
 def blur_error(edge_width_px: float, limit_px: float, name: str) -> InputError:
-    """Return what to raise about a blurred picture.
+    """Return the error for a blurred image.
 
     Parameters
     ----------
     edge_width_px, limit_px : float
-        Width of its edges from 10 % to 90 %, and the largest that will do.
+        Edge width from 10 % to 90 %, and its limit.
     name : str
-        The picture's name.
+        Name of the image.
     """
     return InputError(
-        tr("the picture is blurred: edges are {e:.1f} px wide, at most {m:.1f} px will do").format(
-            e=edge_width_px, m=limit_px
-        ),
+        tr(
+            "The image is blurred: edges are {e:.1f} px wide, but at most {m:.1f} px is allowed"
+        ).format(e=edge_width_px, m=limit_px),
         where=name,
-        advice=tr("Focus the camera, hold the board still, and capture the picture again"),
+        advice=tr("Focus the camera, hold the board still, and capture the image again"),
     )

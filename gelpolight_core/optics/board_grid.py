@@ -1,4 +1,4 @@
-"""Whether fitted corners are a whole checkerboard, and how they lie on its perspective grid."""
+"""Check that fitted corners form a whole checkerboard, and how well they fit a perspective grid."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from gelpolight_core.optics.crossings import Crossings, fit_crossings
 
 Array = NDArray[np.float64]
 
-# A real crossing has its neighbours' amplitude (1); the end of a lone edge square has half of it.
+# A real crossing has the amplitude of its neighbours (1); the end of a single edge has half.
 MIN_CROSSING = 0.75
-# One square is even (0); half light and half dark has half the contrast.
+# A single square is uniform (0); half light and half dark has half the contrast.
 MAX_SPREAD_IN_SQUARE = 0.25
 
 
@@ -26,7 +26,7 @@ def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
     Parameters
     ----------
     grey : (height, width) float32
-        The picture.
+        The image.
     grid : Crossings
         The corners fitted in it.
     """
@@ -43,7 +43,7 @@ def is_checkered(grey: NDArray[np.float32], grid: Crossings) -> bool:
 
 
 def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
-    """Whether the grid's meshes hold light and dark: a detector that jumped over corners."""
+    """Whether grid cells contain both light and dark, because the detector skipped corners."""
     t = np.linspace(0.2, 0.8, 7)
     right, down = (a.reshape(-1, 1, 1, 1) for a in np.meshgrid(t, t))
     c = grid.corners_px
@@ -56,12 +56,12 @@ def _mixed_squares(grey: NDArray[np.float32], grid: Crossings) -> bool:
 
 
 def goes_on(grey: NDArray[np.float32], grid: Crossings) -> bool:
-    """Whether the checkerboard has a further row or column on any side of the grid.
+    """Whether the checkerboard continues with another row or column beyond the grid.
 
     Parameters
     ----------
     grey : (height, width) float32
-        The picture.
+        The image.
     grid : Crossings
         The corners fitted in it.
     """
@@ -76,10 +76,10 @@ def _has_next_row(grey: NDArray[np.float32], corners: Array, amplitude: Array) -
     x, y = np.meshgrid(np.arange(columns, dtype=np.float64), np.arange(rows, dtype=np.float64))
     matrix, _ = cv2.findHomography(np.stack([x, y], -1).reshape(-1, 2), corners.reshape(-1, 2))
     bend = corners - apply_homography(matrix, x, y)
-    # Distortion bends the grid slowly: the border's misfit goes on outwards.
+    # Distortion bends the grid slowly: the misfit at the border continues outwards.
     beyond = apply_homography(matrix, x[0], y[0] - 1.0) + 2.0 * bend[0] - bend[1]
     step = corners[0] - beyond
-    # A quarter of a square around a corner has to be in the picture for it to be told.
+    # A quarter of a square around a corner must be in the image to detect it.
     margin = 0.25 * np.linalg.norm(step, axis=1, keepdims=True)
     limit = np.array([grey.shape[1], grey.shape[0]]) - 1.0
     seen = ((beyond > margin) & (beyond < limit - margin)).all(axis=1)
@@ -93,14 +93,14 @@ def _has_next_row(grey: NDArray[np.float32], corners: Array, amplitude: Array) -
 
 
 def apply_homography(matrix: NDArray[Any], x: Array, y: Array) -> Array:
-    """Map points of a plane into the picture.
+    """Map points of a plane into the image.
 
     Parameters
     ----------
     matrix : (3, 3)
         The homography.
     x, y : (...)
-        On the plane.
+        Coordinates on the plane.
 
     Returns
     -------
@@ -114,18 +114,18 @@ def apply_homography(matrix: NDArray[Any], x: Array, y: Array) -> Array:
 def grid_misfit_px(
     flat: Array, corners: Array, matrix: NDArray[Any], size: tuple[int, int]
 ) -> Array:
-    """Return how far corners lie from a perspective grid bent by two radial coefficients.
+    """Return the distances of corners from a perspective grid bent by two radial coefficients.
 
     Parameters
     ----------
     flat : (N, 2)
         The corners on the board.
     corners : (N, 2)
-        (u, v) of the same in the picture.
+        (u, v) of the same corners in the image.
     matrix : (3, 3)
-        Homography of the board into the picture, to start from.
+        Homography from board to image, the start value.
     size : (width, height)
-        Of the picture.
+        Size of the image.
 
     Returns
     -------
@@ -148,12 +148,12 @@ def grid_misfit_px(
 
 
 def foreshortening_tilt_deg(matrix: NDArray[Any], at: Array) -> float:
-    """Return the tilt from the foreshortening at a point of the board: arccos of short by long.
+    """Return the tilt from the foreshortening at a point: arccos(short side / long side).
 
     Parameters
     ----------
     matrix : (3, 3)
-        Homography of the board into the picture.
+        Homography from board to image.
     at : (2,)
         The point on the board.
     """

@@ -1,6 +1,6 @@
-"""Rough corners of a checkerboard, from OpenCV's detectors.
+"""Approximate corners of a checkerboard, from OpenCV's detectors.
 
-They say where a board may be, to a pixel or so; nothing that they say is taken on trust.
+They propose where a board may be, to about one pixel; every proposal is checked afterwards.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ LARGEST_SEARCH_PX = 1300
 
 
 def find_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Array | None:
-    """Ask OpenCV's contour detector for the corners: a few milliseconds.
+    """Find the corners with OpenCV's contour detector, in a few milliseconds.
 
     Parameters
     ----------
     grey : (height, width) float32
-        The picture.
+        The image.
     size : (columns, rows)
-        Of the inner corners.
+        Number of inner corners.
 
     Returns
     -------
     (rows, columns, 2) or None
-        Rough (u, v), rows following columns clockwise; None where no such board was found.
+        Approximate (u, v), rows following columns clockwise; None if no such board was found.
     """
     small, scale = _for_detector(grey, longest_px=640)
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
@@ -43,16 +43,16 @@ def find_rough_corners(grey: NDArray[np.float32], size: tuple[int, int]) -> Arra
 def search_rough_corners(
     grey: NDArray[np.float32], size: tuple[int, int], *, longest_px: int = LARGEST_SEARCH_PX
 ) -> Array | None:
-    """Ask OpenCV's slow detector, which copes with more noise and blur and with uneven light.
+    """Find the corners with OpenCV's slow detector, which tolerates noise, blur and uneven light.
 
     Parameters
     ----------
     grey : (height, width) float32
-        The picture.
+        The image.
     size : (columns, rows)
-        Of the inner corners.
+        Number of inner corners.
     longest_px : int, optional
-        Search in a copy of at most this size: smaller is quicker and misses smaller boards.
+        Search in a copy of at most this size: smaller is faster but misses smaller boards.
 
     Returns
     -------
@@ -68,17 +68,17 @@ def search_rough_corners(
 
 
 def search_any_size(grey: NDArray[np.float32]) -> Array | None:
-    """Ask OpenCV for the corners of whatever board there is.
+    """Find the corners of a board of unknown size with OpenCV.
 
     Parameters
     ----------
     grey : (height, width) float32
-        The picture.
+        The image.
 
     Returns
     -------
     (rows, columns, 2) or None
-        As from :func:`find_rough_corners`, with as many rows and columns as there seem to be.
+        As from :func:`find_rough_corners`, with the detected number of rows and columns.
     """
     small, scale = _for_detector(grey)
     for search in (0, cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE):
@@ -105,7 +105,7 @@ def _for_detector(
 
 
 def _in_full_size(corners: NDArray[Any], scale: Array) -> Array:
-    """Undo the shrinking, and let rows follow columns clockwise, as on a board's printed side."""
+    """Scale back to full size, and order rows clockwise after columns, as on the printed side."""
     full = (corners.astype(np.float64) + 0.5) * scale - 0.5
     along = full[0, -1] - full[0, 0]
     down = full[-1, 0] - full[0, 0]

@@ -18,9 +18,9 @@ class Camera:
     Attributes
     ----------
     width, height : int
-        Picture size in pixels.
+        Image size in pixels.
     fx, fy, cx, cy : float
-        Focal lengths and principal point in pixels; pixel centres at whole numbers.
+        Focal lengths and principal point in pixels; pixel centres have integer coordinates.
     distortion : tuple of 5 floats
         (k1, k2, p1, p2, k3), OpenCV's order.
     """
@@ -40,9 +40,9 @@ class Camera:
 
     @property
     def fold(self) -> float:
-        """Tangent of the angle at which the distortion turns back; infinite where it never does.
+        """Tangent of the angle at which the distortion turns back; infinite if it never does.
 
-        Beyond it the model shows two directions in one pixel, which no lens does.
+        Beyond it the model maps two directions to one pixel, which no lens does.
         """
         k1, k2, _, _, k3 = self.distortion
         # The derivative of r (1 + k1 r^2 + k2 r^4 + k3 r^6), by falling powers of r^2.

@@ -1,14 +1,13 @@
-"""Find a checkerboard in a picture, place its corners to a few hundredths of a pixel, and doubt it.
+"""Find a checkerboard in an image, locate its corners to a few hundredths of a pixel, and check it.
 
-OpenCV's detectors say where a board may be (:mod:`.board_search`); nothing they say is taken on
-trust. Every corner is placed by fitting the picture of two crossing edges (:mod:`.crossings`), and
-a board counts as found only when the corners alternate in sign like a checkerboard's, lie on a
-perspective grid, and the pattern ends where the session says that it ends (:mod:`.board_grid`).
+OpenCV's detectors propose where a board may be (:mod:`.board_search`). Every corner is then located
+by fitting a model of two crossing edges (:mod:`.crossings`), and a board counts as found only if
+the corners alternate in sign like those of a checkerboard, lie on a perspective grid, and the
+pattern ends where the session says (:mod:`.board_grid`).
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.optics.board_exposure import (
     EDGE_OF_SIGMA,
     MIN_CONTRAST,
@@ -39,96 +39,50 @@ from gelpolight_core.optics.board_search import (
     search_rough_corners,
 )
 from gelpolight_core.optics.crossings import Crossings, fit_grid
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-# Half of the light squares cut off leaves their edges without a level to be measured from.
+# If half of the light squares are clipped, their edges have no reliable level.
 MAX_SATURATED_SHARE = 0.5
 # An edge wider than a third of a square runs into the next edge.
 MAX_EDGE_OF_SQUARE = 1.0 / 3.0
-# A printed board keeps its lines to about 0.5 % of a square; a misplaced corner is off by 50 %.
+# The lines of a printed board are accurate to about 0.5 % of a square; a wrong corner is off by 50
+# %.
 MAX_RMS_OF_SQUARE = 0.02
 MAX_OFF_OF_SQUARE = 0.08
 
 
 @dataclass(frozen=True, slots=True)
-class BoardSpec:
-    """The printed checkerboard.
-
-    Attributes
-    ----------
-    inner_corners : (columns, rows)
-        Where four squares meet; one less than squares either way.
-    square_mm : float
-        Side of a square.
-    """
-
-    inner_corners: tuple[int, int] = (9, 6)
-    square_mm: float = 3.0
-
-    def __post_init__(self) -> None:
-        """Refuse a board that cannot be.
-
-        Raises
-        ------
-        InputError
-            If there are fewer than 3 corners either way or the squares have no size.
-        """
-        if min(self.inner_corners) < 3:
-            raise InputError(
-                tr("the board has {w} x {h} inner corners").format(
-                    w=self.inner_corners[0], h=self.inner_corners[1]
-                ),
-                where=tr("checkerboard"),
-                advice=tr("State at least 3 x 3: the points where four squares meet"),
-            )
-        if not (math.isfinite(self.square_mm) and self.square_mm > 0.0):
-            raise InputError(
-                tr("the squares' side is {s} mm").format(s=self.square_mm),
-                where=tr("checkerboard"),
-                advice=tr("Measure the side of a square and state it in mm"),
-            )
-
-    @property
-    def points_mm(self) -> Array:
-        """(N, 3) the corners on the board, row by row; z is 0."""
-        columns, rows = self.inner_corners
-        x, y = np.meshgrid(np.arange(columns), np.arange(rows))
-        flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-        return flat * np.float64(self.square_mm)
-
-
-@dataclass(frozen=True, slots=True)
 class BoardView:
-    """A checkerboard found in one picture.
+    """A checkerboard found in one image.
 
     Attributes
     ----------
     name : str
-        The picture's name.
+        Name of the image.
     board : BoardSpec
         The board.
     picture_size : (width, height)
-        Of the picture, in pixels.
+        Size of the image, in pixels.
     corners_px : (N, 2)
-        (u, v) of the inner corners, row by row, in the order of ``board.points_mm``; seen in
-        the picture, rows follow columns clockwise, as on the board's printed side.
+        (u, v) of the inner corners, row by row, in the order of ``board.points_mm``; in the image,
+        rows follow columns clockwise, as on the board's printed side.
     homography_rms_px, homography_max_px : float
-        How far the corners lie from a straight-line perspective grid; lens distortion shows here.
+        Distance of the corners from a straight perspective grid; this includes lens distortion.
     grid_rms_px, grid_max_px : float
-        The same after two radial distortion coefficients: what is left is not the lens.
+        The same after two radial distortion coefficients; this excludes most of the lens.
     square_px : float
         Median side of a square.
     edge_width_px : float
-        Sharpness: 10 % to 90 % width of the squares' edges, median of the corners.
+        Sharpness: 10 % to 90 % width of the squares' edges, median over the corners.
     contrast : float
         Light squares minus dark squares, 0..1.
     saturated_share : float
-        Share of the light squares' area that is at the end of the scale.
+        Saturated share of the light squares' area.
     bounding_box_px : (u_min, v_min, u_max, v_max)
-        Around the corners: the part of the picture that this view covers.
+        Around the corners: the part of the image that this view covers.
     tilt_deg : float
         Tilt against the viewing direction, from the foreshortening (no camera needed).
     """
@@ -150,28 +104,28 @@ class BoardView:
 
 
 def find_board(picture: Picture, board: BoardSpec, *, rough: Array | None = None) -> BoardView:
-    """Find the inner corners of a checkerboard, and make sure that it is the stated one.
+    """Find the inner corners of a checkerboard, and verify that it is the stated one.
 
     Parameters
     ----------
     picture : Picture
         Any size; colours are averaged.
     board : BoardSpec
-        The board that should be there.
+        The expected board.
     rough : (rows, columns, 2), optional
-        Where the corners are to a pixel or two, from :mod:`.board_search`; without it they are
-        searched for, with as much patience as it takes.
+        The corners to a pixel or two, from :mod:`.board_search`; without it they are searched for
+        with every detector.
 
     Returns
     -------
     BoardView
-        The corners and how good they are.
+        The corners and their quality.
 
     Raises
     ------
     InputError
-        If the picture is black, even, saturated or blurred, shows no board, or shows a board
-        with another number of squares.
+        If the image is black, uniform, saturated or blurred, shows no board, or shows a board with
+        another number of squares.
     """
     grey = _average_of_channels(picture)
     check_exposure(grey, picture.name)
@@ -232,14 +186,14 @@ def _check_view(view: BoardView) -> None:
     if view.saturated_share > MAX_SATURATED_SHARE:
         raise refuse(
             tr("{p:.0f} % of the light squares are saturated").format(p=100 * view.saturated_share),
-            advice=tr("Shorten the exposure until the light squares stay below the end of scale"),
+            advice=tr("Use a shorter exposure so that the light squares are not saturated"),
         )
     if view.contrast < MIN_CONTRAST:
         raise refuse(
-            tr("light and dark squares differ by {c:.1f} of 255 only").format(
+            tr("Light and dark squares differ by only {c:.1f} of 255").format(
                 c=255 * view.contrast
             ),
-            advice=tr("Light the board better, or lengthen the exposure"),
+            advice=tr("Use more light on the board, or a longer exposure"),
         )
     limit_px = min(edge_limit_px(view.picture_size[0]), MAX_EDGE_OF_SQUARE * view.square_px)
     if view.edge_width_px > limit_px:
@@ -249,15 +203,15 @@ def _check_view(view: BoardView) -> None:
         or view.grid_max_px > MAX_OFF_OF_SQUARE * view.square_px
     ):
         raise refuse(
-            tr("the corners lie up to {m:.1f} px off a flat grid (squares of {s:.0f} px)").format(
-                m=view.grid_max_px, s=view.square_px
-            ),
-            advice=tr("Use a flat board, hold it still, keep reflections and fingers off it"),
+            tr(
+                "The corners deviate by up to {m:.1f} px from a flat grid (squares of {s:.0f} px)"
+            ).format(m=view.grid_max_px, s=view.square_px),
+            advice=tr("Use a flat board, hold it still, and keep reflections and fingers off it"),
         )
 
 
 def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -> None:
-    """Raise an error that names the board's real size, where another size is sure."""
+    """Raise an error with the actual board size, if another size is certain."""
     rough = search_any_size(grey)
     if rough is None or sorted(rough.shape[:2]) == sorted(board.inner_corners):
         return
@@ -265,7 +219,7 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
     if not is_checkered(grey, grid) or goes_on(grey, grid):
         return
     raise InputError(
-        tr("the board seems to have {a} x {b} inner corners, not {w} x {h}").format(
+        tr("The board seems to have {a} x {b} inner corners, not {w} x {h}").format(
             a=max(rough.shape[:2]),
             b=min(rough.shape[:2]),
             w=board.inner_corners[0],
@@ -278,7 +232,7 @@ def _refuse_other_size(grey: NDArray[np.float32], board: BoardSpec, name: str) -
 
 def _larger(board: BoardSpec, name: str) -> InputError:
     return InputError(
-        tr("the board has more than {w} x {h} inner corners").format(
+        tr("The board has more than {w} x {h} inner corners").format(
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
         where=name,
@@ -287,19 +241,19 @@ def _larger(board: BoardSpec, name: str) -> InputError:
 
 
 def _size_advice() -> str:
-    return tr("Correct the stated inner corners of the board, or show the whole of it")
+    return tr("Correct the number of inner corners of the board, or show the whole board")
 
 
 def _absent(grey: NDArray[np.float32], board: BoardSpec, name: str) -> InputError:
-    """Say why no board was found: blur, or nothing like a board."""
+    """Return the error for a board that was not found: blur, or no board at all."""
     limit_px = edge_limit_px(grey.shape[1])
     width_px = sharpest_edge_px(grey)
     if width_px > limit_px:
         return blur_error(width_px, limit_px, name)
     return InputError(
-        tr("no checkerboard with {w} x {h} inner corners was found").format(
+        tr("No checkerboard with {w} x {h} inner corners was found").format(
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
         where=name,
-        advice=tr("Show the whole board, flat, evenly lit, with a light margin around it"),
+        advice=tr("Show the whole board, flat and evenly lit, with a light margin around it"),
     )

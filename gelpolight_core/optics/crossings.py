@@ -1,7 +1,7 @@
-"""Place the corners of a checkerboard to a few hundredths of a pixel.
+"""Locate the corners of a checkerboard to a few hundredths of a pixel.
 
-Where four squares meet, the picture shows two crossing edges of one blur. Fitting just that to
-the pixels around a rough corner gives its place, its contrast and its sharpness at once.
+Where four squares meet, the image shows two crossing edges with the same blur. A fit of this model
+to the pixels around an approximate corner gives its position, contrast and sharpness together.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.special import erf
 
 Array = NDArray[np.float64]
 
-# A square pixel averages over itself: no edge is sharper than the sd of a unit box.
+# A square pixel averages over its area: no edge is sharper than the sd of a unit box.
 _SIGMA_OF_PIXEL = 1.0 / math.sqrt(12.0)
 
 
@@ -26,9 +26,9 @@ class Crossings:
     Attributes
     ----------
     corners_px : (rows, columns, 2)
-        (u, v) where the edges cross.
+        (u, v) of the crossing point.
     amplitude : (rows, columns)
-        Half of light minus dark, signed by the quadrant that is light.
+        Half of light minus dark; the sign depends on which quadrants are light.
     sigma_px : (rows, columns)
         Standard deviation of the edges' blur.
     """
@@ -54,14 +54,14 @@ def fit_grid(grey: NDArray[np.float32], rough: Array) -> Crossings:
     Parameters
     ----------
     grey : (height, width) float32
-        The picture, 0..1.
+        The image, 0..1.
     rough : (rows, columns, 2)
-        (u, v) of the corners, to a pixel or so.
+        (u, v) of the corners, to about one pixel.
 
     Returns
     -------
     Crossings
-        As they were fitted; whether they are a checkerboard's is for others to say.
+        The fitted crossings; the caller checks whether they form a checkerboard.
     """
     rows, columns = rough.shape[:2]
     along, down = (np.gradient(rough, axis=axis).reshape(-1, 2) for axis in (1, 0))
@@ -79,17 +79,19 @@ def fit_crossings(
     """Fit two crossing blurred edges to each corner.
 
     The model around corner c is b + g.x + A erf(n1.(x-c) / s) erf(n2.(x-c) / s), s = sqrt(2)
-    sigma: an uneven background, two edges of free direction, one blur. Damped Gauss-Newton on
-    the five shape values; the four linear ones are solved anew in each round; all corners at once.
+    sigma: an uneven background, two edges of any direction, one blur. Damped Gauss-Newton on the
+    five shape parameters; the four linear ones are solved again in each iteration; all corners at
+    once.
 
     Parameters
     ----------
     grey : (height, width)
-        The picture.
+        The image.
     rough : (N, 2)
-        Where to start.
+        Start values.
     along, down : (N, 2)
-        Steps to the next corner in the row and in the column, which are the edges' directions.
+        Steps to the next corner in the row and in the column; these are the directions of the
+        edges.
 
     Returns
     -------
@@ -99,14 +101,14 @@ def fit_crossings(
     """
     area = np.abs(along[:, 0] * down[:, 1] - along[:, 1] * down[:, 0])
     longest = np.maximum(np.linalg.norm(along, axis=1), np.linalg.norm(down, axis=1))
-    # Up to 1 % of the picture, where lens distortion still leaves an edge straight.
+    # Up to 1 % of the image, where an edge is still straight despite lens distortion.
     radius = np.clip(0.7 * area / np.maximum(longest, 1e-9), 3.0, max(8.0, grey.shape[1] / 100.0))
     shape = np.empty((len(rough), 5))
     shape[:, :2] = rough
     shape[:, 2] = np.arctan2(along[:, 0], -along[:, 1])
     shape[:, 3] = np.arctan2(down[:, 0], -down[:, 1])
     shape[:, 4] = 1.2
-    # First a small window and one blur for all, wide enough to be drawn in from a pixel away.
+    # First a small window and a common blur, wide enough to converge from a pixel away.
     shape, _ = _fit_shapes(grey, shape, np.minimum(radius, 6.0), free_blur=False)
     shape, amplitude = _fit_shapes(grey, shape, radius, free_blur=True)
     return shape[:, :2], amplitude, shape[:, 4]
@@ -119,7 +121,7 @@ def _fit_shapes(
     base = np.zeros_like(shape)
     base[:, :2] = np.round(shape[:, :2])
     window = _cut_windows(grey, base[:, :2], radius)
-    # Bounds keep the first steps, far from the answer, from jumping to a neighbouring corner.
+    # Bounds keep the first steps, far from the solution, from jumping to a neighbouring corner.
     bound = np.array([1.0, 1.0, 0.2, 0.2, 0.5 if free_blur else 0.0])
     trust = np.ones(len(shape))
     local = shape - base
@@ -166,7 +168,7 @@ def _propose(shape: Array, window: _Window, bound: Array) -> tuple[Array, Array,
 
 
 def _crossing_model(shape: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return erf * erf (N, P) and its slopes (N, P, 5) by centre x, y, both angles and blur."""
+    """Return erf * erf (N, P), and its derivatives (N, P, 5) by x, y, both angles and blur."""
     cx, cy, angle_1, angle_2, sigma = (column[:, None] for column in shape.T)
     dx, dy = x - cx, y - cy
     cos_1, sin_1, cos_2, sin_2 = np.cos(angle_1), np.sin(angle_1), np.cos(angle_2), np.sin(angle_2)
@@ -189,7 +191,8 @@ def _solve(basis: Array, weights: Array, values: Array) -> Array:
     """Weighted least squares of (N, P) values in a basis (N, P, K): (N, K)."""
     transposed = np.swapaxes(basis * weights[..., None], 1, 2)
     normal = transposed @ basis
-    # The ridge is nothing beside a seen corner and keeps an unseen one from stopping the rest.
+    # The ridge is negligible for a visible corner and keeps an invisible one from stopping the
+    # rest.
     scale = np.trace(normal, axis1=1, axis2=2)[:, None, None]
     normal = normal + (1e-12 * scale + 1e-12) * np.eye(basis.shape[2])
     return np.asarray(np.linalg.solve(normal, transposed @ values[..., None])[..., 0])

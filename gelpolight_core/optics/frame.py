@@ -1,4 +1,4 @@
-"""The sensor frame: laid into the undeformed top surface below the camera's optical centre."""
+"""The sensor frame: in the undeformed top surface, below the camera's optical centre."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class TopPlane:
 
     @property
     def rotation(self) -> Array:
-        """(3, 3) rotation, camera frame to sensor frame; rows are the sensor's axes.
+        """(3, 3) rotation, camera frame to sensor frame; the rows are the axes of the sensor frame.
 
-        x is the camera's x axis laid into the plane, z the plane's normal, y completes them.
+        x is the camera's x axis projected into the plane, z the plane's normal, y completes them.
         """
         z = np.array(self.normal_camera)
         x = np.array([1.0, 0.0, 0.0]) - z[0] * z

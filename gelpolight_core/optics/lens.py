@@ -1,22 +1,22 @@
-"""Calibrate the lens from checkerboard views: intrinsics, how sure they are, and what was left out.
+"""Calibrate the lens from checkerboard views: intrinsics, their uncertainty, and unused views.
 
-Zhang's method as OpenCV solves it (pinhole, k1 k2 p1 p2, k3 = 0), wrapped in the doubts that a
-calibration needs: views are checked one by one, duplicates and outliers are left out by name, the
-uncertainty is the larger of the formal one and of the jackknife over views, and every view is
-also judged by a camera that was calibrated without it.
+Zhang's method as solved by OpenCV (pinhole, k1 k2 p1 p2, k3 = 0), with additional checks: each view
+is checked separately, duplicates and outliers are left out by name, the uncertainty is the larger
+of the formal one and of the jackknife over views, and every view is also judged by a camera that
+was calibrated without it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.optics.lens_fit import (
     HeldOutViews,
     LensFit,
@@ -35,21 +35,24 @@ from gelpolight_core.optics.lens_quality import (
 )
 from gelpolight_core.optics.lens_views import (
     MIN_VIEWS,
+    LensRefusal,
     LensView,
+    find_view,
     leave_out_duplicates,
-    look_for_board,
     more_views_advice,
+    refused_view,
     require_views,
 )
+from gelpolight_core.parallel import in_parallel
 from gelpolight_core.quality import QualityTable
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-# A view this much worse than the median view does not show what the others show.
+# A view that is this much worse than the median view does not agree with the others,
 OUTLIER_RATIO = 3.0
-# ... if it is also worse than what a good print and a good fit come to.
+# if it is also worse than the error of a good print and a good fit.
 OUTLIER_LEAST_PX = 0.1
 
 
@@ -62,23 +65,23 @@ class LensResult:
     camera : Camera
         The intrinsics.
     focal_sd_px : (fx, fy)
-        Standard deviations; so are the next two.
+        Standard deviations, as in the next two attributes.
     centre_sd_px : (cx, cy)
     distortion_sd : (k1, k2, p1, p2, k3)
     square_pixels : bool
-        Whether fx = fy was kept, as nothing in the views speaks against it.
+        Whether fx = fy was kept, because the views show no significant difference.
     views : tuple of LensView
-        All pictures, used or not, in the given order.
+        All images, used or not, in the given order.
     rms_px : float
         Over all corners of all used views, both coordinates together.
     held_out_rms_px : float
         The same for corners of views that the camera was calibrated without.
     coverage_map : (6, 8) int
-        Corners seen in each part of the picture.
+        Number of corners in each part of the image.
     coverage : float
-        Share of those parts that hold a corner.
+        Share of these parts with at least one corner.
     normal_spread_deg : float
-        RMS angle of the boards' normals about their mean: without it, no focal length.
+        RMS angle of the board normals about their mean; without it the focal length is unknown.
     quality : QualityTable
         The judged figures.
     """
@@ -97,30 +100,50 @@ class LensResult:
     quality: QualityTable
 
 
-def calibrate_lens(pictures: Sequence[Picture], board: BoardSpec) -> LensResult:
+def calibrate_lens(
+    pictures: Sequence[Picture],
+    board: BoardSpec,
+    *,
+    refused: Mapping[str, InputError] | None = None,
+) -> LensResult:
     """Calibrate the lens from views of one checkerboard at different tilts.
 
     Parameters
     ----------
     pictures : sequence of Picture
-        At least 4 usable; 10 to 20, tilted by 15 to 40 degrees, all over the picture, are good.
+        At least 4 usable; best are 10 to 20, tilted by 15 to 40 degrees and covering the whole
+        image.
     board : BoardSpec
         The board in all of them.
+    refused : mapping of str to InputError, optional
+        Images that cannot be used at all, by name: they become unused views.
 
     Returns
     -------
     LensResult
-        Camera, uncertainty, and what was used. A blurred, failing, double or outlying view among
+        Camera, uncertainty, and the views used. A blurred, failed, duplicate or outlying view among
         good ones is left out and named.
 
     Raises
     ------
     InputError
-        If pictures differ in size, fewer than 4 views are left, the views are too nearly
-        parallel to give a focal length, or the intrinsics cannot be those of a camera.
+        If images differ in size, fewer than 4 views are left, the views are too nearly parallel to
+        give a focal length, or the intrinsics cannot be those of a camera.
     """
     size = _common_size(pictures)
-    views = leave_out_duplicates([look_for_board(picture, board) for picture in pictures])
+    views = leave_out_duplicates(
+        list(in_parallel(lambda picture: find_view(picture, board), pictures))
+    )
+    views += [refused_view(name, fault) for name, fault in (refused or {}).items()]
+    try:
+        return _solve(views, size)
+    except LensRefusal:
+        raise
+    except InputError as fault:
+        raise LensRefusal(fault, views) from fault
+
+
+def _solve(views: list[LensView], size: tuple[int, int]) -> LensResult:
     require_views(views)
     views, fit = _solve_without_outliers(views, size)
     used = [view for view in views if view.used]
@@ -134,51 +157,55 @@ def calibrate_lens(pictures: Sequence[Picture], board: BoardSpec) -> LensResult:
     camera = _camera(fit.values, size)
     spread_deg = normal_spread_deg(fit)
     sd = np.maximum(fit.sd, held_out.sd)
-    refuse_unobservable(sd, fit, spread_deg)
-    _refuse_nonsense(camera)
+    try:
+        refuse_unobservable(sd, fit, spread_deg)
+        _refuse_nonsense(camera)
+    except InputError as fault:
+        raise LensRefusal(fault, views) from fault
     return _assemble(views, fit, held_out, camera, sd, spread_deg, square_pixels)
 
 
 def find_nonsense(camera: Camera) -> str | None:
-    """Say what is impossible about a camera's intrinsics; None when nothing is.
+    """Return a description of what is impossible in a camera's intrinsics; None if nothing is.
 
     Parameters
     ----------
     camera : Camera
-        Of this or another program's making.
+        From this or another program.
     """
     values = np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion])
     if not np.isfinite(values).all():
-        return tr("the intrinsics hold values that are not numbers")
+        return tr("The intrinsics contain values that are not numbers")
     longest = max(camera.width, camera.height)
-    # From a fisheye's 150 degrees, which no pinhole model holds, to 3 degrees across.
+    # From 150 degrees of a fisheye, which no pinhole model describes, down to 3 degrees.
     if not 0.13 * longest < min(camera.fx, camera.fy) <= max(camera.fx, camera.fy) < 20.0 * longest:
-        return tr("focal lengths of {fx:.0f} and {fy:.0f} px do not suit {n} px").format(
+        return tr("Focal lengths of {fx:.0f} and {fy:.0f} px are implausible for {n} px").format(
             fx=camera.fx, fy=camera.fy, n=longest
         )
     if abs(camera.fx / camera.fy - 1.0) > 0.1:
-        return tr("fx {fx:.0f} and fy {fy:.0f} px differ by more than 10 %: no pixel is so").format(
-            fx=camera.fx, fy=camera.fy
-        )
+        return tr(
+            "Implausible pixel aspect ratio: fx {fx:.0f} and fy {fy:.0f} px differ by more "
+            "than 10 %"
+        ).format(fx=camera.fx, fy=camera.fy)
     if not (0.0 < camera.cx < camera.width and 0.0 < camera.cy < camera.height):
-        return tr("the principal point ({x:.0f}, {y:.0f}) lies outside of the picture").format(
+        return tr("The principal point ({x:.0f}, {y:.0f}) is outside the image").format(
             x=camera.cx, y=camera.cy
         )
     return _folding_of(camera)
 
 
 def _folding_of(camera: Camera) -> str | None:
-    """Say where the radial distortion folds the picture over itself before its farthest corner."""
+    """Return a description if the radial distortion folds the image before its farthest corner."""
     k1, k2, _, _, k3 = camera.distortion
     u = np.array([0.0, camera.width - 1.0, 0.0, camera.width - 1.0])
     v = np.array([0.0, 0.0, camera.height - 1.0, camera.height - 1.0])
     reach = float(np.hypot((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy).max())
-    # Undistorted radii up to twice the seen one: barrel distortion of 50 % is a fisheye's.
+    # Undistorted radii up to twice the visible one: barrel distortion of 50 % is a fisheye.
     r = np.linspace(0.0, 2.0 * reach, 2001)
     seen = r * (1.0 + r**2 * (k1 + r**2 * (k2 + r**2 * k3)))
     rising = np.cumprod(np.diff(seen) > 0.0).astype(bool)
     if float(seen[1:][rising].max(initial=0.0)) < reach:
-        return tr("the distortion (k1 {a:.3g}, k2 {b:.3g}) folds the picture over itself").format(
+        return tr("The distortion (k1 {a:.3g}, k2 {b:.3g}) folds the image onto itself").format(
             a=k1, b=k2
         )
     return None
@@ -187,7 +214,7 @@ def _folding_of(camera: Camera) -> str | None:
 def _common_size(pictures: Sequence[Picture]) -> tuple[int, int]:
     if len(pictures) < MIN_VIEWS:
         raise InputError(
-            tr("there are {n} pictures, at least {m} are needed").format(
+            tr("There are {n} images, but at least {m} are needed").format(
                 n=len(pictures), m=MIN_VIEWS
             ),
             where=tr("checkerboard"),
@@ -197,7 +224,7 @@ def _common_size(pictures: Sequence[Picture]) -> tuple[int, int]:
     for picture in pictures:
         if picture.size != size:
             raise InputError(
-                tr("the picture is {a} x {b} pixels, {name} is {c} x {d}").format(
+                tr("The image has {a} x {b} pixels, but {name} has {c} x {d}").format(
                     a=picture.size[0],
                     b=picture.size[1],
                     name=pictures[0].name,
@@ -205,7 +232,7 @@ def _common_size(pictures: Sequence[Picture]) -> tuple[int, int]:
                     d=size[1],
                 ),
                 where=f"checkerboard/{picture.name}",
-                advice=tr("Capture all pictures of a session at one size"),
+                advice=tr("Capture all images of a session at the same size"),
             )
     return size
 
@@ -213,7 +240,7 @@ def _common_size(pictures: Sequence[Picture]) -> tuple[int, int]:
 def _solve_without_outliers(
     views: list[LensView], size: tuple[int, int]
 ) -> tuple[list[LensView], LensFit]:
-    """Solve, and solve again without the worst view for as long as one stands out."""
+    """Solve, and repeat without the worst view as long as one is an outlier."""
     while True:
         require_views(views)
         index = [i for i, view in enumerate(views) if view.used]
@@ -223,7 +250,7 @@ def _solve_without_outliers(
         typical = float(np.median(fit.view_rms_px))
         if fit.view_rms_px[worst] <= max(OUTLIER_RATIO * typical, OUTLIER_LEAST_PX):
             return views, fit
-        reason = tr("its corners are off by {a:.2f} px, those of a typical view by {b:.2f} px")
+        reason = tr("The corners deviate by {a:.2f} px, those of a typical view by {b:.2f} px")
         views = list(views)
         views[index[worst]] = replace(
             views[index[worst]],

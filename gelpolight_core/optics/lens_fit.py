@@ -1,6 +1,6 @@
-"""Solve a lens from corners: all views at once, and again without some of them.
+"""Fit a lens to corners: with all views at once, and again without some of them.
 
-Zhang's method as OpenCV solves it: pinhole, k1 k2 p1 p2, k3 = 0.
+Zhang's method as solved by OpenCV: pinhole, k1 k2 p1 p2, k3 = 0.
 """
 
 from __future__ import annotations
@@ -59,14 +59,14 @@ class LensFit:
 
 @dataclass(frozen=True, slots=True)
 class HeldOutViews:
-    """Cameras that were calibrated without a group of views.
+    """Cameras calibrated without a group of views.
 
     Attributes
     ----------
     values : (G, 9)
         Their intrinsics, as in :class:`LensFit`.
     view_rms_px : (V,)
-        Reprojection error of each view by the camera that did not see it; NaN where there is none.
+        Reprojection error of each view for the camera calibrated without it; NaN if there is none.
     """
 
     values: Array
@@ -80,14 +80,14 @@ class HeldOutViews:
 
 
 def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> LensFit:
-    """Solve from Zhang's closed form and from a plain guess; the better of the two.
+    """Solve from Zhang's closed form and from a simple guess, and return the better solution.
 
     Parameters
     ----------
     seen : sequence of BoardView
-        The views to solve from.
+        The views to use.
     size : (width, height)
-        Of the pictures.
+        Size of the images.
 
     Returns
     -------
@@ -97,14 +97,14 @@ def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> Lens
     Raises
     ------
     InputError
-        If no camera explains the views.
+        If no camera fits the views.
     """
     guess = _guess(size)
     fits = [solve_lens(seen, size, start=start, square_pixels=False) for start in (None, guess)]
     solved = [fit for fit in fits if fit is not None and np.isfinite(fit.values).all()]
     if not solved:
         raise InputError(
-            tr("no camera explains the views"),
+            tr("No camera model fits the views"),
             where=tr("checkerboard"),
             advice=more_views_advice(),
         )
@@ -112,7 +112,7 @@ def solve_from_scratch(seen: Sequence[BoardView], size: tuple[int, int]) -> Lens
 
 
 def _guess(size: tuple[int, int]) -> LensFit:
-    """Return a camera that sees as far across as it is away, axis through the middle."""
+    """Return a guess: field of view as wide as the distance, axis through the image centre."""
     centre = [(size[0] - 1) / 2.0, (size[1] - 1) / 2.0]
     values = np.array([float(max(size)), float(max(size)), *centre, 0.0, 0.0, 0.0, 0.0, 0.0])
     return LensFit(values, np.zeros(9), (), (), np.zeros(0), math.inf)
@@ -120,9 +120,9 @@ def _guess(size: tuple[int, int]) -> LensFit:
 
 @contextmanager
 def _one_opencv_thread() -> Iterator[None]:
-    """Let OpenCV work on one thread: several add up in the order in which they come to an end.
+    """Run OpenCV in one thread: with several, sums depend on the order in which they finish.
 
-    The same pictures have to give the same lens to the last bit, wherever they are calibrated.
+    The same images must give exactly the same lens on every machine.
     """
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
@@ -140,18 +140,18 @@ def solve_lens(
     Parameters
     ----------
     seen : sequence of BoardView
-        The views to solve from.
+        The views to use.
     size : (width, height)
-        Of the pictures.
+        Size of the images.
     start : LensFit or None
-        Where to start; Zhang's closed form when None.
+        Start values; Zhang's closed form if None.
     square_pixels : bool
         Whether fx = fy is kept.
 
     Returns
     -------
     LensFit or None
-        None where OpenCV finds the views degenerate.
+        None if OpenCV finds the views degenerate.
     """
     flags = _FLAGS
     matrix, distortion = np.eye(3), np.zeros(5)
@@ -159,7 +159,7 @@ def solve_lens(
         flags |= cv2.CALIB_USE_INTRINSIC_GUESS
         matrix, distortion = start.matrix, start.values[4:].copy()
     if square_pixels:
-        # OpenCV keeps the ratio that the guess has.
+        # OpenCV keeps the ratio of the guess.
         matrix[0, 0] = matrix[1, 1] = 0.5 * (matrix[0, 0] + matrix[1, 1])
         flags |= cv2.CALIB_FIX_ASPECT_RATIO
     try:
@@ -191,23 +191,23 @@ def solve_lens(
 def hold_out(
     seen: Sequence[BoardView], size: tuple[int, int], fit: LensFit, *, square_pixels: bool
 ) -> HeldOutViews:
-    """Calibrate without each group of views, and see how the camera explains those.
+    """Calibrate without each group of views, and check that camera on those views.
 
     Parameters
     ----------
     seen : sequence of BoardView
         The views of `fit`.
     size : (width, height)
-        Of the pictures.
+        Size of the images.
     fit : LensFit
-        The solution with all views, to start from.
+        The solution with all views, as start values.
     square_pixels : bool
         Whether fx = fy is kept.
 
     Returns
     -------
     HeldOutViews
-        Without the groups whose rest is degenerate.
+        Without the groups whose remaining views are degenerate.
     """
     groups = min(len(seen), _JACKKNIFE_GROUPS)
     group_of = np.arange(len(seen)) % groups
@@ -238,8 +238,8 @@ def aspect_is_significant(
 ) -> bool:
     """Whether fx and fy differ by three standard deviations, formally and over the views.
 
-    Cameras have square pixels; only evidence beyond the noise of the corners and beyond the
-    scatter of the views speaks for others.
+    Cameras have square pixels; a difference must exceed both the noise of the corners and the
+    scatter of the views.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def board_normal(rotation: Array) -> Array:
 
 
 def normal_spread_deg(fit: LensFit) -> float:
-    """Return the RMS angle of the boards' normals about their mean.
+    """Return the RMS angle of the board normals about their mean.
 
     Parameters
     ----------

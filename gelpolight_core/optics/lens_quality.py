@@ -1,4 +1,4 @@
-"""How good a lens calibration is: whether it can be observed at all, coverage, judged figures."""
+"""Quality of a lens calibration: observability, coverage, and judged figures."""
 
 from __future__ import annotations
 
@@ -17,15 +17,18 @@ from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-# Below this the perspective of a 3 mm square differs between views by less than a print's faults.
+# Below this, perspective differs between views by less than the errors of a printed board.
 MIN_NORMAL_SPREAD_DEG = 5.0
-# A focal length known to 1 % makes every length of the sensor wrong by as much.
+# A focal length error of 1 % makes every length of the sensor wrong by 1 %.
 MAX_FOCAL_SD = 0.01
 COVERAGE_CELLS = (6, 8)
 
 
 def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
-    """Refuse views that are too much alike to give a focal length.
+    """Refuse views from which the focal length cannot be determined.
+
+    There are two causes: nearly parallel boards, and a board that is not the flat grid that was
+    stated.
 
     Parameters
     ----------
@@ -34,35 +37,47 @@ def refuse_unobservable(sd: Array, fit: LensFit, spread_deg: float) -> None:
     fit : LensFit
         The solution.
     spread_deg : float
-        Variation of the board's tilt.
+        Variation of the board tilt.
 
     Raises
     ------
     InputError
-        If the boards are nearly parallel or the focal length is known to more than 1 % only.
+        If the boards are nearly parallel or the focal length is uncertain by more than 1 %.
     """
     focal_sd = float(np.max(sd[:2] / np.abs(fit.values[:2])))
     if spread_deg >= MIN_NORMAL_SPREAD_DEG and focal_sd <= MAX_FOCAL_SD:
         return
+    if spread_deg < MIN_NORMAL_SPREAD_DEG:
+        raise InputError(
+            tr(
+                "The views are nearly parallel: the board tilt varies by only {s:.1f} degrees, so "
+                "the focal length is uncertain by {p:.2g} %"
+            ).format(s=spread_deg, p=100.0 * focal_sd),
+            where=tr("checkerboard"),
+            advice=more_views_advice(),
+        )
     raise InputError(
         tr(
-            "the views are too nearly parallel: the board's tilt varies by {s:.1f} degrees, "
-            "and the focal length is known to {p:.2g} % only"
-        ).format(s=spread_deg, p=100.0 * focal_sd),
+            "The corners do not lie on the stated flat grid (error {r:.2f} px), so the focal "
+            "length is uncertain by {p:.2g} % although the board tilt varies by {s:.1f} degrees"
+        ).format(r=fit.rms_px, s=spread_deg, p=100.0 * focal_sd),
         where=tr("checkerboard"),
-        advice=more_views_advice(),
+        advice=tr(
+            "Print the board at 100 % scale and glue it to something flat. If it is flat, capture "
+            "more sharp views that fill the image"
+        ),
     )
 
 
 def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray[np.int64]:
-    """Count the corners seen in each part of the picture.
+    """Count the corners in each part of the image.
 
     Parameters
     ----------
     seen : sequence of BoardView
         The used views.
     size : (width, height)
-        Of the pictures.
+        Size of the images.
 
     Returns
     -------
@@ -77,14 +92,14 @@ def coverage_counts(seen: Sequence[BoardView], size: tuple[int, int]) -> NDArray
 
 
 def fit_figures(fit: LensFit, held_out_rms: float, sd: Array, camera: Camera) -> tuple[Figure, ...]:
-    """Judge how well the camera explains the corners, and how sure it is.
+    """Judge how well the camera fits the corners, and its uncertainty.
 
     Parameters
     ----------
     fit : LensFit
         The solution.
     held_out_rms : float
-        Reprojection error of views held out, pixels.
+        Reprojection error of held-out views, pixels.
     sd : (9,)
         Standard deviations of the intrinsics.
     camera : Camera
@@ -92,12 +107,12 @@ def fit_figures(fit: LensFit, held_out_rms: float, sd: Array, camera: Camera) ->
     """
     focal = max(100.0 * sd[0] / camera.fx, 100.0 * sd[1] / camera.fy)
     centre = float(np.hypot(sd[2], sd[3]))
-    steady = tr("Use a flat board, hold it still, and focus; look at the views with large errors")
+    steady = tr("Use a flat board, hold it still, and focus; check the views with large errors")
     return (
-        # A good print is placed to 0.1 px; half a pixel at the rim is 0.05 mm on the membrane.
+        # A good print is accurate to 0.1 px; half a pixel at the rim is 0.05 mm on the membrane.
         judge("reprojection_rms", tr("Reprojection error"), fit.rms_px, "px",
               warn=0.3, fail=1.0, advice=steady),
-        judge("held_out_rms", tr("Error on views held out"), held_out_rms, "px",
+        judge("held_out_rms", tr("Error on held-out views"), held_out_rms, "px",
               warn=0.4, fail=1.5, advice=more_views_advice()),
         judge("focal_sd", tr("Uncertainty of the focal length"), float(focal), "%",
               warn=0.1, fail=100.0 * MAX_FOCAL_SD, advice=more_views_advice()),
@@ -109,16 +124,16 @@ def fit_figures(fit: LensFit, held_out_rms: float, sd: Array, camera: Camera) ->
 def view_figures(
     views: Sequence[LensView], coverage: float, spread_deg: float
 ) -> tuple[Figure, ...]:
-    """Judge what the views show.
+    """Judge the content of the views.
 
     Parameters
     ----------
     views : sequence of LensView
         Used or not.
     coverage : float
-        Share of the picture's parts that hold a corner.
+        Share of the parts of the image with a corner.
     spread_deg : float
-        Variation of the board's tilt.
+        Variation of the board tilt.
     """
     used = sum(view.used for view in views)
     refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
@@ -128,12 +143,12 @@ def view_figures(
               warn=8, fail=MIN_VIEWS, higher_is_better=True, advice=more_views_advice()),
         judge("views_left_out", tr("Views left out"), len(refused), warn=0,
               advice=tr("Left out: {names}").format(names="; ".join(refused))),
-        judge("normal_spread", tr("Variation of the board's tilt"), spread_deg, "deg",
+        judge("normal_spread", tr("Variation of the board tilt"), spread_deg, "deg",
               warn=10.0, fail=MIN_NORMAL_SPREAD_DEG, higher_is_better=True,
-              advice=tr("Tilt the board more, in other directions")),
-        # Where no corner was seen, the distortion is a guess.
-        judge("coverage", tr("Picture covered by corners"), 100.0 * coverage, "%",
+              advice=tr("Tilt the board more and in different directions")),
+        # Without corners, the distortion is a guess.
+        judge("coverage", tr("Image area covered by corners"), 100.0 * coverage, "%",
               warn=60.0, fail=25.0, higher_is_better=True,
-              advice=tr("Show the board in the corners of the picture too")),
-        judge("edge_width", tr("Width of the squares' edges"), float(np.median(edges)), "px"),
+              advice=tr("Also show the board in the corners of the image")),
+        judge("edge_width", tr("Edge width of the squares"), float(np.median(edges)), "px"),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The views of a lens calibration: which show the board, and which are left out and why."""
+"""The views of a lens calibration: which ones show the board, and which are left out and why."""
 
 from __future__ import annotations
 
@@ -10,42 +10,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.optics.checkerboard import BoardSpec, BoardView, find_board
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.optics.checkerboard import BoardView, find_board
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-# Three views are the least that Zhang's method needs; the fourth checks them.
+# Zhang's method needs at least three views; the fourth checks them.
 MIN_VIEWS = 4
-# Two pictures whose corners differ by less are one view taken twice.
+# Two images whose corners differ by less show the same view twice.
 DUPLICATE_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class LensView:
-    """What became of one picture.
+    """The use of one image.
 
     Attributes
     ----------
     name : str
-        The picture's name.
+        Name of the image.
     used : bool
-        Whether it took part in the calibration.
+        Whether it is part of the calibration.
     reason : str
-        Why not; empty when it did.
+        Why it is not used; empty if it is.
     advice : str
         What to do about it.
     board : BoardView or None
-        The corners, where they were found.
+        The corners, if they were found.
     residuals_px : (N, 2) or None
-        Projected minus seen corner, of the used views.
+        Projected minus measured corner, if used.
     rms_px, held_out_rms_px : float
-        Of this view by the camera with it, and by a camera calibrated without it; NaN if unused.
+        Reprojection error for the camera calibrated with and without this view; NaN if unused.
     normal_camera : (3,) or None
         The board's normal, pointing away from the camera.
     distance_mm : float
-        Of the board's plane; NaN if unused.
+        Distance of the board's plane; NaN if unused.
     """
 
     name: str
@@ -60,20 +61,52 @@ class LensView:
     distance_mm: float = math.nan
 
 
+class LensRefusal(InputError):
+    """A lens calibration that failed, with what was found in each view.
+
+    Parameters
+    ----------
+    fault : InputError
+        Why it failed.
+    views : sequence of LensView
+        All views; those that were left out are named in the message with their reasons.
+    """
+
+    def __init__(self, fault: InputError, views: Sequence[LensView]) -> None:
+        self.views = tuple(views)
+        unused = tr("; left out: {views}").format(views=left_out_views(views))
+        named = not any(not view.used and view.reason not in fault.found for view in views)
+        found = fault.found if named else fault.found + unused
+        super().__init__(found, where=fault.where, advice=fault.advice)
+
+
+def left_out_views(views: Sequence[LensView]) -> str:
+    """Return the views that are not used, by their reasons; the most frequent first."""
+    refused: dict[str, list[LensView]] = {}
+    for view in views:
+        if not view.used:
+            refused.setdefault(view.reason, []).append(view)
+    groups = sorted(refused.values(), key=len, reverse=True)
+    return "; ".join(f"{_names(group)}: {group[0].reason}" for group in groups)
+
+
 def more_views_advice() -> str:
-    """Return the advice to whoever has too few views, or too much alike."""
-    return tr("Capture 10 or more sharp views of the board, tilted by 15 to 40 degrees either way")
+    """Return the advice for too few or too similar views."""
+    return tr(
+        "Capture 10 or more sharp views of the board, tilted by 15 to 40 degrees in different "
+        "directions"
+    )
 
 
-def look_for_board(picture: Picture, board: BoardSpec) -> LensView:
-    """Look for the board in a picture; a picture without it is an unused view, no error.
+def find_view(picture: Picture, board: BoardSpec) -> LensView:
+    """Find the board in an image; an image without it becomes an unused view, not an error.
 
     Parameters
     ----------
     picture : Picture
         Any size.
     board : BoardSpec
-        The board that should be there.
+        The expected board.
 
     Returns
     -------
@@ -83,27 +116,32 @@ def look_for_board(picture: Picture, board: BoardSpec) -> LensView:
     try:
         return LensView(picture.name, True, "", board=find_board(picture, board))
     except InputError as refusal:
-        return LensView(picture.name, False, refusal.found, refusal.advice)
+        return refused_view(picture.name, refusal)
+
+
+def refused_view(name: str, fault: InputError) -> LensView:
+    """Return the unused view for an image that cannot be used, with the reason."""
+    return LensView(name, False, fault.found, fault.advice)
 
 
 def leave_out_duplicates(views: list[LensView]) -> list[LensView]:
-    """Leave out views that show the board just as an earlier one does.
+    """Leave out views that show the board in the same pose as an earlier one.
 
     Parameters
     ----------
     views : list of LensView
-        In the order of the pictures.
+        In the order of the images.
 
     Returns
     -------
     list of LensView
-        The same views; duplicates are unused and name their twin.
+        The same views; duplicates are unused and name the earlier view.
     """
     kept: list[LensView] = []
     for view in views:
         twin = next((other for other in kept if _same_pose(view, other)), None)
         if twin is not None:
-            reason = tr("shows the board just as {name} does").format(name=twin.name)
+            reason = tr("The board has the same pose as in {name}").format(name=twin.name)
             view = replace(view, used=False, reason=reason)
         kept.append(view)
     return kept
@@ -117,7 +155,7 @@ def _same_pose(view: LensView, other: LensView) -> bool:
 
 
 def require_views(views: Sequence[LensView]) -> None:
-    """Refuse views of which too few can be used, naming what is wrong with the others.
+    """Refuse a set with too few usable views, and name the faults of the others.
 
     Parameters
     ----------
@@ -132,20 +170,17 @@ def require_views(views: Sequence[LensView]) -> None:
     used = sum(view.used for view in views)
     if used >= MIN_VIEWS:
         return
-    refused: dict[str, list[LensView]] = {}
-    for view in views:
-        if not view.used:
-            refused.setdefault(view.reason, []).append(view)
-    groups = sorted(refused.values(), key=len, reverse=True)
+    unused = [view for view in views if not view.used]
+    advices = [view.advice for view in unused if view.advice]
     raise InputError(
-        tr("{n} of {m} views can be used, at least {k} are needed ({why})").format(
+        tr("Only {n} of {m} views can be used, but at least {k} are needed ({why})").format(
             n=used,
             m=len(views),
             k=MIN_VIEWS,
-            why="; ".join(f"{_names(group)}: {group[0].reason}" for group in groups),
+            why=left_out_views(views),
         ),
         where=tr("checkerboard"),
-        advice=groups[0][0].advice or more_views_advice(),
+        advice=max(advices, key=advices.count) if advices else more_views_advice(),
     )
 
 

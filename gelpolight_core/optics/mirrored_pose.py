@@ -1,4 +1,4 @@
-"""Which of a board's two mirrored poses is the true one, by the evidence of all views."""
+"""Choose between the two mirrored poses of a board by the evidence of all views."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from collections.abc import Sequence
 
 from gelpolight_core.optics.plane_pose import PlanePose, angle_between_deg
 
-# Differences of chi-square: five standard deviations decide between a pose and its mirrored twin.
+# Differences of chi-square: five standard deviations decide between a pose and its mirror image.
 SURE_MARGIN = 25.0
-# Boards pressed onto one surface agree better than this; the floor of what "agree" means.
+# Boards pressed onto the same surface agree better than this; a lower limit of the scatter.
 _FLATNESS_DEG = 0.05
 
 
 def choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, float]:
     """Return a pose on the true side, and the chi-square by which the other side is worse.
 
-    Every candidate is tried as the truth: each view adds by how much worse the candidate it then
-    takes fits its corners than its best one does, and how far that lies from the one tried, the
-    latter up to a bound, so that a board that does not lie flat cannot outvote the rest. Where
-    the margin is too small to decide, the side that tilts less is taken: sensors are built to
-    look at their top surface squarely.
+    Every candidate is tested as the truth. Each view adds two terms: how much worse its nearest
+    candidate fits its corners than its best candidate, and how far that lies from the tested one.
+    The latter is bounded, so that a board that does not lie flat cannot outvote the rest. If the
+    margin is too small to decide, the side with the smaller tilt is chosen: sensor cameras are
+    built to face their top surface.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ def choose_side(candidates: Sequence[Sequence[PlanePose]]) -> tuple[PlanePose, f
     truth : PlanePose
         One of the candidates.
     margin : float
-        Difference of chi-square, never negative; infinite where there is no other side.
+        Difference of chi-square, never negative; infinite if there is no other side.
     """
     tried = [(_cost(candidates, pose), pose) for view in candidates for pose in view]
     cost, best = min(tried, key=lambda item: item[0])
-    taken = [nearest_pose(view, best) for view in candidates]
-    others = [item for item in tried if not any(item[1] is pose for pose in taken)]
+    chosen = [nearest_pose(view, best) for view in candidates]
+    others = [item for item in tried if not any(item[1] is pose for pose in chosen)]
     if not others:
         return best, math.inf
     other_cost, other = min(others, key=lambda item: item[0])
@@ -52,14 +52,14 @@ def _cost(candidates: Sequence[Sequence[PlanePose]], truth: PlanePose) -> float:
 
 
 def nearest_pose(view: Sequence[PlanePose], truth: PlanePose) -> PlanePose:
-    """Return the pose of one view that suits a pose taken for the truth.
+    """Return the pose of one view that is nearest to a pose assumed to be true.
 
     Parameters
     ----------
     view : sequence of PlanePose
         Its one or two poses, the one with the smaller error first.
     truth : PlanePose
-        Of this or another view.
+        A pose of this or another view.
     """
     return min(view, key=lambda pose: _pose_cost(view, pose, truth))
 

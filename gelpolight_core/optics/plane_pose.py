@@ -1,4 +1,4 @@
-"""The one or two poses in which a seen board may lie, and how sure each is."""
+"""The one or two possible poses of a board in a view, and their uncertainty."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PlanePose:
     normal_sd_deg, distance_sd_mm : float
         Standard deviations from the corners' residuals, for the given camera.
     residuals_px : (N, 2)
-        Projected minus seen corner.
+        Projected minus measured corner.
     """
 
     plane: TopPlane
@@ -66,7 +66,7 @@ def find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
     poses = []
     starts = []
     for turn, shift in zip(turns, shifts, strict=True):
-        # Before the refinement, which overwrites its start.
+        # Before the refinement, which overwrites its start values.
         starts.append(_describe_pose(seen, camera, turn, shift))
         refined = cv2.solvePnPRefineLM(
             points, seen.corners_px, camera.matrix, distortion, turn, shift, criteria
@@ -76,8 +76,8 @@ def find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
     best = poses[0]
     if len(poses) == 1:
         return [best]
-    # Refinement may lead out of the mirrored pose into the true one, which rejects it; shown is
-    # then the pose that it left.
+    # Refinement may move from the mirrored pose to the true one, which rejects the mirrored pose;
+    # the pose before refinement is then reported.
     twin = poses[1]
     if _are_one(twin, best):
         twin = max(starts, key=lambda pose: pose.rms_px)
@@ -85,7 +85,7 @@ def find_poses(seen: BoardView, camera: Camera) -> list[PlanePose]:
 
 
 def _are_one(pose: PlanePose, other: PlanePose) -> bool:
-    """Whether two poses are apart by less than the corners can tell."""
+    """Whether two poses differ by less than the corners can resolve."""
     return angle_between_deg(pose.plane, other.plane) < max(5.0 * other.normal_sd_deg, 1e-4)
 
 
@@ -116,7 +116,7 @@ def _describe_pose(
 
 
 def _pose_slopes(camera: Camera, turned: Array, shift_mm: Array) -> Array:
-    """Return d(corners)/d(small turn about the board's origin, shift), (2N, 6)."""
+    """Return d(corners)/d(small rotation about the board's origin, shift), (2N, 6)."""
     columns = []
     for k in range(3):
         axis = np.eye(3)[k]
@@ -144,7 +144,7 @@ def as_plane(normal: Array, distance_mm: float) -> TopPlane:
     normal : (3,)
         Unit normal, away from the camera.
     distance_mm : float
-        From the optical centre.
+        Distance from the optical centre.
     """
     return TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), distance_mm)
 

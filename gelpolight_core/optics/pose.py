@@ -1,28 +1,29 @@
-"""Where the sensor's top surface is: the pose of a checkerboard that lies on it, in air.
+"""Pose of the sensor's top surface, from a checkerboard that lies on it, in air.
 
-A flat board seen by a camera has two poses that explain it almost equally well, mirrored about
-the viewing direction. Both are found (IPPE), both are refined, and the mirrored one is rejected
-by its larger reprojection error and by the agreement of the views, or, where neither tells,
-because it tilts more; which of the three it was is part of the answer.
+Two poses of a flat board explain an image almost equally well; they are mirrored about the viewing
+direction. Both are found (IPPE) and refined. The mirrored one is rejected by its larger
+reprojection error and by the agreement of the views or, if neither decides, because it tilts more.
+The result states which criterion decided.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import BoardSpec, BoardView, find_board
+from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.mirrored_pose import SURE_MARGIN, choose_side, nearest_pose
 from gelpolight_core.optics.plane_pose import PlanePose, angle_between_deg, as_plane, find_poses
 from gelpolight_core.quality import Figure, QualityTable, judge
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 
@@ -30,26 +31,26 @@ class Decision(StrEnum):
     """How the mirrored pose was rejected."""
 
     SINGLE = "single"  # there was only one pose: the board faces the camera
-    EVIDENCE = "evidence"  # reprojection error, and agreement where there are several views
-    TILT = "tilt"  # the two explain the views equally well; the one that tilts less was taken
+    EVIDENCE = "evidence"  # by reprojection error, and by agreement if there are several views
+    TILT = "tilt"  # both fit equally well; the one with the smaller tilt was chosen
 
 
 @dataclass(frozen=True, slots=True)
 class TopPoseView:
-    """What one picture says about the top surface.
+    """The top surface as seen in one image.
 
     Attributes
     ----------
     name : str
-        The picture's name.
+        Name of the image.
     used : bool
-        Whether it took part.
+        Whether it is used.
     reason : str
-        Why not; empty when it did.
+        Why it is not used; empty if it is.
     board : BoardView or None
-        The corners, where they were found.
+        The corners, if they were found.
     pose, mirrored : PlanePose or None
-        The accepted pose, and the rejected one where there is a second.
+        The accepted pose, and the rejected one if there is a second.
     """
 
     name: str
@@ -77,12 +78,12 @@ class TopPoseResult:
     mirrored : PlanePose or None
         The rejected mirrored pose of the first used view.
     decision : Decision
-        How it was rejected.
+        How the mirrored pose was rejected.
     margin_sd : float
-        By how many standard deviations it was: at most 10 from each view, infinite where there
+        Number of standard deviations of the rejection: at most 10 from each view, infinite if there
         was no other pose.
     views : tuple of TopPoseView
-        All pictures in the given order.
+        All images in the given order.
     quality : QualityTable
         The judged figures.
     """
@@ -100,7 +101,12 @@ class TopPoseResult:
 
 
 def estimate_top_pose(
-    pictures: Sequence[Picture], board: BoardSpec, camera: Camera, *, focal_sd_px: float = 0.0
+    pictures: Sequence[Picture],
+    board: BoardSpec,
+    camera: Camera,
+    *,
+    focal_sd_px: float = 0.0,
+    refused: Mapping[str, InputError] | None = None,
 ) -> TopPoseResult:
     """Find the top surface from views of a checkerboard that lies flat on it, without elastomer.
 
@@ -113,7 +119,9 @@ def estimate_top_pose(
     camera : Camera
         From :func:`gelpolight_core.optics.lens.calibrate_lens`.
     focal_sd_px : float, optional
-        How well the focal length is known; it limits how well the distance is.
+        Standard deviation of the focal length; it limits the accuracy of the distance.
+    refused : mapping of str to InputError, optional
+        Images that cannot be used at all, by name: they become unused views.
 
     Returns
     -------
@@ -123,11 +131,11 @@ def estimate_top_pose(
     Raises
     ------
     InputError
-        If there is no picture, one has not the camera's size, none shows the board, or three and
-        more boards lie in as many different planes.
+        If there is no image, the size differs from the camera's, none shows the board, or three or
+        more boards all lie in different planes.
     """
-    _check_pictures(pictures, camera)
-    looked = [_look(picture, board) for picture in pictures]
+    _check_images(pictures, camera)
+    looked = [_find_board(picture, board) for picture in pictures]
     boards = [board_view for board_view, _ in looked if board_view is not None]
     if not boards:
         first = next(refusal for _, refusal in looked if refusal is not None)
@@ -136,28 +144,30 @@ def estimate_top_pose(
     reference, margin = choose_side(candidates)
     views = _describe(pictures, looked, candidates, reference)
     views = _leave_out_strays(views)
+    views += [TopPoseView(name, False, fault.found) for name, fault in (refused or {}).items()]
     return _assemble(views, camera, margin, focal_sd_px)
 
 
-def _check_pictures(pictures: Sequence[Picture], camera: Camera) -> None:
+def _check_images(pictures: Sequence[Picture], camera: Camera) -> None:
     if not pictures:
         raise InputError(
-            tr("there is no picture of the board on the top surface"),
+            tr("There is no image of the board on the top surface"),
             where=tr("top_pose"),
-            advice=tr("Lay the board onto the top surface and capture it"),
+            advice=tr("Lay the board on the top surface and capture an image"),
         )
     for picture in pictures:
         if picture.size != (camera.width, camera.height):
             raise InputError(
-                tr("the picture is {a} x {b} pixels, the calibrated camera's are {c} x {d}").format(
-                    a=picture.size[0], b=picture.size[1], c=camera.width, d=camera.height
-                ),
+                tr(
+                    "The image has {a} x {b} pixels, but the images of the calibrated camera "
+                    "have {c} x {d}"
+                ).format(a=picture.size[0], b=picture.size[1], c=camera.width, d=camera.height),
                 where=f"top_pose/{picture.name}",
-                advice=tr("Capture all pictures of a session at one size"),
+                advice=tr("Capture all images of a session at the same size"),
             )
 
 
-def _look(picture: Picture, board: BoardSpec) -> tuple[BoardView | None, InputError | None]:
+def _find_board(picture: Picture, board: BoardSpec) -> tuple[BoardView | None, InputError | None]:
     try:
         return find_board(picture, board), None
     except InputError as refusal:
@@ -185,7 +195,7 @@ def _describe(
 
 
 def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
-    """Leave out views whose plane is not the others': needs three, to know which one is wrong."""
+    """Leave out views whose plane differs from the others; this needs three views."""
     poses = [view.pose for view in views if view.used and view.pose is not None]
     if len(poses) < 3:
         return views
@@ -198,11 +208,11 @@ def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
         if view.pose is not None:
             angle_deg = angle_between_deg(view.pose.plane, middle)
             off_mm = abs(view.pose.plane.distance_mm - middle.distance_mm)
-            # Half a degree, 0.1 mm under one end of a board: it does not lie on the surface.
+            # Half a degree is 0.1 mm under one end of a board: it does not lie on the surface.
             if angle_deg > max(0.5, 5.0 * view.pose.normal_sd_deg) or off_mm > max(
                 0.005 * middle.distance_mm, 5.0 * view.pose.distance_sd_mm
             ):
-                reason = tr("its board lies {a:.2f} degrees and {d:.2f} mm off the others'")
+                reason = tr("The board deviates by {a:.2f} degrees and {d:.2f} mm from the others")
                 view = TopPoseView(
                     view.name,
                     False,
@@ -217,16 +227,16 @@ def _leave_out_strays(views: list[TopPoseView]) -> list[TopPoseView]:
 
 
 def _refuse_discord(views: Sequence[TopPoseView], count: int) -> None:
-    """Refuse `count` boards of which no two lie in one plane: then none is known to be right."""
+    """Refuse `count` boards of which no two lie in one plane: none is known to be right."""
     if sum(view.used for view in views) >= 2:
         return
     strays = (view for view in views if view.pose is not None and not view.used)
     raise InputError(
-        tr("the {n} boards do not lie in one plane ({names})").format(
+        tr("The {n} boards do not lie in one plane ({names})").format(
             n=count, names="; ".join(f"{view.name}: {view.reason}" for view in strays)
         ),
         where=tr("top_pose"),
-        advice=tr("Capture the board only where it lies flat on the top surface"),
+        advice=tr("Use only images in which the board lies flat on the top surface"),
     )
 
 
@@ -234,7 +244,7 @@ def _average(poses: Sequence[PlanePose]) -> tuple[TopPlane, float, float]:
     """Return the average plane and the standard deviations of its normal (deg) and distance."""
     normals = np.array([pose.plane.normal_camera for pose in poses])
     distances = np.array([pose.plane.distance_mm for pose in poses])
-    # Equal weights below the flatness of real boards, which the residuals do not know of.
+    # Equal weights below the flatness of real boards, which the residuals do not include.
     normal_weights = np.array([1.0 / math.hypot(p.normal_sd_deg, 1e-3) ** 2 for p in poses])
     distance_weights = np.array([1.0 / math.hypot(p.distance_sd_mm, 1e-4) ** 2 for p in poses])
     normal = normal_weights @ normals
@@ -293,7 +303,7 @@ def _plane_figures(
         judge("distance", tr("Distance of the top surface"), plane.distance_mm, "mm"),
         judge("distance_sd", tr("Uncertainty of the distance"),
               100.0 * distance_sd_mm / plane.distance_mm, "%", warn=0.1, fail=1.0, advice=more),
-        # A degree of tilt moves a mirrored light by 1 mm (PHYSICS: lights from mirror spots).
+        # A tilt error of one degree moves a mirrored LED by 1 mm (see "lights from mirror spots").
         judge("normal_sd", tr("Uncertainty of the normal"), normal_sd_deg, "deg",
               warn=0.1, fail=1.0, advice=more),
         judge("tilt", tr("Tilt of the top surface"), tilt_deg, "deg", warn=5.0, fail=20.0,
@@ -307,7 +317,7 @@ def _view_figures(
     refused = [f"{view.name} ({view.reason})" for view in views if not view.used]
     figures = [
         judge("reprojection_rms", tr("Reprojection error"), rms, "px", warn=0.3, fail=1.0,
-              advice=tr("Use a flat board and check its squares' size; calibrate the lens again")),
+              advice=tr("Use a flat board and check its square size; calibrate the lens again")),
         judge("view_spread", tr("Largest angle between a view and the average"), spread_deg, "deg",
               warn=0.25, fail=1.0, advice=tr("Press the board flat onto the surface in each view")),
         judge("views_left_out", tr("Views left out"), len(refused), warn=0,
@@ -318,7 +328,7 @@ def _view_figures(
             judge("mirrored_margin", tr("Certainty against the mirrored pose"),
                   math.sqrt(max(margin, 0.0)), "sd", warn=math.sqrt(SURE_MARGIN),
                   higher_is_better=True,
-                  advice=tr("Two mirrored poses explain the views equally well, and the one that "
-                            "tilts less was taken. Use a larger or sharper board to be sure"))
+                  advice=tr("Two mirrored poses fit the views equally well; the one with the "
+                            "smaller tilt was chosen. To be sure, use a larger or sharper board"))
         )  # fmt: skip
     return tuple(figures)

@@ -1,9 +1,9 @@
 """Refraction at flat parallel layers between the camera and the membrane.
 
 The stack is air, an optional window, and the elastomer, all parallel to the top surface, whose
-normal need not be the optical axis. Pixel to membrane is closed form (Snell's law in vector
-form); membrane to pixel is one root in the plane of incidence, found by Newton's method.
-The paper's Eq. (3) is the special case of one face and a normal along the optical axis.
+normal may differ from the optical axis. The way from pixel to membrane has a closed form (Snell's
+law as vectors); from membrane to pixel, one root in the plane of incidence is found by Newton's
+method. The paper's Eq. (3) is the special case of one face and a normal along the optical axis.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class LayerStack:
     Attributes
     ----------
     thicknesses_mm : tuple of floats
-        Air gap, [window,] elastomer; their sum is the top plane's distance.
+        Air gap, [window,] elastomer; their sum is the distance of the top plane.
     indices : tuple of floats
         Refractive indices of the same layers; the first is air's 1.
     """
@@ -49,14 +49,14 @@ def build_stack(
     window_thickness_mm: float = 0.0,
     window_index: float = 1.49,
 ) -> LayerStack:
-    """Return the stack below a top surface at `distance_mm`; layers of no thickness are left out.
+    """Return the stack below a top surface at `distance_mm`; layers of zero thickness are left out.
 
     Parameters
     ----------
     distance_mm : float
         From the optical centre to the top surface, along its normal.
     elastomer_thickness_mm, window_thickness_mm : float
-        0: there is none.
+        0 if there is none.
     elastomer_index, window_index : float
         Refractive indices.
 
@@ -69,10 +69,13 @@ def build_stack(
     if air_mm < 0.0:
         raise InputError(
             tr(
-                "elastomer and window are {t:.1f} mm thick, the top surface is {d:.1f} mm away"
+                "Elastomer and window are {t:.1f} mm thick, but the top surface is only "
+                "{d:.1f} mm away"
             ).format(t=elastomer_thickness_mm + window_thickness_mm, d=distance_mm),
-            where=tr("what is stated of the sensor"),
-            advice=tr("Correct the thicknesses, or the squares of the board on top"),
+            where=tr("sensor description"),
+            advice=tr(
+                "Correct the thicknesses, or the square size of the board on the top surface"
+            ),
         )
     layers = [
         (air_mm, 1.0),
@@ -84,7 +87,7 @@ def build_stack(
 
 
 def radius_on_membrane(tangent_in_air: Array, stack: LayerStack) -> tuple[Array, Array]:
-    """Return how far from the foot a ray meets the top surface, and its slope inside the gel.
+    """Return the radius at which a ray meets the top surface, and its slope in the elastomer.
 
     Parameters
     ----------
@@ -113,8 +116,8 @@ def radius_on_membrane(tangent_in_air: Array, stack: LayerStack) -> tuple[Array,
 def tangent_in_air(radius_mm: Array, stack: LayerStack, *, tolerance_mm: float = 1e-12) -> Array:
     """Return the tangent in air of the ray that meets the top surface at `radius_mm`.
 
-    Newton's method on the concave, monotone :func:`radius_on_membrane`: started below the root it
-    converges from that side, without overshoot.
+    Newton's method on the concave, monotone :func:`radius_on_membrane`: a start below the root
+    converges from that side without overshoot.
 
     Parameters
     ----------
@@ -123,7 +126,7 @@ def tangent_in_air(radius_mm: Array, stack: LayerStack, *, tolerance_mm: float =
     stack : LayerStack
         The layers.
     tolerance_mm : float, optional
-        Largest error of the radius that is accepted.
+        Largest accepted error of the radius.
     """
     radius = np.asarray(radius_mm, dtype=np.float64)
     # The paraxial slope is the steepest, so its estimate lies below the root.
@@ -164,10 +167,10 @@ def camera_to_membrane(
     Returns
     -------
     points_mm : (..., 2)
-        Where the rays meet the top surface, sensor frame (x, y); NaN for rays that never do.
+        Points (x, y) where the rays meet the top surface, sensor frame; NaN for rays that never do.
     drift : (..., 2)
-        Sideways move (x, y) of the seen surface point per mm of indentation depth: the ray
-        direction w of PHYSICS, scaled to unit depth; it points back to the foot.
+        Ray slope: lateral shift (x, y) of the visible surface point per mm of indentation depth; it
+        points towards the foot of the perpendicular.
     """
     in_sensor = np.asarray(directions) @ plane.rotation.T
     sideways = np.hypot(in_sensor[..., 0], in_sensor[..., 1])
@@ -178,7 +181,7 @@ def camera_to_membrane(
 
 
 def membrane_to_camera(points_mm: Array, plane: TopPlane, stack: LayerStack) -> Array:
-    """Return the camera-frame directions (..., 3) under which top-surface points are seen.
+    """Return the camera-frame directions (..., 3) towards points of the top surface.
 
     Parameters
     ----------

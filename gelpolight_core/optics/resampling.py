@@ -1,7 +1,7 @@
-"""The one resampling table: raw pixel for every node of a regular grid on the membrane.
+"""The one resampling table: raw pixel coordinates for every node of a regular membrane grid.
 
-Lens distortion, refraction, tilt and metric scale are all held by this table, so that a frame is
-interpolated once. An inverse table leaves no holes and merges no pixels.
+The table combines lens distortion, refraction, tilt and metric scale, so that a frame is
+interpolated only once. An inverse table leaves no holes and merges no pixels.
 """
 
 from __future__ import annotations
@@ -11,20 +11,24 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import LayerStack, camera_to_membrane, membrane_to_camera
+from gelpolight_core.parallel import in_parallel
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+BLOCK_ROWS = 64
+"""Rows of the table computed by one thread at a time: few enough to stay in the cache."""
 FLOAT32_MAX_PIXELS = 32_766
 GRID_PER_PICTURE = 8.0
-# Just before a lens model turns back, a hundredth of a pixel moves a ray by degrees.
+# Just before a lens model folds, a hundredth of a pixel changes a ray by degrees.
 BEFORE_FOLD = 0.9
-# Less than this holds no indentation with undeformed membrane about it.
+# A smaller field cannot contain an indentation with undeformed membrane around it.
 LEAST_NODES = 32
 
 
@@ -61,18 +65,18 @@ class MembraneGrid:
 
 @dataclass(frozen=True, slots=True)
 class ResamplingTable:
-    """Where in the raw picture each membrane node is seen.
+    """Position in the raw image of each membrane node.
 
     Attributes
     ----------
     grid : MembraneGrid
         The nodes.
     u_px, v_px : (rows, columns) float32
-        Raw pixel coordinates; -1 where a node is not seen.
+        Raw pixel coordinates; -1 for nodes that are not visible.
     valid : (rows, columns) bool
-        Seen by the camera and inside the working circle.
+        Visible to the camera and inside the working circle.
     drift : (rows, columns, 2) float32
-        Sideways move (x, y) of the seen surface point per mm of depth.
+        Ray slope: lateral shift (x, y) of the visible surface point per mm of depth.
     """
 
     grid: MembraneGrid
@@ -82,7 +86,7 @@ class ResamplingTable:
     drift: NDArray[np.float32]
 
     def apply(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Resample a raw picture (height, width[, 3]) onto the grid, bilinear; 0 outside."""
+        """Resample a raw image (height, width[, 3]) onto the grid, bilinear; 0 outside."""
         return np.asarray(
             cv2.remap(rgb, self.u_px, self.v_px, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT),
             dtype=np.float32,
@@ -104,47 +108,57 @@ def build_resampling_table(
     camera, plane, stack
         Optics.
     working_diameter_mm : float
-        Diameter of the working circle about the sensor frame's origin.
+        Diameter of the working circle around the origin of the sensor frame.
     pitch_mm : float, optional
-        Node distance; by default one raw pixel's footprint at the origin.
+        Node spacing; by default the footprint of one raw pixel at the origin.
 
     Raises
     ------
     InputError
-        If the camera sees nothing of the working circle, or the picture is too large.
+        If the camera sees nothing of the working circle, or the image is too large.
     """
     if max(camera.width, camera.height) > FLOAT32_MAX_PIXELS:
         raise InputError(
-            tr("the picture is {w} x {h} pixels").format(w=camera.width, h=camera.height),
+            tr("The image has {w} x {h} pixels").format(w=camera.width, h=camera.height),
             where=tr("camera"),
-            advice=tr("Use pictures of at most {n} pixels a side").format(n=FLOAT32_MAX_PIXELS),
+            advice=tr("Use images of at most {n} pixels a side").format(n=FLOAT32_MAX_PIXELS),
         )
     grid = visible_grid(camera, plane, stack, diameter_mm=working_diameter_mm, pitch_mm=pitch_mm)
     points = grid.points_mm()
-    directions = membrane_to_camera(points, plane, stack)
-    pixels = camera.project(directions)
-    steepest = BEFORE_FOLD * camera.fold
-    inside = (
-        (directions[..., 2] > 0.0)
-        & (pixels >= 0.0).all(axis=-1)
-        & (np.hypot(directions[..., 0], directions[..., 1]) < steepest * directions[..., 2])
-        & (pixels[..., 0] <= camera.width - 1)
-        & (pixels[..., 1] <= camera.height - 1)
-    )
     in_circle = np.hypot(points[..., 0], points[..., 1]) <= working_diameter_mm / 2
-    _, drift = camera_to_membrane(directions, plane, stack)
-    seen = np.where(inside[..., None], pixels, -1.0).astype(np.float32)
+
+    def seen_from(rows: slice) -> tuple[Map, Mask, Map]:
+        """Return raw pixels, whether they are in the image, and ray slopes, for some rows."""
+        directions = membrane_to_camera(points[rows], plane, stack)
+        pixels = camera.project(directions)
+        inside = (
+            (directions[..., 2] > 0.0)
+            & (pixels >= 0.0).all(axis=-1)
+            & (np.hypot(directions[..., 0], directions[..., 1]) < steepest * directions[..., 2])
+            & (pixels[..., 0] <= camera.width - 1)
+            & (pixels[..., 1] <= camera.height - 1)
+        )
+        _, drift = camera_to_membrane(directions, plane, stack)
+        seen = np.where(inside[..., None], pixels, -1.0)
+        return seen.astype(np.float32), inside, drift.astype(np.float32)
+
+    steepest = BEFORE_FOLD * camera.fold
+    # Fixed block size, independent of the number of threads, so that the table is always the same.
+    blocks = [slice(first, first + BLOCK_ROWS) for first in range(0, grid.shape[0], BLOCK_ROWS)]
+    pixels, inside, drift = (
+        np.concatenate(parts) for parts in zip(*in_parallel(seen_from, blocks), strict=True)
+    )
     return ResamplingTable(
         grid,
-        np.ascontiguousarray(seen[..., 0]),
-        np.ascontiguousarray(seen[..., 1]),
+        np.ascontiguousarray(pixels[..., 0]),
+        np.ascontiguousarray(pixels[..., 1]),
         inside & in_circle,
-        drift.astype(np.float32),
+        drift,
     )
 
 
 def paraxial_footprint_mm(camera: Camera, stack: LayerStack) -> float:
-    """Return the size of one raw pixel on the membrane at the sensor frame's origin.
+    """Return the size of one raw pixel on the membrane at the origin of the sensor frame.
 
     Parameters
     ----------
@@ -163,14 +177,14 @@ def visible_grid(
     diameter_mm: float,
     pitch_mm: float | None = None,
 ) -> MembraneGrid:
-    """Return the grid over the seen part of the working circle, in transform-friendly sizes.
+    """Return the grid over the visible part of the working circle, in sizes suited to transforms.
 
     Parameters
     ----------
     camera, plane, stack, pitch_mm
         As in :func:`build_resampling_table`.
     diameter_mm : float
-        Of the working circle.
+        Diameter of the working circle.
 
     Raises
     ------
@@ -191,30 +205,43 @@ def visible_grid(
     high = np.minimum(ahead.max(axis=0, initial=-np.inf), diameter_mm / 2)
     if not (high - low > 2 * pitch_mm).all():
         raise InputError(
-            tr("the camera sees nothing of the working circle"),
+            tr("The camera sees nothing of the working circle"),
             where="top_pose",
-            advice=tr("Check the board's square size and the picture of the top surface"),
+            advice=tr("Check the square size of the board and the image of the top surface"),
         )
     if not (high - low >= LEAST_NODES * pitch_mm).all():
         raise InputError(
-            tr("the working circle's seen part is {x:.2f} x {y:.2f} mm, below {n} pixels").format(
-                x=high[0] - low[0], y=high[1] - low[1], n=LEAST_NODES
-            ),
-            where=tr("what is stated of the sensor"),
-            advice=tr("State the working diameter in mm, as the width of the membrane in use"),
+            tr(
+                "The visible part of the working circle is {x:.2f} x {y:.2f} mm, less than "
+                "{n} pixels"
+            ).format(x=high[0] - low[0], y=high[1] - low[1], n=LEAST_NODES),
+            where=tr("sensor description"),
+            advice=tr("Enter the working diameter in mm: the width of the membrane in use"),
         )
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
     if nodes > GRID_PER_PICTURE * camera.width * camera.height:
         raise InputError(
-            tr("the membrane grid would have {n:.1e} nodes").format(n=nodes),
+            tr("The membrane grid would have {n:.1e} nodes").format(n=nodes),
             where=tr("camera"),
-            advice=tr("Check focal length and working diameter, or state a wider pitch"),
+            advice=tr("Check focal length and working diameter, or set a larger pitch"),
         )
     axes = []
     for start, stop in zip(low, high, strict=True):
-        # In fours, so that a quarter-scale grid has whole nodes too.
+        # Multiples of four, so that a quarter-scale grid has whole nodes too.
         quarter = int(np.ceil(((stop - start) / pitch_mm + 1.0) / 4.0))
-        count = 4 * next_fast_len(quarter, real=True)
+        count = 4 * _next_smooth(quarter)
         middle = (start + stop) / 2
         axes.append(middle + pitch_mm * (np.arange(count) - (count - 1) / 2))
     return MembraneGrid(axes[0], axes[1], float(pitch_mm))
+
+
+def _next_smooth(count: int) -> int:
+    """Return the next number from `count` on without prime factors above 5 (fast transforms)."""
+    while True:
+        rest = count
+        for prime in (2, 3, 5):
+            while rest % prime == 0:
+                rest //= prime
+        if rest == 1:
+            return count
+        count += 1

@@ -1,4 +1,4 @@
-"""Light intensity on the membrane from the whiteboard picture (Eq. 5)."""
+"""Light intensity on the membrane from the whiteboard image (Eq. 5)."""
 
 from __future__ import annotations
 
@@ -8,24 +8,27 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.masks import SATURATED
+from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
 from gelpolight_core.quality import QualityTable, judge
-from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import require_colour
+from gelpolight_core.session.images import require_colour
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-SATURATED = 0.99
 SMOOTHING_MM = 0.5
 DUST_SIGMAS = 5.0
+LIGHT_BANDS = 16
 LEAST_DUST = 0.01
 LEAST_LIGHT = 0.02
 TREND_POINTS = 20_000
 LEAST_PIXELS = 1000
-# Spread of the logarithm above which a channel is not lit as its LED says; lobes stay well below.
+# If the logarithm spreads more than this, a channel is not lit by its own LED; lobes stay well
+# below.
 UNEVEN = 0.15
 
 
@@ -36,11 +39,11 @@ class RadianceResult:
     Attributes
     ----------
     radiance : (rows, columns, 3) float32
-        |L_k| of Eq. (5), in pixel values 0..1; 0 where there is no light.
+        ``|L_k|`` of Eq. (5), in pixel values 0..1; 0 without light.
     usable : (rows, columns) bool
         Nodes where all three channels have light.
     saturated, dust : (rows, columns) bool
-        What was left out and filled from around, for an overlay.
+        Pixels left out and filled from their surroundings, for an overlay.
     quality : QualityTable
         Figures, limits and advice.
     """
@@ -58,14 +61,14 @@ def calibrate_radiance(
     """Measure the light intensity from a white diffuse board pressed on the top surface.
 
     The board is Lambertian and faces down, so ``|L_k| = I_k / cos(theta_k)`` (Eq. 5). The ratio of
-    this to the inverse-square law of a Lambertian LED is nearly constant; it is the ratio that is
-    smoothed (about a polynomial trend), so that saturated and dusty places are filled with what
-    the law says there.
+    this to the inverse-square law of a Lambertian LED is nearly constant. This ratio is smoothed
+    (about a polynomial trend), so that saturated and dusty areas are filled with the value from the
+    law.
 
     Parameters
     ----------
     whiteboard : Picture
-        Raw picture, elastomer mounted, no membrane.
+        Raw image, elastomer mounted, no membrane.
     table : ResamplingTable
         Raw pixel for every membrane node.
     led_positions_mm : (3, 3)
@@ -74,8 +77,8 @@ def calibrate_radiance(
     Raises
     ------
     InputError
-        If the picture is grey, too dark in a channel, saturated over most of the field, or a
-        channel is lit from where another LED is.
+        If the image is grey, too dark in a channel, saturated over most of the field, or a channel
+        is lit from the position of another LED.
     """
     where = f"whiteboard/{whiteboard.name}"
     require_colour(whiteboard, where=where)
@@ -84,22 +87,25 @@ def calibrate_radiance(
     at_top = np.concatenate([points, np.zeros_like(points[..., :1])], axis=-1)
     directions, distances = light_directions(led_positions_mm, at_top)
     cosines = -directions[..., 2]
-    # A Lambertian LED facing the membrane: lobe = cosine of the same angle, as faces are parallel.
+    # A Lambertian LED facing the membrane: the lobe is the cosine of the same angle, as the faces
+    # are parallel.
     law = cosines / distances**2
     saturated = (image >= SATURATED).any(axis=2) & table.valid
     _refuse_hopeless(image, saturated, table.valid, where)
     sigma_px = SMOOTHING_MM / table.grid.pitch_mm
-    board = _board_area(image, table.valid)
+    # A median keeps edges and removes noise: noise alone must not look like a lit board.
+    calm = np.asarray(cv2.medianBlur(np.ascontiguousarray(image), 5), np.float32)
+    board = _board_area(calm, table.valid)
     _refuse_other_lights(image[board], (cosines * law)[board], where)
     radiance = np.zeros(image.shape, dtype=np.float32)
     dust = np.zeros(saturated.shape, dtype=bool)
     for k in range(3):
         ratio = (image[..., k] / (cosines[..., k] * law[..., k])).astype(np.float32)
         good = board & (image[..., k] < SATURATED) & (image[..., k] > 0.0)
-        trend = _trend(ratio, good, points)
+        trend = _trend(ratio, good, table.grid)
         smooth, outliers = _smooth_robustly(ratio / trend, good, law[..., k], sigma_px)
         smooth *= trend
-        dust |= outliers
+        dust |= outliers & (calm[..., k] > LEAST_LIGHT)
         radiance[..., k] = np.where(board, smooth * law[..., k], 0.0)
     usable = board & (radiance * cosines > LEAST_LIGHT).all(axis=2)
     return RadianceResult(
@@ -112,30 +118,30 @@ def _refuse_hopeless(
 ) -> None:
     brightest = [float(np.percentile(image[..., k][valid], 99)) for k in range(3)]
     if min(brightest) < 2 * LEAST_LIGHT:
-        name = (tr("red"), tr("green"), tr("blue"))[int(np.argmin(brightest))]
+        name = channel_name(int(np.argmin(brightest)))
         raise InputError(
-            tr("the {name} channel is dark (brightest {v:.1%})").format(
+            tr("The {name} channel is dark (brightest value {v:.1%})").format(
                 name=name, v=min(brightest)
             ),
             where=where,
-            advice=tr("Switch the {name} LED on, or expose longer").format(name=name),
+            advice=tr("Switch the {name} LED on, or use a longer exposure").format(name=name),
         )
     share = float(saturated[valid].mean())
     if share > 0.3:
         raise InputError(
             tr("{share:.0%} of the working area is saturated").format(share=share),
             where=where,
-            advice=tr("Shorten the exposure until the brightest place is below 95 %"),
+            advice=tr("Use a shorter exposure so that the brightest area stays below 95 %"),
         )
 
 
 def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
-    """Refuse LEDs of which another explains a channel (N, 3) far better than its own does.
+    """Refuse LEDs if another LED explains a channel (N, 3) far better than its own.
 
-    With its own LED the board's light over the law's is even but for the lobe; with one that stands
-    elsewhere it runs from side to side.
+    With its own LED, the ratio of board light to the law is uniform except for the lobe; with an
+    LED at another position it slopes from one side to the other.
     """
-    names = (tr("red"), tr("green"), tr("blue"))
+    names = [channel_name(k) for k in range(3)]
     for k, name in enumerate(names):
         lit = light[:, k] > LEAST_LIGHT
         if lit.sum() < LEAST_PIXELS:
@@ -144,20 +150,22 @@ def _refuse_other_lights(light: Map, expected: Array, where: str) -> None:
         best = int(np.argmin(run))
         if best != k and run[k] > UNEVEN and run[best] < 0.5 * run[k]:
             raise InputError(
-                tr("the {name} channel is lit from where the mirror shows the {other} LED").format(
-                    name=name, other=names[best]
-                ),
+                tr(
+                    "The {name} channel is lit from the position of the {other} LED in the "
+                    "mirror image"
+                ).format(name=name, other=names[best]),
                 where=where,
                 advice=tr(
-                    "Capture mirror and whiteboard again: the LEDs or colours were swapped between"
+                    "Capture mirror and whiteboard again: the LEDs or colours were swapped "
+                    "between them"
                 ),
             )
 
 
 def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return where the whiteboard is seen: the slab's rim may lie inside the working circle.
+    """Return the area of the whiteboard: the elastomer's rim may lie inside the working circle.
 
-    Dark specks on the board belong to it; a few pixels along its rim, which are mixed, do not.
+    Dark specks on the board belong to it; a few mixed pixels along its rim do not.
     """
     lit = (valid & (image.max(axis=2) > LEAST_LIGHT)).astype(np.uint8)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15))
@@ -166,26 +174,31 @@ def _board_area(image: Map, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return (core > 0) & valid
 
 
-def _trend(ratio: Map, good: NDArray[np.bool_], points_mm: Array) -> Map:
+def _trend(ratio: Map, good: NDArray[np.bool_], grid: MembraneGrid) -> Map:
     """Return a polynomial of fourth degree through the good pixels, robust to specks.
 
-    Near the border a blur sees one side only; about the trend, that side is level.
+    Near the border a blur has data on one side only; relative to the trend, that side is level.
     """
-    scale = float(np.abs(points_mm).max())
-    x, y = (points_mm[..., i] / scale for i in range(2))
-    terms = np.stack([x**i * y**j for i in range(5) for j in range(5 - i)], axis=-1)
+    scale = max(float(np.abs(grid.x_mm).max()), float(np.abs(grid.y_mm).max()))
+    x, y = np.vander(grid.x_mm / scale, 5), np.vander(grid.y_mm / scale, 5)
     rows, columns = np.nonzero(good)
     stride = max(rows.size // TREND_POINTS, 1)
-    basis = terms[rows[::stride], columns[::stride]]
-    value = ratio[rows[::stride], columns[::stride]].astype(np.float64)
+    rows, columns = rows[::stride], columns[::stride]
+    value = ratio[rows, columns].astype(np.float64)
+    # Powers run from 4 to 0, so the sum of the powers of x and y is at most 4 on and below the
+    # diagonal from (4, 0) to (0, 4).
+    of_x, of_y = np.nonzero(np.add.outer(np.arange(5), np.arange(5)) >= 4)
+    basis = x[columns][:, of_x] * y[rows][:, of_y]
     keep = np.ones(value.size, dtype=bool)
     for _ in range(3):
         weights, *_ = np.linalg.lstsq(basis[keep], value[keep], rcond=None)
         error = np.abs(basis @ weights - value)
         keep = error <= 3.0 * 1.4826 * np.median(error[keep]) + 1e-9
-    # Where the polynomial is not led by data it may stray; it never leaves the data's own range.
+    # Without data the polynomial may run away; it never leaves the range of the data.
     low, high = value[keep].min(), value[keep].max()
-    return np.clip(terms @ weights, low, high).astype(np.float32)
+    product = np.zeros((5, 5))
+    product[of_y, of_x] = weights
+    return np.clip(y @ product @ x.T, low, high).astype(np.float32)
 
 
 def _smooth_robustly(
@@ -193,21 +206,51 @@ def _smooth_robustly(
 ) -> tuple[Map, NDArray[np.bool_]]:
     """Return the ratio smoothed over good pixels, and the pixels rejected as dust.
 
-    Noise grows where the law says there is little light, so weights follow the law.
+    Noise increases where the law predicts little light, so the weights follow the law.
     """
     weight = np.where(good, law / law[good].max() if good.any() else 0.0, 0.0).astype(np.float32)
     smooth = _weighted_blur(ratio, weight, sigma_px)
-    deviation = np.where(good, (ratio / smooth - 1.0) * np.sqrt(weight), 0.0)
-    spread = 1.4826 * float(np.median(np.abs(deviation[good])))
-    outliers = good & (np.abs(deviation) > max(DUST_SIGMAS * spread, LEAST_DUST))
-    # The rim of a speck is soft: what lies next to an outlier goes with it.
+    deviation = np.where(good, ratio / smooth - 1.0, 0.0).astype(np.float32)
+    # A speck changes neighbouring pixels together, noise does not: the mean of 3 x 3 pixels is
+    # judged.
+    deviation = _mean_of_good(deviation, good)
+    noise = _noise_by_light(deviation, good, weight)
+    outliers = good & (np.abs(deviation) > np.maximum(DUST_SIGMAS * noise, LEAST_DUST))
+    # The rim of a speck is soft: neighbours of an outlier are rejected too.
     outliers = cv2.dilate(outliers.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     weight[outliers] = 0.0
     return _weighted_blur(ratio, weight, sigma_px), outliers & good
 
 
+def _mean_of_good(values: Map, good: NDArray[np.bool_]) -> Map:
+    """Return the mean of the good pixels within 3 x 3; 0 for pixels that are not good."""
+    count = np.asarray(cv2.blur(good.astype(np.float32), (3, 3)))
+    total = np.asarray(cv2.blur(np.where(good, values, np.float32(0.0)), (3, 3)))
+    return np.asarray(np.where(good, total / np.maximum(count, 1e-3), 0.0), np.float32)
+
+
+def _noise_by_light(deviation: Map, good: NDArray[np.bool_], light: Map) -> Map:
+    """Return the noise of the relative deviation as a function of the amount of light.
+
+    Read noise and shot noise depend on the light differently. No law is assumed: the spread is
+    measured in bands of equal light. Dust is too rare in a band to change its median.
+    """
+    if not good.any():
+        return np.zeros_like(deviation)
+    edges = np.quantile(light[good], np.linspace(0.0, 1.0, LIGHT_BANDS + 1))
+    band = np.clip(np.searchsorted(edges, light[good], side="right") - 1, 0, LIGHT_BANDS - 1)
+    size = np.abs(deviation[good])
+    found = [
+        (float(np.median(light[good][band == k])), 1.4826 * float(np.median(size[band == k])))
+        for k in range(LIGHT_BANDS)
+        if (band == k).any()
+    ]
+    middle, spread = np.array(found).T
+    return np.asarray(np.interp(light, middle, spread), np.float32)
+
+
 def _weighted_blur(values: Map, weight: Map, sigma_px: float) -> Map:
-    """Normalised Gaussian blur; places without weight take the nearest wider average."""
+    """Normalised Gaussian blur; pixels without weight use the nearest wider average."""
     known_weight = float((weight).sum())
     mean = float((values * weight).sum()) / max(known_weight, 1e-12)
     result = np.full_like(values, mean)
@@ -220,7 +263,7 @@ def _weighted_blur(values: Map, weight: Map, sigma_px: float) -> Map:
 
 
 def _blur_reduced(values: Map, weight: Map, sigma_px: float) -> tuple[Map, Map]:
-    """Blur two maps on a grid reduced so far that the Gaussian still spans several nodes."""
+    """Blur two maps on a reduced grid on which the Gaussian still spans several nodes."""
     factor = max(int(sigma_px / 4.0), 1)
     rows, columns = values.shape
     size = (max(columns // factor, 1), max(rows // factor, 1))
@@ -252,7 +295,7 @@ def _judge(
                 "%",
                 warn=0.1,
                 fail=10.0,
-                advice=tr("Shorten the exposure until nothing is saturated"),
+                advice=tr("Use a shorter exposure so that nothing is saturated"),
             ),
             judge(
                 "whiteboard_dust_percent",
@@ -270,14 +313,14 @@ def _judge(
                 "%",
                 warn=10.0,
                 fail=40.0,
-                advice=tr("Expose longer, or move the LEDs outward or lower"),
+                advice=tr("Use a longer exposure, or move the LEDs outward or lower"),
             ),
             judge(
                 "light_range",
-                tr("Light, brightest over darkest place of a channel"),
+                tr("Light, ratio of brightest to darkest area of a channel"),
                 evenness,
                 warn=40.0,
-                advice=tr("Lower or move the LEDs for a more even light"),
+                advice=tr("Lower or move the LEDs for more even light"),
             ),
         )
     )

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from gelpolight_core.reconstruction.plan import EFFORTS
+from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.translation import tr
 
-PAPER, FULL = "paper", "full"
+PAPER, FULL, IN_PLACE = "paper", "full", "in-place"
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Way:
     Attributes
     ----------
     model : str
-        ``paper`` or ``full``.
+        ``paper``, ``full`` or ``in-place``.
     effort : str
         One of `EFFORTS`; the paper's model knows ``best`` only.
     """
@@ -32,6 +32,8 @@ class Way:
         """What people call it."""
         if self.model == PAPER:
             return tr("Paper's model")
+        if self.model == IN_PLACE:
+            return tr("In place")
         names = {"fast": tr("fast"), "balanced": tr("balanced"), "best": tr("best")}
         return tr("Full model, {effort}").format(effort=names[self.effort])
 
@@ -55,11 +57,14 @@ class FoundError:
 WAYS = (*(Way(FULL, effort) for effort in EFFORTS), Way(PAPER, "best"))
 """All ways, the quickest of the full model first."""
 
+CLOSED_WAYS = (Way(IN_PLACE, "best"),)
+"""The ways for a closed sensor."""
+
 FOUND: Mapping[Way, FoundError] = MappingProxyType(
     {
         Way(FULL, "fast"): FoundError(0.70, 0.41),
         Way(FULL, "balanced"): FoundError(0.39, 0.22),
-        Way(FULL, "best"): FoundError(0.41, 0.14),
+        Way(FULL, "best"): FoundError(0.38, 0.15),
         Way(PAPER, "best"): FoundError(2.0, 2.6),
     }
 )

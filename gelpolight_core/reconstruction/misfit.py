@@ -15,13 +15,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.ball_pixels import neighbourhood, view_directions
-from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.lights.crosstalk import unmix
-from gelpolight_core.reconstruction.full import LEAST_BASE, SATURATED, as_linear
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.masks import LEAST_LIGHT, SATURATED
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
+from gelpolight_core.reconstruction.linear import as_linear
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reflectance.membrane import bounce_weight
+from gelpolight_core.reflectance.surroundings import neighbourhood, view_directions
+from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 Map = NDArray[np.float32]
 Array = NDArray[np.float64]
@@ -35,7 +37,8 @@ class Misfit:
     ----------
     model : str
         ``paper``: | |n| - 1 |; ``full``: root mean square over the channels of the brightness seen
-        less the brightness explained, in units of the flat membrane's.
+        less the brightness explained, in units of the flat membrane's; ``in-place``: slope seen
+        less slope of the depth.
     values : (rows, columns) float32
         NaN where nothing is known.
     """
@@ -69,7 +72,10 @@ def solve_misfit(
     step = max(-(-max(rows, columns) // largest), 1)
     thin = np.s_[step // 2 :: step, step // 2 :: step]
     inside = heightmap.flags[thin] & Flag.OUTSIDE.value == 0
-    full = reconstructor.calibration.full
+    calibration = reconstructor.calibration
+    if isinstance(calibration, InPlaceCalibration):
+        return Misfit(heightmap.model, np.where(inside, _slope_misfit(heightmap, thin), np.nan))
+    full = calibration.full
     if heightmap.model != "full" or full is None:
         left = reconstructor.slopes(frame).length_error[thin]
     elif heightmap.normals is None:
@@ -78,12 +84,25 @@ def solve_misfit(
         # A node of the thinned grid stands for its neighbours: so does its brightness.
         linear = as_linear(reconstructor.linearise(frame))
         seen = np.asarray(cv2.blur(linear, (step, step)), np.float32)
-        left = _picture_misfit(seen, reconstructor.calibration, full, heightmap, thin, inside)
+        light = None if heightmap.health is None else heightmap.health.light
+        gain = np.ones(3) if light is None else light.share
+        left = _picture_misfit(seen, gain, calibration, full, heightmap, thin, inside)
     return Misfit(heightmap.model, np.where(inside, left, np.nan).astype(np.float32))
+
+
+def _slope_misfit(heightmap: HeightMap, thin: tuple[slice, slice]) -> Map:
+    """Return how far the slopes that were seen are from those of the depth."""
+    if heightmap.normals is None:
+        raise ValueError("the misfit of calibration in place needs the normals")
+    down, across = np.gradient(heightmap.depth_mm, heightmap.pitch_mm)
+    n = heightmap.normals
+    left = np.hypot(n[..., 0] / n[..., 2] - across, n[..., 1] / n[..., 2] - down)
+    return np.asarray(left[thin], np.float32)
 
 
 def _picture_misfit(
     rgb: Map,
+    gain: Array,
     calibration: Calibration,
     full: FullModel,
     heightmap: HeightMap,
@@ -107,20 +126,20 @@ def _picture_misfit(
     u, v = (cv2.remap(m, column, row, cv2.INTER_LINEAR) for m in (table.u_px, table.v_px))
     raw = np.asarray(cv2.remap(rgb, u, v, cv2.INTER_LINEAR), np.float32)
     base = np.asarray(cv2.remap(full.background, column, row, cv2.INTER_LINEAR), np.float32)
-    light = unmix(raw, calibration.crosstalk)
-    ratio = np.asarray(light / np.maximum(base, LEAST_BASE), np.float32)
-    of_use = (raw < SATURATED) & (base > LEAST_BASE) & inside[..., None]
+    light = unmix(np.asarray(raw / gain, np.float32), calibration.crosstalk)
+    ratio = np.asarray(light / np.maximum(base, LEAST_LIGHT), np.float32)
+    of_use = (raw < SATURATED) & (base > LEAST_LIGHT) & inside[..., None]
     pitch = heightmap.pitch_mm * (thin[0].step or 1)
     around = neighbourhood(ratio, inside, pitch, full.membrane.bounce_reach_mm)
     normals = heightmap.normals[thin].astype(np.float64)
-    explained = _explained(full, np.stack([x, y], axis=-1), depth, normals, drift)
+    explained = direct_light(full, np.stack([x, y], axis=-1), depth, normals, drift)
     bounced = full.membrane.bounce * around * bounce_weight(normals)[..., None]
     left = np.where(of_use, ratio - explained - bounced, 0.0)
     count = np.maximum(of_use.sum(axis=-1), 1)
     return np.asarray(np.sqrt((left**2).sum(axis=-1) / count), np.float32)
 
 
-def _explained(
+def direct_light(
     full: FullModel, places_mm: Array, depth_mm: Array, normals: Array, drift: Array
 ) -> Array:
     """Return the direct brightness (..., 3) over the flat membrane's (PHYSICS, shading).

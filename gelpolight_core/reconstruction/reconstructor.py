@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -10,36 +11,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
-from gelpolight_core.reconstruction.acceptance import (
-    RimCheck,
+from gelpolight_core.health.check import HealthCheck
+from gelpolight_core.health.finding import KEYS, Health, LightGain
+from gelpolight_core.reconstruction.checks import (
     accepted,
+    condition_note,
+    free_boundary_note,
     refuse_coplanar_lights,
     refuse_dark_membrane,
-    rim_check,
-    rim_let_go,
+    small_image_note,
+    unanchored_note,
     unsolved_note,
+    visible_depth_note,
 )
-from gelpolight_core.reconstruction.full import as_linear, reconstruct_full
-from gelpolight_core.reconstruction.heightmap import HeightMap
-from gelpolight_core.reconstruction.live import LiveSolver
-from gelpolight_core.reconstruction.live_maps import CURVE_ERROR
-from gelpolight_core.reconstruction.normals import (
-    ShadingMaps,
-    SlopeField,
-    SlopeSolver,
-    normals_from_slopes,
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
+from gelpolight_core.reconstruction.in_place.calibration import (
+    AnyCalibration,
+    InPlaceCalibration,
+    require_open,
 )
-from gelpolight_core.reconstruction.paper_kernel import blank_rows
-from gelpolight_core.reconstruction.plan import EFFORTS, Plan, PlanStep
-from gelpolight_core.reconstruction.poisson import PoissonSolver
+from gelpolight_core.reconstruction.in_place.solver import STEPS as IN_PLACE_STEPS
+from gelpolight_core.reconstruction.in_place.solver import InPlaceSolver
+from gelpolight_core.reconstruction.linear import linearised
+from gelpolight_core.reconstruction.near_light.solver import NearLightDepth, NearLightSolver
+from gelpolight_core.reconstruction.paper.depth import PAPER_REASON, PAPER_STEPS, PaperSolver
+from gelpolight_core.reconstruction.paper.model import SlopeField
 from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
-from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceStep
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.stated_lengths import stated_sd
 from gelpolight_core.translation import tr
 
 Notes = tuple[str, ...]
-LOOKUP_SIZE = 2048
+LIGHT = tr("light of the image")
 
 
 class Reconstructor:
@@ -47,18 +53,18 @@ class Reconstructor:
 
     Parameters
     ----------
-    calibration : Calibration
+    calibration : Calibration or InPlaceCalibration
         Of the sensor that the pictures come from.
     model : str, optional
-        ``paper`` or ``full``; by default the one that the calibration was made for.
+        ``paper``, ``full`` or ``in-place``; by default the one that the calibration was made for.
     terms : Terms, optional
-        What the full model reckons with; by default everything.
+        What the full model includes; by default everything.
     effort : str, optional
-        How much work the full model's frame is worth: ``best``, the whole grid at its full scale;
-        ``balanced``, what the frame needs, at half scale, for live pictures; ``fast``, at quarter
-        scale. The paper's model knows one way only.
+        Scale at which the full model solves the region of the contact: ``best``, full scale;
+        ``balanced``, half scale, for live images; ``fast``, quarter scale. The paper's model has
+        one mode.
     workers : int, optional
-        Threads of the solve and the transforms.
+        Threads. Results do not depend on their number.
 
     Raises
     ------
@@ -70,12 +76,17 @@ class Reconstructor:
 
     Examples
     --------
-    >>> Reconstructor(read_calibration(path)).depth(frame).depth_mm  # doctest: +SKIP
+    >>> import gelpolight_core as gp
+    >>> sensor = gp.Reconstructor(gp.read_calibration("sensor.gplcal"), effort="balanced")
+    >>> image = gp.read_image("session/presses/cylinder_s5_d100.png")
+    >>> height_map = sensor.depth(image)
+    >>> round(float(height_map.depth_mm.max()))  # mm
+    1
     """
 
     def __init__(
         self,
-        calibration: Calibration,
+        calibration: AnyCalibration,
         *,
         model: str | None = None,
         terms: Terms = ALL_TERMS,
@@ -86,6 +97,12 @@ class Reconstructor:
             raise ValueError(f"effort = {effort!r}, expected one of {EFFORTS}")
         self.calibration = calibration
         self.model = model or calibration.model
+        self.terms = terms
+        self.effort = effort
+        self.workers = workers
+        if isinstance(calibration, InPlaceCalibration) or self.model == IN_PLACE:
+            _refuse_other_model(calibration, self.model)
+            return
         if self.model == "full" and calibration.full is None:
             raise InputError(
                 tr("the calibration was made for the paper's model only"),
@@ -95,41 +112,46 @@ class Reconstructor:
         used = calibration.full if self.model == "full" else None
         leds_mm = calibration.led_positions_mm if used is None else used.led_positions_mm
         refuse_coplanar_lights(calibration, leds_mm)
-        refuse_dark_membrane(calibration)
-        self.terms = terms
-        self.effort = effort
-        self.workers = workers
+        refuse_dark_membrane(calibration, model=self.model)
+        self._notes = tuple(filter(None, (condition_note(calibration, leds_mm),)))
+
+    @property
+    def _open(self) -> Calibration:
+        """The calibration, which knows optics and lights."""
+        return require_open(self.calibration, where=self.calibration.identity)
 
     @cached_property
-    def maps(self) -> ShadingMaps:
-        """The calibration's maps as the paper's fused pass wants them."""
-        return shading_maps(self.calibration)
+    def paper(self) -> PaperSolver:
+        """The solver of the paper's model."""
+        return PaperSolver(self._open, workers=self.workers)
 
     @cached_property
-    def _threads(self) -> RowWorkers:
-        return RowWorkers(self.workers)
+    def health_check(self) -> HealthCheck:
+        """What compares frames with the calibration's background."""
+        return HealthCheck(self._open)
 
     @cached_property
-    def slope_solver(self) -> SlopeSolver:
-        """The paper's fused pass on the calibration's maps."""
-        return SlopeSolver(self.maps, self._threads)
+    def near_light(self) -> NearLightSolver:
+        """The solver of the full model."""
+        assert self._open.full is not None
+        return NearLightSolver(self._open, self._open.full, workers=self.workers)
 
     @cached_property
-    def solver(self) -> PoissonSolver:
-        """The paper's integration on the calibration's grid."""
-        grid = self.calibration.table.grid
-        return PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=self.workers)
+    def in_place(self) -> InPlaceSolver:
+        """The solver of a closed sensor."""
+        calibration = self.calibration
+        assert isinstance(calibration, InPlaceCalibration)
+        return InPlaceSolver(calibration.in_place, noise=calibration.noise, workers=self.workers)
 
-    @cached_property
-    def rim(self) -> RimCheck:
-        """What the rim shows while nothing crosses it."""
-        return rim_check(self.calibration)
+    @property
+    def visible_depth_mm(self) -> float | None:
+        """Smallest depth of a pressed flat face that shows above the noise; None: not known.
 
-    @cached_property
-    def live(self) -> LiveSolver:
-        """The planned solve of ``balanced`` and ``fast``."""
-        assert self.calibration.full is not None
-        return LiveSolver(self.calibration, self.calibration.full, workers=self.workers)
+        Shallower relief reads 0 by the full model. It follows from the calibration's noise, the
+        pitch, the directions of the lights and the drape. The paper's model does not look for
+        contacts.
+        """
+        return self.near_light.visible_mm if self.model == "full" else None
 
     def at_effort(self, effort: str) -> Reconstructor:
         """Return one of another effort, which shares what is made ready already.
@@ -158,17 +180,33 @@ class Reconstructor:
         camera = self.calibration.camera
         self.depth(np.zeros((camera.height, camera.width, 3), dtype))
 
-    def plan(self, frame: NDArray[Any], *, normals: bool = True, uncertainty: bool = False) -> Plan:
-        """Return which steps a frame needs, and why the others are left out.
+    def needs(self, frame: NDArray[Any], *, name: str = "") -> Trace:
+        """Return which steps a frame needs, without reconstructing it.
+
+        It costs no more than the check of its health and looking for a contact. What was done for
+        a frame, with times, is the ``trace`` of its result.
 
         Parameters
         ----------
-        frame, normals, uncertainty
-            As in :meth:`depth`, which is what finds out.
+        frame, name
+            As in :meth:`depth`.
+
+        Raises
+        ------
+        InputError
+            As in :meth:`depth`.
         """
-        plan = self.depth(frame, normals=normals, uncertainty=uncertainty).plan
-        assert plan is not None
-        return plan
+        frame = self._accepted(frame, name)
+        if self.model == IN_PLACE:
+            why = tr("calibration in place has one mode")
+            return Trace(self.effort, tuple(TraceStep(s, True, why) for s in IN_PLACE_STEPS))
+        light = self.health_check.check(frame).light
+        if self.model == "full":
+            found = self.near_light.needs(frame, effort=self.effort, terms=self.terms, light=light)
+        else:
+            steps = tuple(TraceStep(step, True, PAPER_REASON) for step in PAPER_STEPS)
+            found = Trace(self.effort, steps)
+        return replace(found, steps=(_light_step(light), *found.steps))
 
     def slopes(self, frame: NDArray[Any], *, name: str = "") -> SlopeField:
         """Return the depth's slopes of a raw frame (height, width, 3), RGB.
@@ -184,12 +222,13 @@ class Reconstructor:
             If the frame is not of the calibration's size, not in colour, or holds other numbers
             than :meth:`depth` takes.
         """
-        return self.slope_solver.solve(self.linearise(self._accepted(frame, name)))
+        frame = self._accepted(frame, name)
+        light = self.health_check.check(frame).light
+        return self.paper.slopes(frame, None if light is None else light.share)
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
         """Return a frame with the camera's response undone; floats are linear light already."""
-        response = self.calibration.response
-        return frame if response is None or frame.dtype.kind == "f" else response.linearise(frame)
+        return linearised(frame, self.calibration.response)
 
     def depth(
         self,
@@ -198,6 +237,7 @@ class Reconstructor:
         name: str = "",
         normals: bool = True,
         uncertainty: bool = False,
+        health: Health | None = None,
     ) -> HeightMap:
         """Reconstruct a raw frame.
 
@@ -212,6 +252,8 @@ class Reconstructor:
         uncertainty : bool, optional
             Whether the result holds how far each pixel may be off; several times as slow.
             The paper's model states none.
+        health : Health, optional
+            Of this frame, where it is known; by default the quick check for live images is made.
 
         Raises
         ------
@@ -219,72 +261,86 @@ class Reconstructor:
             If the frame is not of the calibration's size, or holds other numbers than these.
         """
         frame = self._accepted(frame, name)
-        notes = self._rim_notes(frame)
+        if self.model == IN_PLACE:
+            return self._in_place_depth(frame, name, normals, uncertainty)
+        health = self.health_check.check(frame) if health is None else health
+        notes = (*self._notes, *(finding.line for finding in health.findings))
         if self.model == "full":
-            why = self._why_unplanned(uncertainty)
-            if why is None:
-                return self._depth_live(frame, name, normals, notes)
-            return self._depth_full(frame, name, normals, uncertainty, why, notes)
-        light = self.linearise(frame)
-        divergence, field = self.slope_solver.divergence(light, self.solver, slopes=normals)
-        depth_mm = self.solver.depth_of(divergence)
-        self._threads.run(len(depth_mm), blank_rows, field.flags, depth_mm)
-        shown = normals_from_slopes(field.slope_x, field.slope_y) if normals else None
-        depth_mm = np.asarray(depth_mm, np.float32)
-        heightmap = self._heightmap(depth_mm, shown, field.flags, name, notes)
-        names = [tr("resampling, normals and their divergence"), tr("integration")]
-        plan = _unplanned(self.effort, names, tr("the paper's model knows one way"), normals, False)
-        return replace(heightmap, plan=plan)
+            found = self._near_light_depth(frame, name, normals, uncertainty, notes, health.light)
+        else:
+            found = self._paper_depth(frame, name, normals, notes, health.light)
+        assert found.trace is not None
+        trace = replace(found.trace, steps=(_light_step(health.light), *found.trace.steps))
+        return replace(found, health=health, trace=trace)
 
-    def _why_unplanned(self, uncertainty: bool) -> str | None:
-        """Return why everything is done for a frame, or None where it is planned."""
-        if self.effort == "best":
-            return tr("the effort is best")
-        if uncertainty:
-            return tr("standard deviations are asked for")
-        if self.terms != ALL_TERMS:
-            return tr("terms of the model are left out by hand")
-        if self.live.maps.membrane.curve_error > CURVE_ERROR:
-            return tr("the membrane's curve is too bent for the fast solve")
-        return None
+    def health(self, frame: NDArray[Any], *, name: str = "") -> Health:
+        """Return the faults of a frame, each with cause and remedy.
 
-    def _depth_live(self, frame: NDArray[Any], name: str, normals: bool, notes: Notes) -> HeightMap:
-        full = self.calibration.full
-        assert full is not None
-        found = self.live.depth(frame, effort=self.effort, normals=normals)
-        notes += _notes(found.rim, found.stopped, found.unsolved)
+        The whole image is searched for bad pixels, and large movements of the camera are followed.
+        For a closed sensor everything is unknown.
+
+        Parameters
+        ----------
+        frame, name
+            As in :meth:`depth`.
+
+        Raises
+        ------
+        InputError
+            As in :meth:`depth`.
+        """
+        frame = self._accepted(frame, name)
+        if self.model == IN_PLACE:
+            return Health(unknown=KEYS)
+        return self.health_check.check(frame, whole=True)
+
+    def _paper_depth(
+        self,
+        frame: NDArray[Any],
+        name: str,
+        normals: bool,
+        notes: Notes,
+        light: LightGain | None,
+    ) -> HeightMap:
+        gain = None if light is None else light.share
+        found = self.paper.depth(frame, normals=normals, gain=gain)
+        notes += found.notes
         heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
-        scale = full.scale_sd
         return replace(
             heightmap,
-            depth_scale_sd=None if scale is None else scale.depth,
-            lateral_scale_sd=None if scale is None else scale.lateral,
-            plan=found.plan,
+            lateral_per_mm=self.paper.ray_spread_per_mm,
+            trace=Trace(self.effort, found.steps),
         )
 
-    def _depth_full(
+    def _near_light_depth(
         self,
         frame: NDArray[Any],
         name: str,
         normals: bool,
         uncertainty: bool,
-        why: str,
         notes: Notes,
+        light: LightGain | None,
     ) -> HeightMap:
-        full = self.calibration.full
+        full = self._open.full
         assert full is not None
-        result = reconstruct_full(
-            as_linear(self.linearise(frame)),
-            self.calibration,
-            full,
+        # Small images need a finer scale; standard deviations are those of the best answer.
+        effort = "best" if uncertainty else self.near_light.effort_for(self.effort)
+        if effort == "best":
+            # One way for a camera's numbers and for light, so that both give the same depth.
+            frame = self.linearise(frame)
+        found = self.near_light.depth(
+            frame,
+            effort="best" if uncertainty else self.effort,
             terms=self.terms,
-            workers=self.workers,
+            normals=normals,
             uncertainty=uncertainty,
+            light=light,
         )
-        notes += _notes(result.rim, result.stopped, result.unsolved)
-        shown = result.normals if normals else None
-        heightmap = self._heightmap(result.depth_mm, shown, result.flags, name, notes)
-        scale, noise = full.scale_sd, result.noise
+        pitch_mm = self.calibration.table.grid.pitch_mm
+        small = small_image_note(pitch_mm, full.decay_mm) if found.rounds is not None else ""
+        notes += (*_notes(found), *filter(None, (small,)))
+        heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, notes)
+        scale, noise, stated = full.scale_sd, found.noise, stated_sd(self._open.stack)
         return replace(
             heightmap,
             slope_sd=None if noise is None else noise.slope_sd,
@@ -292,9 +348,36 @@ class Reconstructor:
             slope_model_sd=None if noise is None else noise.slope_model_sd,
             depth_model_sd_mm=None if noise is None else noise.depth_model_sd_mm,
             noise_mm=None if noise is None else noise.examples_mm,
-            depth_scale_sd=None if scale is None else scale.depth,
-            lateral_scale_sd=None if scale is None else scale.lateral,
-            plan=_unplanned(self.effort, _full_names(), why, normals, uncertainty),
+            depth_scale_sd=None if scale is None else math.hypot(scale.depth, stated.depth),
+            lateral_scale_sd=None if scale is None else math.hypot(scale.lateral, stated.lateral),
+            visible_depth_mm=self.visible_depth_mm,
+            trace=found.trace,
+        )
+
+    def _in_place_depth(
+        self, frame: NDArray[Any], name: str, normals: bool, uncertainty: bool
+    ) -> HeightMap:
+        calibration = self.calibration
+        assert isinstance(calibration, InPlaceCalibration)
+        model = calibration.in_place
+        found = self.in_place.depth(
+            self.linearise(frame),
+            effort=self.effort,
+            with_normals=normals,
+            uncertainty=uncertainty,
+        )
+        heightmap = self._heightmap(found.depth_mm, found.normals, found.flags, name, found.notes)
+        return replace(
+            heightmap,
+            slope_sd=found.slope_sd,
+            depth_sd_mm=found.depth_sd_mm,
+            slope_model_sd=found.slope_model_sd,
+            depth_model_sd_mm=found.depth_model_sd_mm,
+            noise_mm=found.noise_mm,
+            # A slope is a length of the ball over another; a height is a slope times a length.
+            depth_scale_sd=float(np.hypot(model.errors.depth_share, 2.0 * model.scale_sd)),
+            lateral_scale_sd=model.scale_sd,
+            trace=found.trace,
         )
 
     def _heightmap(
@@ -317,12 +400,8 @@ class Reconstructor:
             model=self.model,
             source=name,
             notes=notes,
+            calibration_fault=self.calibration.fault,
         )
-
-    def _rim_notes(self, frame: NDArray[Any]) -> Notes:
-        rim = self.rim
-        note = rim.note(as_linear(self.linearise(frame[rim.row, rim.column][None]))[0])
-        return (note,) if note else ()
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
         """Return a frame of the right size as numbers that every step takes."""
@@ -333,75 +412,48 @@ class Reconstructor:
                 tr("the picture is {shape}, the calibration is for {w}x{h}x3").format(
                     shape=shape, w=camera.width, h=camera.height
                 ),
-                where=name or tr("picture"),
+                where=name or tr("image"),
                 advice=tr("Use the calibration of this sensor at this picture size"),
             )
-        return accepted(frame, name=name)
+        frame = accepted(frame, name=name)
+        if isinstance(self.calibration, InPlaceCalibration):
+            return frame
+        return self.calibration.bad_pixels.left_out(frame)
 
 
-def _notes(rim: str, stopped: str, unsolved: float) -> Notes:
-    """Return what is to be said of a reconstruction, in sentences for a person."""
-    notes = []
-    if rim == "free":
-        notes.append(rim_let_go())
-    if stopped == "damped":
-        notes.append(tr("the press is deep for its lights: the near-light rounds were damped"))
-    if stopped == "unsettled":
-        notes.append(tr("the near-light rounds did not settle: damping did not help"))
-    if stopped == "grows":
-        notes.append(tr("the near-light rounds did not settle: the last was taken back"))
-    notes += [note for note in (unsolved_note(unsolved),) if note]
+def _refuse_other_model(calibration: AnyCalibration, model: str) -> None:
+    """Refuse a closed sensor's calibration for another model, and the reverse."""
+    if model == calibration.model:
+        return
+    raise InputError(
+        tr("the calibration was made for the model {made}, not for {model}").format(
+            made=calibration.model, model=model
+        ),
+        where=calibration.identity,
+        advice=tr("Leave --model out, or use a calibration for that model"),
+    )
+
+
+def _notes(found: NearLightDepth) -> Notes:
+    """Return what a person must know of a reconstruction, in sentences."""
+    stopped = "" if found.rounds is None else found.rounds.stopped
+    said = {
+        "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
+        "unsettled": tr("the near-light rounds did not settle: damping did not help"),
+        "grows": tr("the near-light rounds did not settle: the last was undone"),
+    }
+    notes = [] if found.boundary.free is None else [free_boundary_note()]
+    notes += [unanchored_note()] if found.boundary.level_sd_mm > 0.0 else []
+    notes += [said[stopped]] if stopped in said else []
+    sensor = visible_depth_note(found.visible_mm) if found.rounds is None else ""
+    notes += [note for note in (unsolved_note(found.unsolved), sensor) if note]
     return tuple(notes)
 
 
-def _full_names() -> list[str]:
-    return [
-        tr("resampling and comparing"),
-        tr("near light, quarter scale"),
-        tr("near light, full scale"),
-        tr("integration"),
-        tr("true positions"),
-    ]
-
-
-def _unplanned(effort: str, names: list[str], why: str, normals: bool, uncertainty: bool) -> Plan:
-    """Return the plan of a frame for which everything is done."""
-    asked = {tr("normals"): normals, tr("standard deviations"): uncertainty}
-    return Plan(
-        effort,
-        (
-            *(
-                PlanStep(name, True, tr("nothing is left out: {why}").format(why=why))
-                for name in names
-            ),
-            *(
-                PlanStep(name, wanted, tr("asked for") if wanted else tr("nobody asked for them"))
-                for name, wanted in asked.items()
-            ),
-        ),
-    )
-
-
-def shading_maps(calibration: Calibration) -> ShadingMaps:
-    """Gather a calibration's maps as the fused pass wants them."""
-    table = calibration.table
-    strength = calibration.radiance * calibration.factors
-    usable = table.valid & (strength > 0.0).all(axis=2)
-    gain = np.zeros_like(strength)
-    gain[usable] = 1.0 / strength[usable]
-    lookup, scale = calibration.reflectance.lookup(LOOKUP_SIZE)
-
-    def single(array: NDArray[Any]) -> NDArray[np.float32]:
-        return np.ascontiguousarray(array, dtype=np.float32)
-
-    return ShadingMaps(
-        table.u_px,
-        table.v_px,
-        single(gain),
-        lookup,
-        scale,
-        single(calibration.reflectance.coverage),
-        single(calibration.led_positions_mm),
-        single(table.grid.x_mm),
-        single(table.grid.y_mm),
-    )
+def _light_step(light: LightGain | None) -> TraceStep:
+    """Return what was done about the light of a frame."""
+    if light is None:
+        return TraceStep(LIGHT, False, tr("it is as at calibration, or cannot be corrected"))
+    shares = ", ".join(f"{share:.4f}" for share in light.share)
+    reason = tr("red, green and blue are {shares} of those at calibration, which is undone")
+    return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)

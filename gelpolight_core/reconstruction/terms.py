@@ -15,8 +15,8 @@ class Terms:
     Attributes
     ----------
     near_light_rounds : int
-        Rounds at quarter scale in which light, inverse square and lobe are taken anew at the depth
-        found, before the round at full scale; 0: the light is frozen at the flat membrane.
+        Rounds at quarter scale in which light, inverse square and lobe are computed again at the
+        depth found, before the round at full scale; 0: the light is frozen at the flat membrane.
     ray_true_slopes : bool
         Slopes are integrated along the refracted rays; else as if all rays ran straight down.
     true_positions : bool
@@ -28,9 +28,9 @@ class Terms:
         A saturated channel is missing information; else its value is believed.
     weights : bool
         Slopes count as far as they can be trusted; else all alike, by one sine transform, which
-        cannot let the rim go either.
+        cannot free the boundary either.
     free_rim : bool
-        The rim is let go where a contact crosses it; else depth 0 is held all around.
+        The boundary is free where a contact crosses it; else depth 0 is held all around.
     denoising : bool
         Even parts of the picture are averaged over a few nodes.
     """

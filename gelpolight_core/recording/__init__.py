@@ -1,1 +1,1 @@
-"""Recordings: raw frames of a source, lossless, with their times, in one file."""
+"""Recordings: raw lossless frames of a source, with their times, in one file."""

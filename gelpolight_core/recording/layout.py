@@ -28,7 +28,7 @@ _SHORT, _LONG, _ASCII, _LONG8 = 3, 4, 2, 16
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """Where a packed strip of a frame lies in the file."""
+    """Position of a compressed strip of a frame in the file."""
 
     place: int
     size: int
@@ -37,16 +37,16 @@ class Strip:
 
 @dataclass(frozen=True, slots=True)
 class FrameMark:
-    """What stands at the head of a frame.
+    """Header of a frame.
 
     Attributes
     ----------
     number, time_s : int, float
         As in :class:`~gelpolight_core.recording.recording.RecordedFrame`.
     size : int
-        Bytes from the frame mark to the next one.
+        Bytes from this frame mark to the next one.
     rows, columns, bits : int
-        Of the picture.
+        Size and bit depth of the image.
     strips : tuple of Strip
         From the top.
     """
@@ -61,7 +61,7 @@ class FrameMark:
 
     @property
     def rows_per_strip(self) -> int:
-        """Rows in every strip but the last one, which may have fewer."""
+        """Rows in every strip except the last one, which may have fewer."""
         return -(-self.rows // len(self.strips))
 
     def pack(self) -> bytes:
@@ -90,7 +90,7 @@ def _mark_size(strips: int) -> int:
 
 
 def unpack_mark(data: bytes) -> FrameMark | None:
-    """Return the frame mark at the head of some bytes; None if there is no whole one."""
+    """Return the frame mark at the start of some bytes; None if there is no complete one."""
     if len(data) < _MARK.size or not data.startswith(FRAME_MAGIC):
         return None
     _, number, time_s, size, rows, columns, bits, n = _MARK.unpack_from(data)
@@ -105,7 +105,7 @@ def unpack_mark(data: bytes) -> FrameMark | None:
 
 
 def pack_head(version: int, content: dict[str, Any]) -> bytes:
-    """Return everything that stands before the first frame."""
+    """Return everything before the first frame."""
     text = json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
     crc = zlib.crc32(struct.pack("<II", version, len(text)) + text)
     head = TIFF_HEAD.pack(b"II", 43, 8, 0, 0) + HEAD.pack(MAGIC, version, len(text), crc)
@@ -120,7 +120,7 @@ def pack_closing(frames: int, last_number: int) -> bytes:
 
 
 def unpack_closing(data: bytes) -> tuple[int, int] | None:
-    """Return the count of frames and the last number offered; None while not closed."""
+    """Return the frame count and the last number received; None if the file was not closed."""
     frames, last_number, closed, crc = CLOSING.unpack(data)
     if closed != 1 or crc != zlib.crc32(data[: -_CRC.size]):
         return None
@@ -129,14 +129,14 @@ def unpack_closing(data: bytes) -> tuple[int, int] | None:
 
 @dataclass(frozen=True, slots=True)
 class FrameBlock:
-    """A frame as it goes into the file.
+    """A frame as stored in the file.
 
     Attributes
     ----------
     data : bytes
-        All of it.
+        All of its bytes.
     directory_at, link_at : int
-        Where in the file its TIFF directory stands, and that one's link to the next.
+        Positions in the file of its TIFF directory, and of that directory's link to the next.
     """
 
     data: bytes
@@ -158,11 +158,11 @@ def pack_frame(
     Parameters
     ----------
     strips : sequence of bytes
-        Packed, from the top.
+        Compressed strips, from the top.
     number, time_s, shape, bits
-        Of the frame; `shape` is (rows, columns).
+        Properties of the frame; `shape` is (rows, columns).
     place : int
-        Where in the file it begins.
+        Start position in the file.
     """
     text = json.dumps({"number": number, "time_s": time_s}).encode() + b"\0"
     directory_at = place + padded(_mark_size(len(strips)))
@@ -200,7 +200,7 @@ def _directory(mark: FrameMark, place: int, text: tuple[int, int]) -> bytes:
         (277, _SHORT, 1, 3),
         (278, _LONG, 1, mark.rows_per_strip),
         (279, _LONG8, n, tables_at + 8 * n if n > 1 else mark.strips[0].size),
-        (284, _SHORT, 1, 1),  # red, green and blue side by side
+        (284, _SHORT, 1, 1),  # red, green and blue interleaved
         (317, _SHORT, 1, 2),  # horizontal differences
     )
     packed = b"".join(struct.pack("<HHQQ", *entry) for entry in entries)

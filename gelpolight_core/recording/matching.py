@@ -1,25 +1,25 @@
-"""Whether a recording and a calibration belong together, and what is to be said of it."""
+"""Check that a recording and a calibration belong together."""
 
 from __future__ import annotations
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.translation import tr
 
 
-def require_match(recording: Recording, calibration: Calibration) -> None:
-    """Refuse a calibration of another sensor, or of pictures of another size.
+def require_match(recording: Recording, calibration: AnyCalibration) -> None:
+    """Refuse a calibration of another sensor, or for another image size.
 
-    A recording that names no sensor goes with any; which of a sensor's calibrations was in use
-    when it was recorded does not matter.
+    A recording without a sensor name matches any calibration; which calibration of a sensor was in
+    use during recording does not matter.
 
     Parameters
     ----------
     recording : Recording
         An open one.
-    calibration : Calibration
-        That it shall be reconstructed with.
+    calibration : Calibration or InPlaceCalibration
+        The calibration for its reconstruction.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
     recorded, calibrated = recording.header.serial, calibration.sensor.serial
     if recorded and recorded != calibrated:
         raise InputError(
-            tr("the recording is of sensor {a} and the calibration of sensor {b}").format(
+            tr("The recording is of sensor {a}, but the calibration is of sensor {b}").format(
                 a=recorded, b=calibrated
             ),
             where=str(recording.path),
@@ -38,7 +38,7 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
     size = (calibration.camera.width, calibration.camera.height)
     if len(recording) and recording.size != size:
         raise InputError(
-            tr("the frames are {a} pixels and the calibration is for {b}").format(
+            tr("The frames have {a} pixels, but the calibration is for {b}").format(
                 a="x".join(map(str, recording.size)), b="x".join(map(str, size))
             ),
             where=str(recording.path),
@@ -47,12 +47,12 @@ def require_match(recording: Recording, calibration: Calibration) -> None:
 
 
 def recording_notes(recording: Recording) -> list[str]:
-    """Return what a person should know of a recording that is not all that it could be."""
+    """Return notes for the user about an incomplete recording."""
     notes = []
     if recording.truncated:
-        notes.append(tr("the recording was cut short or is damaged; this is what is left of it"))
+        notes.append(tr("The recording is truncated or damaged; only the readable part is used"))
     if recording.lost:
         notes.append(
-            tr("{n} frames of the source are not in the recording").format(n=recording.lost)
+            tr("{n} frames of the source are missing in the recording").format(n=recording.lost)
         )
     return notes

@@ -1,4 +1,4 @@
-"""Reading a recording: any frame at any time, checked."""
+"""Read a recording: random access to frames, with checks."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.reading import open_file, parse_json, unreadable
+from gelpolight_core.image.file import MAX_PIXELS
+from gelpolight_core.io.reading import open_file, parse_json, unreadable
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.layout import FrameMark
 from gelpolight_core.recording.pixels import strip_rows, unpack_strip
 from gelpolight_core.recording.recording import VERSION, RecordedFrame, RecordingHeader, Rgb
-from gelpolight_core.session.wholeness import MAX_PIXELS
 from gelpolight_core.translation import tr
 
 SEARCH_BYTES = 1 << 20
@@ -32,20 +32,20 @@ class Recording:
     path : Path
         The file.
     header : RecordingHeader
-        What it says of itself.
+        Description of the recording.
     numbers : (N,) int64
-        The source's count of each frame.
+        Frame number counted by the source.
     times_s : (N,) float64
-        When each was made, on the source's clock.
+        Time of each frame, on the source's clock.
     size : (int, int)
-        (width, height) in pixels; (0, 0) without frames.
+        Width and height in pixels; (0, 0) without frames.
     bits : int
         8 or 16; 0 without frames.
     lost : int
-        Frames that the source made between the first and the last, and that are not here.
+        Number of missing frames between the first and the last.
     truncated : bool
-        Whether the end is missing or something in it cannot be read: it was cut short, its program
-        was stopped, or it is damaged.
+        Whether the end is missing or a part cannot be read, because the file is truncated or
+        damaged or the recording program was stopped.
     """
 
     def __init__(self, path: Path, file: int) -> None:
@@ -72,7 +72,7 @@ class Recording:
         Raises
         ------
         InputError
-            If there is no such file, it is no recording, is of a newer program, or its head is
+            If the file does not exist, is not a recording, has a newer version, or its header is
             damaged.
         """
         try:
@@ -80,7 +80,7 @@ class Recording:
                 file = os.dup(stream.fileno())
         except FileNotFoundError as error:
             raise InputError(
-                tr("there is no such file"), where=str(path), advice=tr("Check the file's name")
+                tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
             ) from error
         try:
             return cls(path, file)
@@ -92,7 +92,7 @@ class Recording:
             raise
 
     def __len__(self) -> int:
-        """Return how many frames there are."""
+        """Return the number of frames."""
         return len(self._marks)
 
     @property
@@ -101,14 +101,14 @@ class Recording:
         return float(self.times_s[-1] - self.times_s[0]) if len(self) else 0.0
 
     def frame(self, index: int) -> RecordedFrame:
-        """Return a frame exactly as it was written.
+        """Return a frame exactly as written.
 
         Raises
         ------
         InputError
             If it is damaged or cannot be read.
         IndexError
-            If there is no such frame.
+            If the index is out of range.
         """
         if self._file is None:
             raise ValueError("the recording is closed")
@@ -125,20 +125,20 @@ class Recording:
                 raise unreadable(error, self.path) from error
             if zlib.crc32(data) != strip.crc or not unpack_strip(data, rgb[part]):
                 raise InputError(
-                    tr("frame {n} is damaged").format(n=index),
+                    tr("Frame {n} is damaged").format(n=index),
                     where=str(self.path),
                     advice=tr("Leave this frame out, or copy the recording again"),
                 )
         return RecordedFrame(rgb, mark.number, mark.time_s)
 
     def close(self) -> None:
-        """Give the file back; harmless when it is closed."""
+        """Close the file; may be called repeatedly."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
 
     def __enter__(self) -> Recording:
-        """Return itself."""
+        """Return the recording."""
         return self
 
     def __exit__(
@@ -152,7 +152,7 @@ class Recording:
 
 
 def is_recording(path: Path) -> bool:
-    """Return whether a file says that it is a recording, whatever its name and state."""
+    """Return whether a file starts like a recording, whatever its name and state."""
     try:
         with open_file(path) as stream:
             head = stream.read(layout.CLOSING_AT)
@@ -162,20 +162,20 @@ def is_recording(path: Path) -> bool:
 
 
 def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int]:
-    """Return what the recording says of itself, and where the frames begin."""
+    """Return the description of the recording, and the position of the first frame."""
     head = os.pread(file, layout.DESCRIPTION_AT, 0)
     if len(head) < layout.DESCRIPTION_AT or head[layout.HEAD_AT :][:8] != layout.MAGIC:
         raise InputError(
-            tr("this is not a recording"),
+            tr("The file is not a recording"),
             where=str(path),
-            advice=tr("Choose a recording that this program made"),
+            advice=tr("Choose a recording made with this program"),
         )
     _, version, length, crc = layout.HEAD.unpack_from(head, layout.HEAD_AT)
     if version > VERSION:
         raise InputError(
-            tr("the recording has version {a} and this program knows {b}").format(
-                a=version, b=VERSION
-            ),
+            tr(
+                "The recording has version {a}, but this program only reads up to version {b}"
+            ).format(a=version, b=VERSION),
             where=str(path),
             advice=tr("Open it with a newer version of the program"),
         )
@@ -186,16 +186,16 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
             try:
                 return RecordingHeader.from_json(parse_json(text)), layout.padded(end)
             except ValueError:
-                pass  # damaged as much as one whose checksum is wrong
+                pass  # just as damaged as with a wrong checksum
     raise InputError(
-        tr("the head of the recording is damaged"),
+        tr("The header of the recording is damaged"),
         where=str(path),
         advice=tr("Copy it again, or use another recording"),
     )
 
 
 def _find_frames(file: int, begin: int, size: int) -> list[FrameMark]:
-    """Return the marks of all frames that lie whole in the file, in their order."""
+    """Return the marks of all complete frames in the file, in order."""
     marks: list[FrameMark] = []
     place = begin
     while place < size:
@@ -209,10 +209,10 @@ def _find_frames(file: int, begin: int, size: int) -> list[FrameMark]:
 
 
 def _next_magic(file: int, place: int, size: int) -> int:
-    """Return where the next frame may begin behind a damaged place; `size` if nowhere."""
+    """Return the possible start of the next frame after damage; `size` if there is none."""
     overlap = len(layout.FRAME_MAGIC) - 1
     while place + overlap < size:
-        # Not mapped into memory: a file that shrinks meanwhile would end the program.
+        # Not memory-mapped: if the file shrank meanwhile, the program would crash.
         part = os.pread(file, SEARCH_BYTES, place)
         found = part.find(layout.FRAME_MAGIC)
         if found >= 0:
@@ -224,12 +224,12 @@ def _next_magic(file: int, place: int, size: int) -> int:
 
 
 def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bool:
-    """Return whether a mark can be true: inside the file, and alike the frames before it."""
+    """Return whether a mark is plausible: inside the file, and like the frames before it."""
     end = place + mark.size
     inside = end <= size and all(
         place < strip.place and strip.place + strip.size <= end for strip in mark.strips
     )
-    # The last strip may be shorter; a strip that cannot be packed any more takes a little more.
+    # The last strip may be shorter; an incompressible strip is slightly larger than its data.
     most = _most_bytes(mark) if mark.strips else 0
     inside = inside and all(strip.size <= most for strip in mark.strips)
     shaped = (
@@ -245,6 +245,6 @@ def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bo
 
 
 def _most_bytes(mark: FrameMark) -> int:
-    """Return what a packed strip takes at most, before memory is taken for it."""
+    """Return the largest possible size of a compressed strip, before memory is allocated."""
     plain = mark.rows_per_strip * mark.columns * 3 * mark.bits // 8
     return plain + plain // 8 + 4096

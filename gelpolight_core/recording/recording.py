@@ -1,9 +1,9 @@
-r"""What a recording is, and the file that holds it (``.gplrec``).
+r"""The format of recordings (``.gplrec``).
 
 The file is a BigTIFF of one page per frame (RGB, 8 or 16 bit, Deflate, horizontal differences), so
-that tifffile, OpenCV, Pillow, libtiff or ImageJ's Bio-Formats open its frames without this program.
-What is ours lies where TIFF readers do not look, and our own reader looks nowhere else. All
-numbers are little-endian, all blocks begin at multiples of 8 bytes::
+that tifffile, OpenCV, Pillow, libtiff or ImageJ's Bio-Formats can open its frames without this
+program. Our own data is in places that TIFF readers ignore, and our own reader uses only that data.
+All numbers are little-endian, all blocks begin at multiples of 8 bytes::
 
     0   BigTIFF head: "II", 43, 8, 0, place of the first page's directory (8 bytes)
     16  "GPLREC\r\n", version, bytes of the description, CRC-32 of these two and the description
@@ -15,19 +15,20 @@ numbers are little-endian, all blocks begin at multiples of 8 bytes::
         TIFF directory, its strip tables being those of the frame mark
         strips: zlib streams of the differences to the left neighbour
 
-A frame counts once it is whole: a program that is killed loses at most the one it was writing, and
-the part of it that was written is passed over. The directory's link is set last, so that other
-readers never see a part of a frame either. Every frame mark and every strip has a checksum: a frame
-is given back as it was written, or refused. Behind a damaged place the reader goes on with the next
-frame mark that is whole. Frame numbers count what the source made: where they leap, frames are
-lost. Within two seconds what was written is on the disk itself, so that a power cut takes no more.
+A frame counts once it is complete: a killed program loses at most the frame it was writing, and its
+incomplete part is skipped. The directory's link is set last, so that other readers never see an
+incomplete frame either. Every frame mark and every strip has a checksum: a frame is returned
+exactly as written, or refused. After a damaged part the reader continues with the next complete
+frame mark. Frame numbers count the frames of the source: gaps are lost frames. Data is flushed to
+the disk within two seconds, so that a power cut loses no more.
 
-Why this and not another, measured at 1280 x 960, 8 bit, noise of 50 dB (CPU time and size of a
-frame): this 12 ms with the writing, 1.3 MB; OpenCV's HFYU .avi 6 to 9 ms, 1.15 MB, but 8 bit only,
-without times, and lost without its index; FFV1 .mkv 60 ms, 0.74 MB; PNG 28 to 57 ms, 0.8 to 1.0 MB;
-zlib level 1 on raw values 37 ms, 1.43 MB; tifffile with zlib level 1 32 ms, 0.97 MB; plain values
-0.3 ms, 3.69 MB, which at 30 frames a second is as much as many disks take. 12 bit in 16: this
-36 ms, 3.8 MB; PNG 59 ms, 3.4 MB. With noise of 40 dB, 8 bit, this takes 16 ms and 1.9 MB.
+Comparison with other formats, measured at 1280 x 960, 8 bit, noise of 50 dB (CPU time and size of a
+frame): this format 12 ms including writing, 1.3 MB; OpenCV's HFYU .avi 6 to 9 ms, 1.15 MB, but 8
+bit only, without times, and lost without its index; FFV1 .mkv 60 ms, 0.74 MB; PNG 28 to 57 ms, 0.8
+to 1.0 MB; zlib level 1 on raw values 37 ms, 1.43 MB; tifffile with zlib level 1 32 ms, 0.97 MB;
+plain values 0.3 ms, 3.69 MB, which at 30 frames per second is the limit of many disks. 12 bit in
+16: this format 36 ms, 3.8 MB; PNG 59 ms, 3.4 MB. With noise of 40 dB, 8 bit, this format takes 16
+ms and 1.9 MB.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core import __version__
-from gelpolight_core.reading import written_text
+from gelpolight_core.io.reading import written_text
 
 ENDING = ".gplrec"
 FORMAT = "gelpolight-recording"
@@ -58,11 +59,11 @@ class RecordedFrame:
     Attributes
     ----------
     rgb : (rows, columns, 3) uint8 or uint16
-        As the source gave it.
+        As delivered by the source.
     number : int
-        The source's count.
+        Frame number counted by the source.
     time_s : float
-        When it was made, on the source's clock; only differences mean something.
+        Time on the source's clock; only differences are meaningful.
     """
 
     rgb: Rgb
@@ -72,22 +73,22 @@ class RecordedFrame:
 
 @dataclass(frozen=True, slots=True)
 class RecordingHeader:
-    """What a recording says of itself.
+    """Description of a recording.
 
     Attributes
     ----------
     serial, calibration_id : str
-        Sensor, and calibration in use while it was recorded; empty where there was none.
+        Sensor, and calibration in use during recording; empty if none.
     source, kind : str
-        What the frames came from: its name, and "camera", "virtual", "folder" or "recording".
+        Name of the source, and "camera", "virtual", "folder" or "recording".
     settings : mapping
-        Settings of the source by their keys, which carry the units.
+        Settings of the source; the keys include the units.
     started : str
-        When, ISO 8601 in UTC.
+        Start time, ISO 8601 in UTC.
     program : str
-        Version that wrote it.
+        Version of the program that wrote it.
     note : str
-        What the person wrote.
+        Note by the user.
     """
 
     serial: str = ""
@@ -100,18 +101,18 @@ class RecordingHeader:
     note: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as plain values."""
+        """Return the description as plain values."""
         texts = {name: getattr(self, name) for name in _TEXTS}
         return {"format": FORMAT, **texts, "settings": dict(self.settings)}
 
     @classmethod
     def from_json(cls, content: Any) -> RecordingHeader:
-        """Read what `as_json` gave; what a later minor version added is passed over.
+        """Read the result of `as_json`; additions of later minor versions are ignored.
 
         Raises
         ------
         ValueError
-            If something is missing or is not what it should be.
+            If something is missing or invalid.
         """
         if not isinstance(content, dict) or content.get("format") != FORMAT:
             raise ValueError("not the description of a recording")

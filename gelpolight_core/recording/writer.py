@@ -1,4 +1,4 @@
-"""Writing a recording, frame by frame."""
+"""Write a recording, frame by frame."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from types import TracebackType
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import cannot_write, sync_folder
+from gelpolight_core.image.file import MAX_PIXELS
+from gelpolight_core.io.atomic import cannot_write, sync_folder
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.pixels import pack_pixels
 from gelpolight_core.recording.recording import VERSION, RecordingHeader, Rgb
-from gelpolight_core.session.wholeness import MAX_PIXELS
 from gelpolight_core.translation import tr
 
 SYNC_S = 2.0
 
 
 class RecordingWriter:
-    """A recording that is being made; for one thread.
+    """A recording that is being written; for one thread.
 
     Parameters
     ----------
     path : Path
-        A new file: a recording never takes the place of another file.
+        A new file: a recording never replaces an existing file.
     header : RecordingHeader
-        What it says of itself.
+        Description of the recording.
 
     Attributes
     ----------
     frames : int
-        Frames that are written.
+        Number of written frames.
     size_bytes : int
-        What they take on the disk.
+        Their size on the disk.
 
     Raises
     ------
     InputError
-        If there is such a file, or it cannot be made.
+        If the file exists or cannot be created.
     """
 
     def __init__(self, path: Path, header: RecordingHeader) -> None:
@@ -55,14 +55,16 @@ class RecordingWriter:
         self._last_number: int | None = None
         self._link_at = layout.TIFF_LINK_AT
         self.frames = 0
-        # The packing is compiled now if it must be, not while frames come in.
+        # Compile the compression code now if needed, not while frames arrive.
         pack_pixels(np.zeros((1, 1, 3), np.uint8))
         try:
             flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
             self._file: int | None = os.open(path, flags, 0o666)
         except FileExistsError as error:
             raise InputError(
-                tr("there is a file of this name"), where=str(path), advice=tr("Name a new one")
+                tr("A file with this name already exists"),
+                where=str(path),
+                advice=tr("Choose a new name"),
             ) from error
         except OSError as error:
             raise cannot_write(error, path) from error
@@ -77,23 +79,23 @@ class RecordingWriter:
             raise
 
     def append(self, rgb: Rgb, number: int, time_s: float) -> None:
-        """Write a frame; once this returns, no crash of the program loses it.
+        """Write a frame; after this call, a crash of the program cannot lose it.
 
         Parameters
         ----------
         rgb : (rows, columns, 3) uint8 or uint16
-            All frames have one size and one kind.
+            All frames must have the same size and type.
         number : int
-            The source's count; larger than that of the frame before.
+            Frame number counted by the source; larger than that of the previous frame.
         time_s : float
-            When it was made.
+            Time of the frame.
 
         Raises
         ------
         InputError
-            If it cannot be written; the recording then ends with the frame before.
+            If it cannot be written; the recording then ends with the previous frame.
         ValueError
-            If it is no such frame.
+            If the frame is not valid.
         """
         if self._file is None:
             raise ValueError("the recording is closed")
@@ -107,7 +109,7 @@ class RecordingWriter:
             place=self.size_bytes,
         )
         self._append(block.data)
-        # Only now do other readers see the frame.
+        # Other readers see the frame only from now on.
         self._write(block.directory_at.to_bytes(8, "little"), self._link_at)
         self._link_at = block.link_at
         self._last_number = int(number)
@@ -116,17 +118,17 @@ class RecordingWriter:
             self._sync()
 
     def close(self, last_number: int | None = None) -> None:
-        """Mark the recording as complete and bring it to the disk; harmless when it is closed.
+        """Mark the recording as complete and flush it to disk; may be called repeatedly.
 
         Parameters
         ----------
         last_number : int, optional
-            The last frame that the source made, if that one was not written.
+            Number of the last frame of the source, if that frame was not written.
 
         Raises
         ------
         InputError
-            If the disk takes no more; the frames are kept all the same.
+            If the disk is full; the frames are still kept.
         """
         if self._file is None:
             return
@@ -140,7 +142,7 @@ class RecordingWriter:
             os.close(file)
 
     def __enter__(self) -> RecordingWriter:
-        """Return itself."""
+        """Return the writer."""
         return self
 
     def __exit__(
@@ -171,7 +173,7 @@ class RecordingWriter:
             self._write(data, self.size_bytes)
         except InputError:
             assert self._file is not None
-            # The part of a frame is of no use, and does no harm where the disk lets it not go.
+            # Remove the incomplete frame if possible; if it stays, it does no harm.
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self.size_bytes)
             raise

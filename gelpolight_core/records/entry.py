@@ -1,4 +1,4 @@
-"""One line of the lab's records."""
+"""One entry of the lab's records."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Quantity:
     Attributes
     ----------
     name : str
-        With its unit, such as ``diameter_mm``, ``height_mm`` or ``angle_deg``.
+        Name with unit, such as ``diameter_mm``, ``height_mm`` or ``angle_deg``.
     value : float
-        As measured.
+        The measured value.
     sd : float or None
-        Its standard deviation, where that is known.
+        Its standard deviation, if known.
     truth : float or None
-        The true value, where that is known.
+        The true value, if known.
     limit_percent : float or None
         Largest error that passes, in percent of the truth.
     """
@@ -40,12 +40,12 @@ class Quantity:
     limit_percent: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no number, and a truth without size."""
+        """Refuse invalid numbers, and a true value of 0."""
         given = (self.value, self.sd, self.truth, self.limit_percent)
         if not all(number is None or math.isfinite(number) for number in given):
             raise ValueError(f"{self.name} holds a number that is not finite: {given}")
         if self.truth == 0.0:
-            raise ValueError(f"{self.name} has a truth of 0")
+            raise ValueError(f"{self.name} has a true value of 0")
 
     @property
     def error(self) -> float | None:
@@ -67,7 +67,7 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class MeasurementRecord:
-    """A measurement as it is kept.
+    """A stored measurement.
 
     Attributes
     ----------
@@ -76,25 +76,25 @@ class MeasurementRecord:
     shape : str
         Tool or shape: ``cylinder``, ``cuboid``, ``ball``, ``distance``, ``step_height``, ...
     quantities : tuple of Quantity
-        What was measured; at least one.
+        The measured values; at least one.
     verdict : str
-        ``pass``, ``fail``, ``doubtful``, or empty where nothing was to be judged.
+        ``pass``, ``fail``, ``doubtful``, or empty if there was nothing to judge.
     reason : str
-        Why doubtful.
+        Reason for ``doubtful``.
     settings : mapping
         Model, camera and tool settings; plain values.
     details : mapping
-        Everything else that the measurement says, as ``measure --json`` writes it.
+        All other data of the measurement, as written by ``measure --json``.
     operator : str
-        Who measured.
+        Name of the user.
     time : datetime
-        When, in UTC.
+        Time of the measurement, in UTC.
     picture : str
-        The picture or recording, with the frame where it is one of several.
+        The image or recording, with the frame if it is one of several.
     note : str
-        What the person wrote.
+        Note by the user.
     id : int or None
-        In the database; None before it is there.
+        Number in the database; None before it is stored.
     """
 
     serial: str
@@ -112,17 +112,19 @@ class MeasurementRecord:
     id: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a measurement of nothing, of no sensor, or at a time without zone."""
+        """Refuse a measurement without quantities or sensor, or with a time without zone."""
         names = [quantity.name for quantity in self.quantities]
         if not names or len(set(names)) != len(names):
-            raise ValueError(f"a measurement has quantities of different names, not {names}")
+            raise ValueError(
+                f"the quantities of a measurement must have different names, not {names}"
+            )
         if not self.serial:
-            raise ValueError("a measurement is of a sensor")
+            raise ValueError("a measurement needs a sensor")
         if self.time.tzinfo is None:
             raise ValueError("the time has no zone")
 
     def quantity(self, name: str) -> Quantity | None:
-        """Return the quantity of a name; None where that was not measured."""
+        """Return the quantity with a name; None if it was not measured."""
         return next((q for q in self.quantities if q.name == name), None)
 
 
@@ -149,14 +151,15 @@ def indenter_record(
     picture: str = "",
     note: str = "",
 ) -> MeasurementRecord:
-    """Return what is to be kept of a fitted indenter.
+    """Return the record of a fitted indenter.
 
     Parameters
     ----------
     measurement : Measurement
-        As fitted; of a cuboid the mean side is kept as ``side_mm``, as its error is judged by it.
+        The fit; for a cuboid the mean side is stored as ``side_mm``, because its error is judged by
+        it.
     comparison : Comparison, optional
-        With the truth, where that is known.
+        Comparison with the truth, if known.
     serial, calibration_id, settings, operator, picture, note
         As in :class:`MeasurementRecord`.
     size_limit_percent, height_limit_percent : float

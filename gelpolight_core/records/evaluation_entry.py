@@ -1,4 +1,4 @@
-"""An evaluation by the protocol as one line of the lab's records."""
+"""An evaluation by the protocol as one entry of the lab's records."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ def evaluation_record(
     operator: str = "",
     folder: str = "",
 ) -> MeasurementRecord | None:
-    """Return what is to be kept of a whole evaluation: its mean absolute errors.
+    """Return the record of a whole evaluation: its mean absolute errors.
 
     Parameters
     ----------
     evaluation : Evaluation
-        Of all presses.
+        Evaluation of all presses.
     serial, calibration_id, operator
         As in :class:`MeasurementRecord`.
     size_limit_percent, height_limit_percent : float
         Largest mean errors that pass.
     folder : str
-        Where the presses are; kept as the picture's name.
+        Folder of the presses; stored as the image name.
 
     Returns
     -------
     record : MeasurementRecord or None
-        None where nothing could be measured.
+        None if nothing could be measured.
     """
     limits = {"planar": size_limit_percent, "depth": height_limit_percent}
     errors = {
@@ -67,12 +67,12 @@ def evaluation_record(
 
 
 def add_once(records: Records, record: MeasurementRecord) -> int:
-    """Add an evaluation, unless one of the same run with the same errors is there.
+    """Add an evaluation, unless the same run with the same errors is already stored.
 
     Returns
     -------
     number : int
-        The new one's; 0 where nothing was added.
+        Number of the new entry; 0 if nothing was added.
     """
     for known in records.measurements():
         same = (known.shape, known.picture, known.calibration_id) == (
@@ -86,7 +86,7 @@ def add_once(records: Records, record: MeasurementRecord) -> int:
 
 
 def _plain(group: Group) -> dict[str, Any]:
-    """Return plain values; what is not known, None."""
+    """Return plain values; None for unknown ones."""
     plain = asdict(group)
     plain["statistic"] = {
         key: value if math.isfinite(value) else None for key, value in plain["statistic"].items()

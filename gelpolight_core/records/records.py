@@ -1,10 +1,10 @@
 """The lab's records: one SQLite database in the workspace.
 
-Every change is one transaction that is on the disk before the call returns (rollback journal,
-``synchronous = EXTRA``), so that neither a killed program nor a power cut loses or halves what was
-acknowledged; not the write-ahead log, which does not work on network disks. Several programs may
-use the file at once: each waits for its turn, for a few seconds. Nothing is ever deleted; what was
-removed is marked so, and can be brought back.
+Every change is one transaction that is on disk before the call returns (rollback journal,
+``synchronous = EXTRA``), so that neither a killed program nor a power cut can lose or split a
+confirmed change. The write-ahead log is not used, because it does not work on network disks.
+Several programs may use the file at the same time: each waits a few seconds for its turn. Nothing
+is ever deleted; a removed entry is only marked and can be restored.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from types import TracebackType
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.reading import brief, written_text
+from gelpolight_core.io.reading import brief, written_text
+from gelpolight_core.records.database import connect, keep_aside
+from gelpolight_core.records.database_errors import in_plain_words, is_damage
 from gelpolight_core.records.entry import MeasurementRecord
-from gelpolight_core.records.faults import in_plain_words, is_damage
-from gelpolight_core.records.opening import connect, keep_aside
 from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of
 from gelpolight_core.records.statistics import Drift, Statistics, statistics_of
 from gelpolight_core.records.table import write_csv
@@ -36,14 +36,14 @@ BUSY_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Measurements of one thing.
+    """Measurements of the same quantity.
 
     Attributes
     ----------
     serial : str
         The sensor.
     shape, quantity : str
-        What was measured, and which value of it.
+        The shape, and the measured quantity.
     truth : float or None
         Its true value; None for those without.
     """
@@ -57,14 +57,14 @@ class Group:
 class Records:
     """The records of a workspace, open; any thread may use them.
 
-    Made by :meth:`open`.
+    Created by :meth:`open`.
 
     Attributes
     ----------
     path : Path
         The file.
     notice : str
-        What the person should know, as a sentence: that a damaged file was kept aside. Else empty.
+        Message for the user if a damaged file was set aside; otherwise empty.
     """
 
     def __init__(self, path: Path, connection: sqlite3.Connection, notice: str = "") -> None:
@@ -74,20 +74,20 @@ class Records:
 
     @classmethod
     def open(cls, path: Path, *, busy_s: float = BUSY_S) -> Records:
-        """Open the records, or begin them; a damaged file is kept aside and new ones are begun.
+        """Open or create the records; a damaged file is set aside and a new one is created.
 
         Parameters
         ----------
         path : Path
-            The file; its folder must be there.
+            The file; its folder must exist.
         busy_s : float, optional
-            How long to wait for another program.
+            Longest time to wait for another program.
 
         Raises
         ------
         InputError
-            If they cannot be opened: another program holds them, the folder cannot be written and
-            holds none, or they are of a newer version.
+            If they cannot be opened: another program is using them, the folder has none and is
+            read-only, or they have a newer version.
         """
         try:
             return cls(path, connect(path, busy_s))
@@ -97,18 +97,18 @@ class Records:
                     raise
         aside = keep_aside(path)
         notice = tr(
-            "The records were damaged. They are kept as {name}, and new ones were begun."
+            "The records were damaged. They were saved as {name}, and new records were created."
         ).format(name=aside.name)
         with in_plain_words(path):
             return cls(path, connect(path, busy_s), notice)
 
     def add(self, record: MeasurementRecord) -> int:
-        """Keep a measurement, and return its number; it is on the disk then.
+        """Store a measurement on disk and return its number.
 
         Raises
         ------
         InputError
-            If it cannot be written; nothing of it is kept then.
+            If it cannot be written; then no part of it is stored.
         """
         row = row_of(record)
         with self._writing() as connection:
@@ -135,16 +135,16 @@ class Records:
         *,
         removed: bool = False,
     ) -> tuple[MeasurementRecord, ...]:
-        """Return measurements in the order in which they were kept, whatever the clock said.
+        """Return measurements in the order in which they were stored, independent of the clock.
 
         Parameters
         ----------
         serial, shape : str, optional
-            Only those of this sensor, of this shape.
+            Only those of this sensor, or of this shape.
         since : datetime, optional
-            Only those of this time or later.
+            Only those at this time or later.
         removed : bool, optional
-            The removed ones in place of the others.
+            Return the removed ones instead of the others.
 
         Raises
         ------
@@ -175,44 +175,44 @@ class Records:
             raise self._no_measurement(error) from error
 
     def update_note(self, number: int, note: str) -> None:
-        """Change what the person wrote of a measurement.
+        """Change the note of a measurement.
 
         Parameters
         ----------
         number : int
-            Of the measurement, as :meth:`add` gave it.
+            Number of the measurement, from :meth:`add`.
         note : str
             The new text.
 
         Raises
         ------
         InputError
-            If there is no such measurement, or it cannot be written.
+            If the measurement does not exist or cannot be written.
         """
         self._change(number, "note = ?", note)
 
     def remove(self, number: int) -> None:
-        """Mark a measurement as removed; :meth:`restore` brings it back.
+        """Mark a measurement as removed; :meth:`restore` restores it.
 
         Raises
         ------
         InputError
-            If there is no such measurement, or it cannot be written.
+            If the measurement does not exist or cannot be written.
         """
         self._change(number, "removed = ?", text_of(datetime.now(UTC)))
 
     def restore(self, number: int) -> None:
-        """Bring a removed measurement back; harmless for one that is there.
+        """Restore a removed measurement; does nothing for the others.
 
         Raises
         ------
         InputError
-            If there is no such measurement, or it cannot be written.
+            If the measurement does not exist or cannot be written.
         """
         self._change(number, "removed = ?", None)
 
     def groups(self, serial: str | None = None) -> tuple[Group, ...]:
-        """Return what was measured, each thing once, in the order of its first measurement."""
+        """Return the measured quantities, each once, in the order of their first measurement."""
         found = (
             Group(record.serial, record.shape, quantity.name, quantity.truth)
             for record in self.measurements(serial)
@@ -221,7 +221,7 @@ class Records:
         return tuple(dict.fromkeys(found))
 
     def statistics(self, group: Group) -> Statistics:
-        """Return the statistics of the measurements of one thing.
+        """Return the statistics of the measurements of one quantity.
 
         Raises
         ------
@@ -237,19 +237,19 @@ class Records:
                     quantity=group.quantity, shape=group.shape
                 ),
                 where=group.serial,
-                advice=tr("Measure one first"),
+                advice=tr("Make a measurement first"),
             )
         return statistics_of(values)
 
     def drift(self, serial: str, quantity: str | None = None) -> Drift:
-        """Return the errors of a sensor's measurements that have a truth, in that order.
+        """Return the errors of a sensor's measurements with a known truth, in order.
 
         Parameters
         ----------
         serial : str
             The sensor.
         quantity : str, optional
-            Only the errors of this one, such as ``height_mm``.
+            Only the errors of this quantity, such as ``height_mm``.
         """
         found = [
             (record, q, q.error_percent)
@@ -268,14 +268,14 @@ class Records:
         )
 
     def export_csv(self, path: Path, serial: str | None = None) -> int:
-        """Write a table with one line per measured value; return how many measurements it holds.
+        """Write a table with one line per measured value; return the number of measurements.
 
         Parameters
         ----------
         path : Path
             The file.
         serial : str, optional
-            Of one sensor only.
+            Only measurements of this sensor.
 
         Raises
         ------
@@ -287,7 +287,7 @@ class Records:
         return len(records)
 
     def sensors(self) -> tuple[str, ...]:
-        """Return the serials of all sensors that were measured with."""
+        """Return the serial numbers of all sensors with measurements."""
         with self._reading() as connection:
             rows = connection.execute("SELECT serial FROM sensors ORDER BY serial").fetchall()
         try:
@@ -298,12 +298,12 @@ class Records:
     def know_calibration(
         self, identity: str, serial: str, *, model: str = "", made: str = "", verdict: str = ""
     ) -> None:
-        """Keep what is known of a calibration beside its measurements.
+        """Store the data of a calibration next to its measurements.
 
         Parameters
         ----------
         identity, serial : str
-            Of the calibration and its sensor.
+            Identity of the calibration, serial number of its sensor.
         model, made, verdict : str, optional
             ``paper`` or ``full``; ISO 8601 time; ``pass``, ``warn`` or ``fail``.
 
@@ -320,12 +320,12 @@ class Records:
             )
 
     def close(self) -> None:
-        """Give the file back; harmless when it is closed."""
+        """Close the file; may be called repeatedly."""
         with self._lock:
             self._connection.close()
 
     def __enter__(self) -> Records:
-        """Return itself."""
+        """Return the records."""
         return self
 
     def __exit__(
@@ -339,11 +339,11 @@ class Records:
 
     def _no_measurement(self, error: Exception) -> InputError:
         return InputError(
-            tr("the records hold something that no measurement is ({reason})").format(
+            tr("The records contain an invalid measurement ({reason})").format(
                 reason=brief(str(error), 200)
             ),
             where=str(self.path),
-            advice=tr("Move the file away, or bring back an older copy of it"),
+            advice=tr("Move the file away, or restore an older copy of it"),
         )
 
     def _change(self, number: int, what: str, value: str | None) -> None:
@@ -353,7 +353,7 @@ class Records:
             )
             if changed.rowcount != 1:
                 raise InputError(
-                    tr("there is no measurement {number}").format(number=number),
+                    tr("Measurement {number} does not exist").format(number=number),
                     where=str(self.path),
                     advice=tr("Read the records again"),
                 )
@@ -370,7 +370,7 @@ class Records:
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
         with self._lock, in_plain_words(self.path):
-            self._connection.execute("BEGIN")  # one state for all that is read
+            self._connection.execute("BEGIN")  # one consistent state for all reads
             try:
                 yield self._connection
             finally:

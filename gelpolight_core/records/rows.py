@@ -1,4 +1,4 @@
-"""Measurements and the rows of the tables that hold them."""
+"""Convert measurements to table rows and back."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import sqlite3
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
-from gelpolight_core.reading import parse_json, written_text
+from gelpolight_core.io.reading import parse_json, written_text
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
-# As much as one value of the database may hold.
+# The size limit of one value of the database.
 MOST_TEXT = 10_000_000
 
 
 def text_of(time: datetime) -> str:
-    """Return a time as text that sorts as times do."""
+    """Return a time as text that sorts in the order of time."""
     return time.astimezone(UTC).isoformat(timespec="microseconds")
 
 
@@ -47,12 +47,12 @@ def quantity_rows(record: MeasurementRecord) -> list[tuple[object, ...]]:
 def records_of(
     rows: Sequence[sqlite3.Row], parts: Sequence[sqlite3.Row]
 ) -> tuple[MeasurementRecord, ...]:
-    """Put measurements together from their rows and those of their values.
+    """Build measurements from their rows and those of their values.
 
     Raises
     ------
     ValueError, TypeError, KeyError
-        If a row holds no measurement.
+        If a row is not a valid measurement.
     """
     quantities: dict[int, list[Quantity]] = {}
     for part in parts:
@@ -71,7 +71,7 @@ _TEXTS = ("serial", "shape", "verdict", "reason", "operator", "picture", "note")
 def _record(row: sqlite3.Row, quantities: tuple[Quantity, ...]) -> MeasurementRecord:
     settings, details = parse_json(row["settings"]), parse_json(row["details"])
     if not isinstance(settings, dict) or not isinstance(details, dict):
-        raise ValueError("the settings of a measurement are no table")
+        raise ValueError("the settings of a measurement are not a table")
     texts = {name: written_text(row[name], MOST_TEXT) for name in _TEXTS}
     return MeasurementRecord(
         **texts,

@@ -8,7 +8,7 @@ from pathlib import Path
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
-# "GPLR": tells our databases from those of other programs.
+# "GPLR": distinguishes our databases from those of other programs.
 APPLICATION_ID = 0x47504C52
 
 _FIRST = (
@@ -55,16 +55,16 @@ _FIRST = (
 )
 
 MIGRATIONS: tuple[tuple[str, ...], ...] = (_FIRST,)
-"""Statements that lead from each version to the next, from an empty file on."""
+"""Statements that migrate each version to the next, starting from an empty file."""
 
 
 def bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
-    """Make the tables, or change older ones to what this program knows, wholly or not at all.
+    """Create the tables, or migrate older ones to the present version, completely or not at all.
 
     Raises
     ------
     InputError
-        If the database is another program's, or of a newer version of this one.
+        If the database belongs to another program, or to a newer version of this one.
     sqlite3.Error
         If it cannot be read or written.
     """
@@ -73,7 +73,7 @@ def bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
         return
     connection.execute("BEGIN IMMEDIATE")
     try:
-        # Another program may have done it while we waited for our turn.
+        # Another program may have migrated it while we waited for our turn.
         for number in range(_version(connection, path), len(MIGRATIONS)):
             for statement in MIGRATIONS[number]:
                 connection.execute(statement)
@@ -86,12 +86,12 @@ def bring_up_to_date(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def refuse_other_tables(connection: sqlite3.Connection, path: Path) -> None:
-    """Refuse views, triggers and tables that this program did not make: they may run for ever.
+    """Refuse views, triggers and tables of other programs: they might run for ever.
 
     Raises
     ------
     InputError
-        If there are any, or one of ours is missing or another.
+        If there are any, or one of our tables is missing or different.
     """
     own = sqlite3.connect(":memory:")
     try:
@@ -103,34 +103,34 @@ def refuse_other_tables(connection: sqlite3.Connection, path: Path) -> None:
         own.close()
     if _tables(connection) != wanted:
         raise InputError(
-            tr("the records hold other tables than this program makes"),
+            tr("The records contain other tables than those of this program"),
             where=str(path),
-            advice=tr("Move the file away, or bring back an older copy of it"),
+            advice=tr("Move the file away, or restore an older copy of it"),
         )
 
 
 def _tables(connection: sqlite3.Connection) -> set[tuple[object, ...]]:
     rows = connection.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
-    # What SQLite keeps for itself: indices of its own, the last numbers, statistics.
+    # Internal tables of SQLite: its own indices, last numbers, statistics.
     return {(r[0], r[1], r[2]) for r in rows if not str(r[1]).startswith("sqlite_")}
 
 
 def _version(connection: sqlite3.Connection, path: Path) -> int:
-    """Return the version of the tables, 0 where there are none."""
+    """Return the version of the tables, 0 if there are none."""
     (owner,) = connection.execute("PRAGMA application_id").fetchone()
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if tables and owner != APPLICATION_ID:
         raise InputError(
-            tr("this is the database of another program"),
+            tr("The file is a database of another program"),
             where=str(path),
             advice=tr("Move it away, or choose another folder"),
         )
     if version > len(MIGRATIONS):
         raise InputError(
-            tr("the records have version {a} and this program knows {b}").format(
-                a=version, b=len(MIGRATIONS)
-            ),
+            tr(
+                "The records have version {a}, but this program only reads up to version {b}"
+            ).format(a=version, b=len(MIGRATIONS)),
             where=str(path),
             advice=tr("Open them with a newer version of the program"),
         )

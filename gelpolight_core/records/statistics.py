@@ -1,4 +1,4 @@
-"""Statistics of repeated measurements, and how a sensor's error goes with time."""
+"""Statistics of repeated measurements, and the change of a sensor's error over time."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Of measurements of one thing, in their unit.
+    """Statistics of measurements of one quantity, in its unit.
 
     Attributes
     ----------
     n : int
-        How many.
+        Number of measurements.
     mean : float
         Their mean.
     sd : float
-        Standard deviation of one of them (n - 1); NaN for fewer than two.
+        Standard deviation of a single measurement (n - 1); NaN for fewer than two.
     spread : float
         Largest minus smallest.
     repeatability : float
@@ -60,7 +60,7 @@ def statistics_of(values: Sequence[float]) -> Statistics:
     ISO 5725-6, 4.1: the repeatability limit, 2.8 standard deviations.
     """
     if not len(values):
-        raise ValueError("no measurements to make statistics of")
+        raise ValueError("no measurements for statistics")
     array = np.asarray(values, np.float64)
     sd = float(np.std(array, ddof=1)) if array.size > 1 else math.nan
     return Statistics(
@@ -75,13 +75,13 @@ class Drift:
     Attributes
     ----------
     times : tuple of datetime
-        When, in UTC.
+        Times of the measurements, in UTC.
     times_s : (N,) float64
         The same in seconds since 1970, for a chart.
     error_percent : (N,) float64
         Measured minus true, in percent of the truth.
     quantities, shapes, calibration_ids : tuple of str
-        What was measured, of what, with which calibration.
+        Quantity, shape and calibration of each measurement.
     ids : tuple of int
         The measurements.
     """

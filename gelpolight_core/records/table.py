@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.records.entry import MeasurementRecord
 
 COLUMNS = (
@@ -19,13 +19,13 @@ COLUMNS = (
 
 
 def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
-    """Return the lines of the table, under :data:`COLUMNS`; None where a value is not known."""
+    """Return the lines of the table, under :data:`COLUMNS`; None for unknown values."""
     return [
         (
-            r.id, r.time.strftime("%Y-%m-%d %H:%M:%S"), _said(r.serial), _said(r.calibration_id),
-            _said(r.shape), _said(q.name),
+            r.id, r.time.strftime("%Y-%m-%d %H:%M:%S"), _safe(r.serial), _safe(r.calibration_id),
+            _safe(r.shape), _safe(q.name),
             q.value, q.sd, q.truth, q.error, q.error_percent, q.limit_percent,
-            _said(r.verdict), _said(r.reason), _said(r.operator), _said(r.picture), _said(r.note),
+            _safe(r.verdict), _safe(r.reason), _safe(r.operator), _safe(r.picture), _safe(r.note),
             json.dumps(dict(r.settings), ensure_ascii=False) if r.settings else "",
         )
         for r in records
@@ -33,13 +33,13 @@ def rows_of(records: Iterable[MeasurementRecord]) -> list[tuple[object, ...]]:
     ]  # fmt: skip
 
 
-def _said(text: str) -> str:
-    """Return a text so that no spreadsheet takes it for a formula and computes it."""
+def _safe(text: str) -> str:
+    """Return a text that no spreadsheet interprets as a formula."""
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
 def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:
-    """Write the table, whole or not at all.
+    """Write the table, completely or not at all.
 
     Raises
     ------
@@ -50,5 +50,5 @@ def write_csv(records: Sequence[MeasurementRecord], path: Path) -> None:
     writer = csv.writer(text)
     writer.writerow(COLUMNS)
     writer.writerows(rows_of(records))
-    # The mark at the beginning tells spreadsheets that this is UTF-8.
+    # The byte order mark tells spreadsheets that the file is UTF-8.
     write_atomically(path, lambda stream: stream.write(text.getvalue().encode("utf-8-sig")))

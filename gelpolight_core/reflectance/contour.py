@@ -212,11 +212,11 @@ def kink_along(table: KinkTable, radius_px: float) -> float:
 
 
 def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
-    """Walk from a rough circle to the contact's edge.
+    """Walk from a circle near the contact's edge to the edge.
 
-    First the circle with the strongest kink. Then, where the kink is clear, its place in every
-    direction and the circle through these: the narrower the filter, the less is it drawn by the
-    curvature of the drape. Where noise scatters the places, the strongest circle itself stays.
+    First the circle with the strongest kink near it. Then, where the kink is clear, its place in
+    every direction and the circle through these: the narrower the filter, the less is it drawn by
+    the curvature of the drape. Where noise scatters the places, the strongest circle itself stays.
 
     Parameters
     ----------
@@ -225,16 +225,14 @@ def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
     valid : (rows, columns) bool
         The working area.
     start : Circle
-        Rough circle, too large by up to three times.
+        A circle near the edge; a kink farther off is another one.
     """
 
     def table(around: Circle, half_width: float, wedge_deg: float = 4.0) -> KinkTable:
         return kink_table(scaled, valid, around, half_width=half_width, wedge_deg=wedge_deg)
 
     circle = start
-    for shift, shrink, grow in ((0.4, 0.3, 1.6), (0.2, 0.7, 1.4)):
-        wide = table(circle, 0.35)
-        circle = search_circle(wide, circle, shift=shift, shrink=shrink, grow=grow)
+    circle = search_circle(table(circle, 0.35), circle, shift=0.2, shrink=0.75, grow=1.35)
     for step in (0.02, 0.005):
         reach = 4.0 * step
         limits = {"shift": reach, "shrink": 1.0 - reach, "grow": 1.0 + reach, "step": step}
@@ -249,26 +247,6 @@ def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
     if contour.residual_px < 0.01 * contour.circle.radius:
         return trace_contour(table(contour.circle, 0.15), contour.circle, margin=0.1)
     return contour
-
-
-def inner_shading(scaled: Array32, circle: Circle, *, noise_variance: float) -> float:
-    """Return the variation of the shading in the inner half over that in the rim.
-
-    Parameters
-    ----------
-    scaled : (rows, columns, 3)
-        Difference to the background.
-    circle : Circle
-        The contact's edge.
-    noise_variance : float
-        Variance of `scaled` without any shading, summed over channels.
-    """
-    distance = distance_in_radii(scaled.shape[:2], circle)
-    inner, rim = scaled[distance < 0.5], scaled[(distance > 0.7) & (distance < 1.0)]
-    if len(inner) < 16 or len(rim) < 16:
-        return 1.0
-    inside = max(float(inner.var(axis=0).sum()) - noise_variance, 0.0)
-    return float(np.sqrt(inside / max(float(rim.var(axis=0).sum()) - noise_variance, 1e-12)))
 
 
 def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Array32:

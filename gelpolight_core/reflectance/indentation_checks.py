@@ -1,4 +1,4 @@
-"""Whether what was found in a picture is one whole ball's indentation, and how good it is.
+"""Whether what was found in a image is one whole ball's indentation, and how good it is.
 
 Where something can be refused outright it is, by its reason; the rest becomes judged figures with
 the same limits.
@@ -6,6 +6,7 @@ the same limits.
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import NoReturn
 
 import cv2
@@ -13,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.noise import LARGEST_GAIN_CHANGE, ScaledDifference
 from gelpolight_core.quality import Figure, QualityTable, judge
+from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit
 from gelpolight_core.reflectance.contour import (
     Circle,
     Contour,
-    inner_shading,
     kink_along,
     kink_table,
 )
-from gelpolight_core.reflectance.noise import LARGEST_GAIN_CHANGE, ScaledDifference
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float32]
@@ -38,15 +39,57 @@ _LEAST_AXIS_RATIO = 0.8
 _LARGEST_RESIDUAL = 0.07
 _ALLOWED_RESIDUAL_PX = 1.5
 _LEAST_COVERAGE = 0.35
+# 12 % of a usual contact are 4 degrees; more is no place to start a refinement from.
+_LARGEST_SD = 0.12
 _LARGEST_DRIFT = 0.1
-# Variation of the shading in the inner half over that in the rim: 0.4 and more for a ball, whose
-# slope grows at least linearly from the middle (0.28 for slopes, at a contact of 0.9 ball radii,
-# where brightness has long flattened out); near 0 for a flat face.
-_LEAST_INNER_SHADING = 0.25
+# The inner half of a ball changes as the whole does: 0.9 to 1.6 on all sensors seen. Flat faces
+# give 0.2 and less, domed ones 0.5.
+_LEAST_INNER_CHANGE = 0.7
+_LEAST_VISIBLE = 0.4
+# Behind markers only guesses are left: above the first no object can be told, above the second
+# no ball can be denied.
+MOST_HIDDEN = 0.7
+_MUCH_HIDDEN = 0.45
+# Shadows widen a contact; the camera's scale and the ball's radius are known to some per cent.
+_LARGEST_OF_BALL = 1.3
+
+
+class Reason(StrEnum):
+    """Why an image shows no ball that can be used, for scripts and tests."""
+
+    OK = "ok"
+    CUT = "cut"
+    NO_INDENTATION = "no_indentation"
+    SEVERAL = "several"
+    NOT_ROUND = "not_round"
+    FLAT = "flat"
+    NOT_A_BALL = "not_a_ball"
+    TOO_SMALL = "too_small"
+    TOO_LARGE = "too_large"
+    MARKERS = "markers"
+    LIGHT_CHANGED = "light_changed"
+    SWAPPED = "swapped"
+    UNUSABLE_IMAGE = "unusable_image"
+
+
+class BallRefusal(InputError):
+    """An image that shows no ball that can be used.
+
+    Parameters
+    ----------
+    reason : Reason
+        Why, as a key.
+    found, where, advice : str
+        As for :class:`~gelpolight_core.errors.InputError`.
+    """
+
+    def __init__(self, reason: Reason, found: str, *, where: str, advice: str) -> None:
+        super().__init__(found, where=where, advice=advice)
+        self.reason = reason
 
 
 def reaches_border(region: Mask, valid: Mask) -> bool:
-    """Whether a region touches the border of the picture or of the working area.
+    """Whether a region touches the border of the image or of the working area.
 
     Parameters
     ----------
@@ -70,7 +113,7 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
     reaches : bool
         Whether the disturbed region touches the border.
     name : str
-        The picture's name.
+        The image's name.
 
     Raises
     ------
@@ -78,18 +121,12 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
         If any of the edge lies outside, or most of it was not seen and the
         region touches the border.
     """
-    circle = contour.circle
-    angle = np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False)
     # A kink shows only with some membrane on its far side.
-    column = np.rint(circle.x + (circle.radius + 1.0) * np.cos(angle)).astype(np.intp)
-    row = np.rint(circle.y + (circle.radius + 1.0) * np.sin(angle)).astype(np.intp)
-    rows, columns = area.shape
-    within = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    within &= area[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
-    outside = 1.0 - float(within.mean())
+    outside = 1.0 - share_in_view(contour.circle, area, margin_px=1.0)
     unclear = reaches and contour.coverage < _LEAST_COVERAGE
     if outside > 0.0 or unclear:
-        raise InputError(
+        raise BallRefusal(
+            Reason.CUT,
             tr("the border cuts the indentation; {share:.0f} % of its edge is out of view").format(
                 share=100.0 * (outside if outside > 0.0 else 1.0 - contour.coverage)
             ),
@@ -98,43 +135,175 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
         )
 
 
-def check_one(change: ScaledDifference, circle: Circle, name: str) -> None:
-    """Refuse a second disturbance that is about as strong and as large as the first.
+def share_in_view(circle: Circle, area: Mask, *, margin_px: float = 0.0) -> float:
+    """Return the share of a circle, widened by `margin_px`, that lies in the working area."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False)
+    column = np.rint(circle.x + (circle.radius + margin_px) * np.cos(angle)).astype(np.intp)
+    row = np.rint(circle.y + (circle.radius + margin_px) * np.sin(angle)).astype(np.intp)
+    rows, columns = area.shape
+    within = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    within &= area[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+    return float(within.mean())
+
+
+def check_visible(circle: Circle, area: Mask, name: str) -> None:
+    """Refuse an indentation of which so little is in view that its centre is a guess.
 
     Parameters
     ----------
-    change : ScaledDifference
-        Of the two pictures.
     circle : Circle
-        The first contact's edge.
+        The contact's edge.
+    area : (rows, columns) bool
+        The working area.
     name : str
-        The picture's name.
+        The image's name.
 
     Raises
     ------
     InputError
-        If there is one.
+        If less than two fifths of the edge is in view.
+    """
+    seen = share_in_view(circle, area)
+    if seen < _LEAST_VISIBLE:
+        raise BallRefusal(
+            Reason.CUT,
+            tr("the border cuts the indentation; {share:.0f} % of its edge is out of view").format(
+                share=100.0 * (1.0 - seen)
+            ),
+            where=name,
+            advice=tr("Press the ball nearer to the middle"),
+        )
+
+
+def looks_like_ball(shading: ShadingFit) -> bool:
+    """Return whether a fitted shading is that of a round, curved object."""
+    return (
+        shading.explained >= BALL_EXPLAINED
+        and shading.inner_change >= _LEAST_INNER_CHANGE
+        and shading.axis_ratio >= _LEAST_AXIS_RATIO
+    )
+
+
+def check_shading(
+    shading: ShadingFit,
+    circle: Circle,
+    ball_radius_px: float | None,
+    hidden: float,
+    name: str,
+) -> None:
+    """Refuse an indentation whose shading is not a ball's.
+
+    Parameters
+    ----------
+    shading : ShadingFit
+        The fit of a ball's shading.
+    circle : Circle
+        The contact's edge.
+    ball_radius_px : float or None
+        Radius of the ball, if it is known.
+    hidden : float
+        Share of the contact that markers hide.
+    name : str
+        The image's name.
+
+    Raises
+    ------
+    InputError
+        If the shading is not a ball's, the contact is too small or larger than the ball, or
+        markers hide so much of it that nobody can tell.
+    """
+    if circle.radius < SMALLEST_RADIUS_PX:
+        _refuse_small(circle.radius, name)
+    if not looks_like_ball(shading) and hidden > _MUCH_HIDDEN:
+        _refuse_hidden(hidden, name)
+    if shading.inner_change < _LEAST_INNER_CHANGE:
+        _refuse_shape(Reason.FLAT, tr("the indentation is flat inside, unlike a ball's"), name)
+    if shading.axis_ratio < _LEAST_AXIS_RATIO:
+        _refuse_oval(shading.axis_ratio, name)
+    if shading.explained < BALL_EXPLAINED:
+        _refuse_shape(
+            Reason.NOT_A_BALL,
+            tr("a ball's shading explains only {share:.0f} % of what is seen").format(
+                share=100.0 * max(shading.explained, 0.0)
+            ),
+            name,
+        )
+    if ball_radius_px is not None and circle.radius > _LARGEST_OF_BALL * ball_radius_px:
+        _refuse_shape(
+            Reason.TOO_LARGE,
+            tr("the contact's radius is {c:.0f} px, the ball's only {r:.0f} px").format(
+                c=circle.radius, r=ball_radius_px
+            ),
+            name,
+        )
+
+
+def refuse_unfitted(hidden: float, name: str) -> NoReturn:
+    """Refuse a disturbance with too few pixels for a fit, because of markers or of its size."""
+    if hidden > 0.3:
+        _refuse_hidden(hidden, name)
+    _refuse_shape(Reason.TOO_SMALL, tr("what differs is too small for a ball"), name)
+
+
+def _refuse_hidden(hidden: float, name: str) -> NoReturn:
+    _refuse_shape(
+        Reason.MARKERS,
+        tr("printed markers hide {share:.0f} % of the contact").format(share=100.0 * hidden),
+        name,
+    )
+
+
+def _refuse_small(radius_px: float, name: str) -> NoReturn:
+    _refuse_shape(
+        Reason.TOO_SMALL,
+        tr("the contact's radius is only {r:.1f} px, too small to use").format(r=radius_px),
+        name,
+    )
+
+
+def other_regions(change: ScaledDifference, circle: Circle) -> list[Mask]:
+    """Return the disturbances that are about as strong and as large as a contact.
+
+    Parameters
+    ----------
+    change : ScaledDifference
+        Of the two images.
+    circle : Circle
+        The contact's edge.
+
+    Returns
+    -------
+    list of (small rows, small columns) bool
+        On the grid of `change`, the largest of each threshold; empty if the contact stands alone.
     """
     f, half = change.factor, 0.5 * (change.factor - 1)
     rows, columns = np.indices(change.scaled.shape)
     distance = np.hypot(columns * f + half - circle.x, rows * f + half - circle.y) / circle.radius
     inside = change.scaled[distance < 1.0]
     if len(inside) == 0:
-        return
+        return []
     top = float(np.quantile(inside, 0.9))
     least = np.pi * max(0.4 * circle.radius, SMALLEST_RADIUS_PX) ** 2 / f**2
+    found = []
     for share in (0.35, 0.5, 0.7):
         # The first contact's own drape and shadow hang together with it; another press does not.
         hot = (change.scaled > max(DETECTION, share * top)) | (distance < 1.3)
         _, labels, stats, _ = cv2.connectedComponentsWithStats(hot.astype(np.uint8))
-        own = labels[distance < 1.3][0]
-        areas = [s[cv2.CC_STAT_AREA] for i, s in enumerate(stats) if i not in (0, own)]
-        if max(areas, default=0) > least:
-            raise InputError(
-                tr("there is more than one indentation"),
-                where=name,
-                advice=tr("Press one ball at a time"),
-            )
+        areas = stats[:, cv2.CC_STAT_AREA].copy()
+        areas[[0, labels[distance < 1.3][0]]] = 0
+        if areas.max() > least:
+            found.append(np.asarray(labels == int(areas.argmax())))
+    return found
+
+
+def refuse_several(name: str) -> NoReturn:
+    """Refuse an image with a second ball."""
+    raise BallRefusal(
+        Reason.SEVERAL,
+        tr("there is more than one indentation"),
+        where=name,
+        advice=tr("Press one ball at a time"),
+    )
 
 
 def check_round(contour: Contour, name: str) -> None:
@@ -145,7 +314,7 @@ def check_round(contour: Contour, name: str) -> None:
     contour : Contour
         The contact's edge.
     name : str
-        The picture's name.
+        The image's name.
 
     Raises
     ------
@@ -154,48 +323,19 @@ def check_round(contour: Contour, name: str) -> None:
     """
     radius = contour.circle.radius
     if contour.coverage < _LEAST_COVERAGE:
-        _refuse_shape(tr("no round edge of a contact can be made out"), name)
+        _refuse_shape(Reason.NOT_ROUND, tr("no round edge of a contact can be made out"), name)
     if contour.coverage > 0.75 and contour.axis_ratio < _LEAST_AXIS_RATIO:
-        _refuse_shape(
-            tr("the indentation is not round; its axes are as 1 to {ratio:.2f}").format(
-                ratio=1.0 / max(contour.axis_ratio, 0.01)
-            ),
-            name,
-        )
+        _refuse_oval(contour.axis_ratio, name)
     if contour.residual_px > max(_LARGEST_RESIDUAL * radius, _ALLOWED_RESIDUAL_PX):
         _refuse_shape(
+            Reason.NOT_ROUND,
             tr("the indentation's edge lies {res:.1f} px about a circle of {r:.1f} px").format(
                 res=contour.residual_px, r=radius
             ),
             name,
         )
     if radius < SMALLEST_RADIUS_PX:
-        _refuse_shape(
-            tr("the contact's radius is only {r:.1f} px, too small to use").format(r=radius), name
-        )
-
-
-def check_ball(sharp: Array, circle: Circle, name: str, *, noise_variance: float) -> None:
-    """Refuse an indentation that is flat inside.
-
-    Parameters
-    ----------
-    sharp : (rows, columns, 3) float32
-        Difference of the pictures in units of its noise.
-    circle : Circle
-        The contact's edge.
-    name : str
-        The picture's name.
-    noise_variance : float
-        Of white noise in `sharp`, all three channels together.
-
-    Raises
-    ------
-    InputError
-        If the shading varies less inside than a ball's.
-    """
-    if inner_shading(sharp, circle, noise_variance=noise_variance) < _LEAST_INNER_SHADING:
-        _refuse_shape(tr("the indentation is flat inside, which a ball's is not"), name)
+        _refuse_small(radius, name)
 
 
 def check_order(
@@ -206,29 +346,30 @@ def check_order(
     name: str,
     background_name: str,
 ) -> None:
-    """Refuse the pictures when the kink lies in the background.
+    """Refuse the images when the kink lies in the background.
 
     Parameters
     ----------
     press, background : (rows, columns, 3) float32
-        The pictures.
+        The images.
     area : (rows, columns) bool
         The working area.
     circle : Circle
         The contact's edge.
     name, background_name : str
-        The pictures' names.
+        The images' names.
 
     Raises
     ------
     InputError
-        If the pictures seem to be swapped.
+        If the images seem to be swapped.
     """
     tables = [kink_table(p, area, circle, half_width=0.25) for p in (press, background)]
     before, after = (kink_along(table, circle.radius) for table in reversed(tables))
-    # Texture and noise are alike in both pictures, so a narrow lead proves nothing.
+    # Texture and noise are alike in both images, so a narrow lead proves nothing.
     if before > 4.0 * after:
-        raise InputError(
+        raise BallRefusal(
+            Reason.SWAPPED,
             tr("the indentation is in the background, not in the press"),
             where=f"{name}, {background_name}",
             advice=tr("Swap the two pictures, or take the background without contact again"),
@@ -236,14 +377,14 @@ def check_order(
 
 
 def check_drift(drift: float, name: str) -> None:
-    """Refuse pictures between which the light changed.
+    """Refuse images between which the light changed.
 
     Parameters
     ----------
     drift : float
         Relative change far from the contact.
     name : str
-        The picture's name.
+        The image's name.
 
     Raises
     ------
@@ -251,7 +392,8 @@ def check_drift(drift: float, name: str) -> None:
         If it is more than a tenth.
     """
     if drift > _LARGEST_DRIFT:
-        raise InputError(
+        raise BallRefusal(
+            Reason.LIGHT_CHANGED,
             tr("the light changed by {drift:.0f} % far from the contact").format(
                 drift=100.0 * drift
             ),
@@ -260,16 +402,28 @@ def check_drift(drift: float, name: str) -> None:
         )
 
 
-def _refuse_shape(found: str, name: str) -> NoReturn:
-    raise InputError(
+def _refuse_oval(axis_ratio: float, name: str) -> NoReturn:
+    _refuse_shape(
+        Reason.NOT_ROUND,
+        tr("the indentation is not round; its axes are as 1 to {ratio:.2f}").format(
+            ratio=1.0 / max(axis_ratio, 0.01)
+        ),
+        name,
+    )
+
+
+def _refuse_shape(reason: Reason, found: str, name: str) -> NoReturn:
+    raise BallRefusal(
+        reason,
         found,
         where=name,
-        advice=tr("Press a single clean ball straight down, or leave this picture out"),
+        advice=tr("Press a single clean ball straight down, or leave this image out"),
     )
 
 
 def judge_indentation(
     contour: Contour,
+    found_by: str,
     signal: float,
     gain: tuple[float, float, float],
     drift: float,
@@ -281,10 +435,12 @@ def judge_indentation(
     ----------
     contour : Contour
         The contact's edge.
+    found_by : str
+        What its circle rests on; the scatter is judged only where it was traced.
     signal : float
         Root mean square difference inside the contact over the noise of one pixel.
     gain : tuple of 3 floats
-        Brightness of the picture over the background's, per channel.
+        Brightness of the image over the background's, per channel.
     drift : float
         Relative change far from the contact.
     saturated : float
@@ -319,16 +475,18 @@ def judge_indentation(
         tr("Press the ball nearer to the middle"),
         tr("Average several frames or press deeper"),
     )
+    largest_sd = max(1.0, _LARGEST_SD * radius)
+    traced = (figure("edge_residual", residual, "%", 4.0, worst_residual, again),)
     return QualityTable(
         (
             judge("contact_radius", tr("Contact radius"), radius, "px"),
-            figure("edge_residual", residual, "%", 4.0, worst_residual, again),
-            figure("centre_sd", contour.centre_sd_px, "px", 1.0, None, again),
+            *(() if found_by == "shading" else traced),
+            figure("centre_sd", contour.centre_sd_px, "px", largest_sd, None, again),
             figure("axis_ratio", contour.axis_ratio, "", 0.9, None, again),
             figure("coverage", 100.0 * contour.coverage, "%", 70.0, lowest, middle),
             figure("signal_to_noise", signal, "", 2.0, None, deeper),
             figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
             figure("drift", 100.0 * drift, "%", 3.0, 100.0 * _LARGEST_DRIFT, light),
-            figure("saturated", 100.0 * saturated, "%", 5.0, None, tr("Shorten the exposure")),
+            figure("saturated", 100.0 * saturated, "%", 5.0, None, tr("Use a shorter exposure")),
         )
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.reflectance.ball import (
@@ -28,7 +29,6 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 INSIDE = 0.9
 LEAST_VALUE = 0.02
-SATURATED = 0.99
 MAX_SHADED_PIXELS = 3_000
 GAIN_NOISE = 0.02
 VALUE_NOISE = 0.003

@@ -8,19 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reflectance.agreement import (
+    PressAgreement,
+    agreement_figures,
+    compare_presses,
+)
 from gelpolight_core.reflectance.ball import BallPose, ball_surface
-from gelpolight_core.reflectance.press import LEAST_VALUE, SATURATED, BallPress, contact_mask
+from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
 from gelpolight_core.reflectance.table import ChannelFit, ReflectanceTable, fit_channel
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-CHANNEL_NAMES = ("red", "green", "blue")
 LEAST_COSINE = 0.05
 
 
@@ -38,12 +44,15 @@ class ReflectanceResult:
         The balls.
     quality : QualityTable
         Figures, limits and advice.
+    agreements : tuple of PressAgreement
+        How each press agrees with the others; empty where they were not compared.
     """
 
     table: ReflectanceTable
     fits: tuple[ChannelFit, ChannelFit, ChannelFit]
     presses: tuple[BallPress, ...]
     quality: QualityTable
+    agreements: tuple[PressAgreement, ...] = ()
 
 
 def ball_scatter(
@@ -112,12 +121,12 @@ def calibrate_reflectance(
     radiance: RadianceResult,
     factors: Map | None = None,
 ) -> ReflectanceResult:
-    """Fit the reflectance table to all ball presses.
+    """Fit the reflectance table to all ball presses, and compare the presses with each other.
 
     Parameters
     ----------
     presses, pictures, table, led_positions_mm, radiance, factors
-        As for :func:`ball_scatter`.
+        As for :func:`ball_scatter`; the presses are compared where the factors are known.
 
     Raises
     ------
@@ -132,7 +141,7 @@ def calibrate_reflectance(
         )
     scatter = ball_scatter(presses, pictures, table, led_positions_mm, radiance, factors)
     fits = [
-        fit_channel(cosines, values, name=tr(CHANNEL_NAMES[k]))
+        fit_channel(cosines, values, name=channel_name(k))
         for k, (cosines, values) in enumerate(scatter)
     ]
     reflectance = ReflectanceTable(
@@ -141,7 +150,11 @@ def calibrate_reflectance(
         np.array([f.coverage for f in fits]),
     )
     three = (fits[0], fits[1], fits[2])
-    return ReflectanceResult(reflectance, three, tuple(presses), _judge(three, presses))
+    agreements: tuple[PressAgreement, ...] = ()
+    if factors is not None:
+        agreements = compare_presses(presses, pictures, table, led_positions_mm, radiance, factors)
+    quality = QualityTable((*_judge(three, presses).figures, *agreement_figures(agreements)))
+    return ReflectanceResult(reflectance, three, tuple(presses), quality, agreements)
 
 
 def _judge(

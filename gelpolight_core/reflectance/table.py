@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import isotonic_regression
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
@@ -47,6 +45,8 @@ class ReflectanceTable:
         cosine : (...)
             Of the angle between light and normal.
         """
+        from scipy.interpolate import PchipInterpolator  # slow to import
+
         curve = PchipInterpolator(self.cosines[channel], self.values[channel])
         return np.asarray(curve(np.clip(cosine, 0.0, 1.0)))
 
@@ -60,6 +60,8 @@ class ReflectanceTable:
         value : (...)
             Processed pixel value I / (rho |L|).
         """
+        from scipy.interpolate import PchipInterpolator  # slow to import
+
         nodes = self.values[channel]
         curve = PchipInterpolator(nodes, self.cosines[channel])
         return np.asarray(curve(np.clip(value, nodes[0], nodes[-1])))
@@ -136,6 +138,9 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     InputError
         If there are too few points, or they do not grow with the cosine.
     """
+    from scipy.interpolate import PchipInterpolator  # slow to import
+    from scipy.optimize import isotonic_regression
+
     seen = np.isfinite(cosines) & np.isfinite(values) & (cosines > 0.0) & (cosines <= 1.0)
     cosines, values = np.asarray(cosines)[seen], np.asarray(values)[seen]
     if cosines.size < 10 * LEAST_IN_BIN:

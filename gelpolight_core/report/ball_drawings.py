@@ -14,6 +14,7 @@ from matplotlib.patches import Circle
 
 from gelpolight_core.calibration.joint import JointResult
 from gelpolight_core.calibration.scatter import ReflectanceScatter
+from gelpolight_core.channels import channel_name
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reflectance.press import BallPress
@@ -25,7 +26,6 @@ from gelpolight_core.report.drawing import (
     FULL_MM,
     Array,
     Map,
-    channel_name,
     draw,
     grid_extent,
     show_picture,
@@ -41,12 +41,12 @@ SAMPLES = 400
 def draw_balls(
     presses: Sequence[BallPress], pictures: Sequence[Map], table: ResamplingTable
 ) -> Drawing:
-    """Show every ball press with the contour found and the circle fitted.
+    """Show every ball press with the detected contour and the fitted circle.
 
     Parameters
     ----------
     presses, pictures : sequences of equal length
-        The balls, and their pictures resampled onto the grid.
+        The balls, and their images resampled onto the grid.
     table : ResamplingTable
         The grid.
     """
@@ -61,7 +61,7 @@ def draw_balls(
 
     return draw(
         tr(
-            "Ball presses: points of the contact's edge (dots) and the circle through them; the "
+            "Ball presses: points on the contact edge (dots) and the circle through them; the "
             "cross is the centre after refinement on the shading"
         ),
         min(rows * FULL_MM / BALLS_ACROSS * 1.16, 230.0),
@@ -106,7 +106,7 @@ def draw_curves(table: ReflectanceTable, scatter: ReflectanceScatter | None = No
     table : ReflectanceTable
         The curves.
     scatter : ReflectanceScatter, optional
-        The ball pixels that they were fitted to.
+        The ball pixels of the fit.
     """
 
     def paint(figure: Figure) -> None:
@@ -116,10 +116,12 @@ def draw_curves(table: ReflectanceTable, scatter: ReflectanceScatter | None = No
             if scatter is not None:
                 _draw_density(axes, scatter.cosines[k], scatter.values[k], top)
             _draw_curve(axes, table, k, top)
-        panels[0].set_ylabel(tr("pixel value over light, I / (\N{GREEK SMALL LETTER RHO}|L|)"))
+        panels[0].set_ylabel(tr("pixel value / light, I / (\N{GREEK SMALL LETTER RHO}|L|)"))
         panels[1].legend(loc="upper left")
 
-    caption = tr("Reflectance curve of each channel; hatched: no ball has shown it, extrapolated")
+    caption = tr(
+        "Reflectance curve of each channel; hatched: extrapolated, not covered by any ball"
+    )
     if scatter is not None:
         caption += tr("; grey: ball pixels, darker where there are more (logarithmic)")
     return draw(caption, 66.0, paint)
@@ -151,7 +153,7 @@ def _draw_curve(axes: Axes, table: ReflectanceTable, channel: int, top: float) -
     )
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, top))
     axes.set_title(
-        tr("{name}: seen from {low:.2f} to {high:.2f}").format(
+        tr("{name}: measured from {low:.2f} to {high:.2f}").format(
             name=channel_name(channel), low=low, high=high
         ),
         color=COLOURS[channel],
@@ -160,14 +162,14 @@ def _draw_curve(axes: Axes, table: ReflectanceTable, channel: int, top: float) -
 
 
 def draw_misfits(presses: Sequence[BallPress], joint: JointResult) -> Drawing:
-    """Show how much of each press the ball alone and the joint model leave unexplained.
+    """Show the unexplained part of each press, for the ball alone and for the joint model.
 
     Parameters
     ----------
     presses : sequence of BallPress
-        With the misfit of their own refinement.
+        With the misfit of their separate refinement.
     joint : JointResult
-        With the misfit of each press after the refinement of all together.
+        With the misfit of each press after the joint refinement.
     """
     names = [printable(PurePath(press.name).name) for press in presses]
     places = np.arange(len(names))
@@ -201,11 +203,11 @@ def draw_misfits(presses: Sequence[BallPress], joint: JointResult) -> Drawing:
             places, 1e3 * np.array(deeper), "^", color="0.2", markersize=3, label=tr("depth")
         )
         right.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")
-        right.set_ylabel(tr("ball moved (\N{MICRO SIGN}m)"))
+        right.set_ylabel(tr("shift of the ball (\N{MICRO SIGN}m)"))
         right.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=3)
 
     return draw(
-        tr("What is left of each ball press, and how far the joint refinement moved the balls"),
+        tr("Residual of each ball press, and the shift of the balls by the joint refinement"),
         66.0,
         paint,
     )

@@ -1,28 +1,31 @@
-"""From a calibration, or a run with its session's pictures, to the report's document."""
+"""Build the report document from a calibration, or from a run with its session's images."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import PurePath
 
-from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.scatter import gather_scatter
 from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.quality import QualityTable, verdict_word
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
 from gelpolight_core.report.ball_drawings import draw_balls, draw_curves, draw_misfits
 from gelpolight_core.report.crosstalk_drawing import draw_crosstalk
 from gelpolight_core.report.document import (
     MARKS,
-    Drawing,
     Listing,
+    Parts,
     Report,
     Section,
     Validation,
 )
 from gelpolight_core.report.drawing import Map
+from gelpolight_core.report.in_place_parts import in_place_facts, in_place_parts
+from gelpolight_core.report.labels import label
 from gelpolight_core.report.light_drawings import (
     draw_factors,
     draw_led_moves,
@@ -36,93 +39,104 @@ from gelpolight_core.report.optics_drawings import (
     draw_top_pose,
 )
 from gelpolight_core.report.stage_facts import stage_facts, stage_intro
-from gelpolight_core.session.session import Session, read_picture
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import SensorData, Session
 from gelpolight_core.translation import tr
 
 
-@dataclass(frozen=True, slots=True)
-class _Parts:
-    """What a run adds to a stage's section."""
-
-    drawings: tuple[Drawing, ...] = ()
-    listings: tuple[Listing, ...] = ()
-
-
-def calibration_report(calibration: Calibration, *, validation: Validation | None = None) -> Report:
-    """Return the report of a calibration file: all but what only the pictures show.
+def calibration_report(
+    calibration: AnyCalibration, *, validation: Validation | None = None
+) -> Report:
+    """Return the report of a calibration file, without the parts that need the images.
 
     Parameters
     ----------
-    calibration : Calibration
-        As read from its file.
+    calibration : Calibration or InPlaceCalibration
+        Read from its file.
     validation : Validation, optional
-        What is known from objects of known size; by default, that nothing is.
+        Results on objects of known size; by default none.
     """
-    parts: dict[str, _Parts] = {
-        "lights": _Parts((draw_led_plan(calibration),)),
-        "crosstalk": _Parts((draw_crosstalk(calibration.crosstalk),)),
-        "radiance": _Parts((draw_radiance(calibration),)),
-        "reflectance": _Parts((draw_curves(calibration.reflectance),)),
-        "factors": _Parts((draw_factors(calibration),)),
+    if isinstance(calibration, InPlaceCalibration):
+        return _assemble(calibration, in_place_parts(calibration), validation)
+    parts: dict[str, Parts] = {
+        "lights": Parts((draw_led_plan(calibration),)),
+        "crosstalk": Parts((draw_crosstalk(calibration.crosstalk),)),
+        "radiance": Parts((draw_radiance(calibration),)),
+        "reflectance": Parts((draw_curves(calibration.reflectance),)),
+        "factors": Parts((draw_factors(calibration),)),
     }
     if calibration.full is not None:
-        parts["joint"] = _Parts((draw_led_moves(calibration),))
+        parts["joint"] = Parts((draw_led_moves(calibration),))
     return _assemble(calibration, parts, validation)
 
 
 def run_report(
     run: CalibrationRun, session: Session, *, validation: Validation | None = None
 ) -> Report:
-    """Return the report of a run: every stage with its pictures.
+    """Return the report of a run: every stage with its images.
 
     Parameters
     ----------
     run : CalibrationRun
         A calibration with the results of every stage.
     session : Session
-        The one that it was made from, for the pictures.
+        The session of the run, for the images.
     validation : Validation, optional
-        What is known from objects of known size; by default, that nothing is.
+        Results on objects of known size; by default none.
 
     Raises
     ------
     InputError
-        If a picture cannot be read any more.
+        If an image can no longer be read.
     """
     c = run.calibration
-    parts: dict[str, _Parts] = {
-        "lens": _Parts(
+    parts: dict[str, Parts] = {
+        "lens": Parts(
             (
                 draw_lens_views(run.lens, _named(session, "checkerboard")),
                 draw_lens_residuals(run.lens),
             ),
             _left_out(run),
         ),
-        "top_pose": _Parts(draw_top_pose(run.top_pose, _named(session, "top_pose"))),
-        "lights": _Parts(
+        "top_pose": Parts(draw_top_pose(run.top_pose, _named(session, "top_pose"))),
+        "lights": Parts(
             (
                 draw_mirror_spots(run.lights.spots, session.averaged("mirror").rgb),
                 draw_led_plan(c, run.lights.bright_points_mm),
             ),
             _rejected_spots(run),
         ),
-        "crosstalk": _Parts((draw_crosstalk(c.crosstalk),)),
-        "radiance": _Parts((draw_radiance(c, run.radiance),)),
+        "crosstalk": Parts((draw_crosstalk(c.crosstalk),)),
+        "radiance": Parts((draw_radiance(c, run.radiance),)),
         "reflectance": _reflectance_parts(run, session),
-        "factors": _Parts((draw_factors(c),)),
+        "factors": Parts((draw_factors(c),)),
     }
     if run.joint is not None:
-        parts["joint"] = _Parts(
+        parts["joint"] = Parts(
             (draw_led_moves(c), draw_misfits(run.reflectance.presses, run.joint))
         )
     return _assemble(c, parts, validation)
+
+
+def in_place_report(run: InPlaceRun, *, validation: Validation | None = None) -> Report:
+    """Return the report of a run with a closed sensor: every press as it was used, or why not.
+
+    Parameters
+    ----------
+    run : InPlaceRun
+        A calibration with its presses.
+    validation : Validation, optional
+        Results on objects of known size; by default none.
+    """
+    parts = in_place_parts(run.calibration, run.result)
+    return _assemble(run.calibration, parts, validation)
 
 
 def _named(session: Session, stage: str) -> Mapping[str, Map]:
     return {picture.name: picture.rgb for picture in session.pictures(stage)}
 
 
-def _reflectance_parts(run: CalibrationRun, session: Session) -> _Parts:
+def _reflectance_parts(run: CalibrationRun, session: Session) -> Parts:
     table, presses = run.calibration.table, run.reflectance.presses
     response = run.calibration.response
     pictures = [
@@ -146,7 +160,7 @@ def _reflectance_parts(run: CalibrationRun, session: Session) -> _Parts:
     listing = Listing(
         tr("Ball presses (lengths in mm)"),
         (
-            tr("picture"),
+            tr("image"),
             tr("ball radius"),
             tr("centre"),
             tr("depth"),
@@ -157,7 +171,7 @@ def _reflectance_parts(run: CalibrationRun, session: Session) -> _Parts:
         tuple(rows),
         (1.5, 0.9, 1.7, 0.8, 1.0, 0.8, 3.2),
     )
-    return _Parts(
+    return Parts(
         (
             draw_balls(presses, pictures, table),
             draw_curves(run.reflectance.table, gather_scatter(run, session)),
@@ -170,8 +184,8 @@ def _left_out(run: CalibrationRun) -> tuple[Listing, ...]:
     rows = tuple((v.name, v.reason, v.advice) for v in run.lens.views if not v.used)
     if not rows:
         return ()
-    heads = (tr("picture"), tr("why"), tr("advice"))
-    return (Listing(tr("Views that were left out"), heads, rows, (1.0, 2.0, 2.0)),)
+    heads = (tr("image"), tr("reason"), tr("advice"))
+    return (Listing(tr("Views left out"), heads, rows, (1.0, 2.0, 2.0)),)
 
 
 def _rejected_spots(run: CalibrationRun) -> tuple[Listing, ...]:
@@ -181,16 +195,18 @@ def _rejected_spots(run: CalibrationRun) -> tuple[Listing, ...]:
     )
     if not rows:
         return ()
-    heads = (tr("number"), tr("place (px)"), tr("why"))
-    return (Listing(tr("Glints that were rejected"), heads, rows, (0.5, 1.0, 4.0)),)
+    heads = (tr("number"), tr("position (px)"), tr("reason"))
+    return (Listing(tr("Rejected glints"), heads, rows, (0.5, 1.0, 4.0)),)
 
 
-def _assemble(c: Calibration, parts: Mapping[str, _Parts], validation: Validation | None) -> Report:
+def _assemble(
+    c: AnyCalibration, parts: Mapping[str, Parts], validation: Validation | None
+) -> Report:
     sections = tuple(
         replace(
             _section(c, key, table),
-            drawings=parts.get(key, _Parts()).drawings,
-            listings=parts.get(key, _Parts()).listings,
+            drawings=parts.get(key, Parts()).drawings,
+            listings=parts.get(key, Parts()).listings,
         )
         for key, table in c.quality.items()
     )
@@ -198,7 +214,7 @@ def _assemble(c: Calibration, parts: Mapping[str, _Parts], validation: Validatio
         title=tr("Calibration of sensor {serial}").format(serial=c.sensor.serial),
         verdict=c.verdict,
         facts=_head_facts(c),
-        validation=validation or Validation(_not_validated()),
+        validation=validation or Validation(_not_validated(c)),
         sections=sections,
         sources=Listing(
             tr("Source files"),
@@ -210,36 +226,27 @@ def _assemble(c: Calibration, parts: Mapping[str, _Parts], validation: Validatio
     )
 
 
-def _section(c: Calibration, key: str, quality: QualityTable) -> Section:
-    return Section(key, stage_title(key), stage_intro(key), quality, stage_facts(c, key))
+def _section(c: AnyCalibration, key: str, quality: QualityTable) -> Section:
+    facts = () if isinstance(c, InPlaceCalibration) else stage_facts(c, key)
+    return Section(key, stage_title(key), stage_intro(key), quality, facts)
 
 
-def _head_facts(c: Calibration) -> tuple[tuple[str, str], ...]:
-    p, s = c.provenance, c.sensor
-    window = (
-        tr("none")
-        if s.window_thickness_mm == 0.0
-        else f"{s.window_thickness_mm:g} mm, n {s.window_refractive_index:g}"
-    )
+def _head_facts(c: AnyCalibration) -> tuple[tuple[str, str], ...]:
+    p = c.provenance
+    models = {"paper": tr("paper"), "full": tr("full"), "in-place": tr("in place, closed sensor")}
     rows = [
-        (tr("Sensor"), s.serial),
+        (tr("Sensor"), c.sensor.serial),
         (tr("Calibration"), c.identity),
-        (tr("Model"), {"paper": tr("the paper's"), "full": tr("full")}.get(c.model, c.model)),
-        (tr("Made"), f"{p.created}, {p.operator}".rstrip(", ")),
+        (tr("Model"), models.get(c.model, c.model)),
+        (tr("Created"), f"{p.created}, {p.operator}".rstrip(", ")),
         (tr("Program"), f"GelPoLight Studio {p.program_version}"),
         (tr("Session"), tr("{name} ({n} files)").format(name=p.session, n=len(p.sources))),
-        (
-            tr("Elastomer"),
-            f"{s.elastomer_thickness_mm:g} mm, n {s.elastomer_refractive_index:g}",
-        ),
-        (tr("Window"), window),
-        (tr("LED height Z1"), f"{s.led_height_mm:g} mm"),
-        (tr("Working diameter"), f"{s.working_diameter_mm:g} mm"),
     ]
+    rows += in_place_facts(c) if isinstance(c, InPlaceCalibration) else _sensor_facts(c.sensor)
     rows += [
         (
-            tr("Changed by hand"),
-            f"{tr(edit.part)} ({', '.join(tr(c) for c in edit.channels)}), "
+            tr("Edited by hand"),
+            f"{label(edit.part)} ({', '.join(label(c) for c in edit.channels)}), "
             f"{edit.made}, {edit.operator}".rstrip(", "),
         )
         for edit in p.edits
@@ -248,15 +255,37 @@ def _head_facts(c: Calibration) -> tuple[tuple[str, str], ...]:
     return tuple(rows)
 
 
-def _not_validated() -> str:
+def _sensor_facts(s: SensorData) -> list[tuple[str, str]]:
+    window = (
+        tr("none")
+        if s.window_thickness_mm == 0.0
+        else f"{s.window_thickness_mm:g} mm, n {s.window_refractive_index:g}"
+    )
+    return [
+        (
+            tr("Elastomer"),
+            f"{s.elastomer_thickness_mm:g} mm, n {s.elastomer_refractive_index:g}",
+        ),
+        (tr("Window"), window),
+        (tr("LED height Z1"), f"{s.led_height_mm:g} mm"),
+        (tr("Working diameter"), f"{s.working_diameter_mm:g} mm"),
+    ]
+
+
+def _not_validated(c: AnyCalibration) -> str:
+    if isinstance(c, InPlaceCalibration):
+        return tr(
+            "Not validated: no object of known size was measured with this calibration. A wrong "
+            "ball radius or scale makes every result wrong, and no image can show this"
+        )
     return tr(
         "Not validated: no object of known size was measured with this calibration. A wrong ball "
-        "radius or square size scales every result, and no picture can tell"
+        "radius or square size scales every result, and no image can show this"
     )
 
 
 def validation_of(evaluation: Evaluation) -> Validation:
-    """Return what an evaluation on presses of known size says of a calibration.
+    """Return the validation of a calibration from an evaluation on presses of known size.
 
     Parameters
     ----------
@@ -285,7 +314,7 @@ def _validation_listing(evaluation: Evaluation) -> Listing:
     rows: list[tuple[str, ...]] = []
     for result in evaluation.results:
         truth, found = result.press.truth, result.measurement
-        row: tuple[str, ...] = (result.press.file, tr(truth.shape), f"{truth.size_mm:.3f}")
+        row: tuple[str, ...] = (result.press.file, label(truth.shape), f"{truth.size_mm:.3f}")
         if found is None:
             row += ("", "", f"{truth.height_mm:.3f}", "", "", result.failure)
         else:
@@ -295,11 +324,11 @@ def _validation_listing(evaluation: Evaluation) -> Listing:
                 f"{truth.height_mm:.3f}",
                 f"{found.height_mm:.3f} \N{PLUS-MINUS SIGN} {found.sd['height_mm']:.3f}",
                 f"{result.depth_percent:+.2f} %",
-                found.verdict if not found.reason else f"{found.verdict}: {found.reason}",
+                f"{label(found.verdict)}: {found.reason}" if found.reason else label(found.verdict),
             )
         rows.append(row)
     heads = (
-        tr("picture"),
+        tr("image"),
         tr("shape"),
         tr("size (mm)"),
         tr("measured"),

@@ -1,4 +1,4 @@
-"""Drawing of the crosstalk: which share of each LED's light the other channels see."""
+"""Drawing of the crosstalk: the share of each LED's light seen by the other channels."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from gelpolight_core.channels import channel_name
 from gelpolight_core.report.document import Drawing
-from gelpolight_core.report.drawing import FULL_MM, channel_name, draw
+from gelpolight_core.report.drawing import FULL_MM, draw
 from gelpolight_core.translation import tr
 
 HEIGHT_MM = 52.0
@@ -15,7 +16,7 @@ COLOURS = ("#c0392b", "#2e8b57", "#2c6fbb")
 
 
 def draw_crosstalk(crosstalk: NDArray[np.float64]) -> Drawing:
-    """Show the share of each LED's light that the other channels see.
+    """Show the share of each LED's light seen by the other channels.
 
     Parameters
     ----------

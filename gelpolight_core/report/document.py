@@ -1,4 +1,4 @@
-"""The report as plain values: what stands in it, not how it is laid out."""
+"""The report as plain values: its contents, without layout."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from gelpolight_core.translation import tr
 
 ROUNDING = 1e-12
 MARKS = {Verdict.PASS: "\N{CHECK MARK}", Verdict.WARN: "!", Verdict.FAIL: "\N{MULTIPLICATION X}"}
-"""A sign beside each verdict's word, so that colour is not the only carrier."""
+"""A symbol next to each verdict, so that it is not shown by colour alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One picture of the report.
+    """One drawing of the report.
 
     Attributes
     ----------
     caption : str
-        What it shows and how to read it.
+        What the drawing shows and how to read it.
     png : bytes
-        The picture.
+        The image.
     width_mm, height_mm : float
-        On paper.
+        Size on paper.
     """
 
     caption: str
@@ -35,12 +35,12 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """A table: a title, column heads and rows of text.
+    """A table: a title, column headings and rows of text.
 
     Attributes
     ----------
     title : str
-        Above the table; may be empty.
+        Title above the table; may be empty.
     heads : tuple of str
         One for each column.
     rows : tuple of tuple of str
@@ -48,7 +48,7 @@ class Listing:
     widths : tuple of float
         Relative widths of the columns on paper.
     fixed_width : bool
-        Whether the last column is set in a fixed-width face, as hashes are.
+        Whether the last column uses a fixed-width font, as for hashes.
     """
 
     title: str
@@ -59,19 +59,35 @@ class Listing:
 
 
 @dataclass(frozen=True, slots=True)
+class Parts:
+    """Drawings and tables of one stage.
+
+    Attributes
+    ----------
+    drawings : tuple of Drawing
+        Its results as drawings.
+    listings : tuple of Listing
+        Tables beside its quality.
+    """
+
+    drawings: tuple[Drawing, ...] = ()
+    listings: tuple[Listing, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Section:
     """One stage of the calibration.
 
     Attributes
     ----------
     key, title, intro : str
-        Name for links, heading, and what the stage does.
+        Name for links, heading, and a description of the stage.
     quality : QualityTable
         Its judged figures.
     facts : tuple of (label, value)
         Its results as numbers.
     drawings : tuple of Drawing
-        Its results as pictures.
+        Its results as drawings.
     listings : tuple of Listing
         Further tables.
     """
@@ -87,12 +103,12 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """Whether objects of known size were measured with the calibration.
+    """Validation of the calibration on objects of known size.
 
     Attributes
     ----------
     sentence : str
-        Whether, and how well; without a full stop.
+        The result as a sentence without a full stop.
     listing : Listing or None
         Each object.
     """
@@ -110,15 +126,15 @@ class Report:
     title : str
         Heading.
     verdict : Verdict
-        Of the calibration.
+        Verdict on the calibration.
     facts : tuple of (label, value)
         Sensor and provenance.
     validation : Validation
-        What is known from objects of known size.
+        Results on objects of known size.
     sections : tuple of Section
-        The stages in their order.
+        The stages in order.
     sources : Listing
-        Every file that it was made from, with its hash.
+        Every source file, with its hash.
     """
 
     title: str
@@ -131,14 +147,14 @@ class Report:
 
 def value_text(figure: Figure) -> str:
     """Return a figure's value with its unit."""
-    # What rounding leaves of a zero is a zero.
+    # Show a rounded negative zero as zero.
     value = 0.0 if abs(figure.value) < ROUNDING else figure.value
     number = f"{value:.4g}" if math.isfinite(value) else tr("not a number")
     return f"{number} {figure.unit}".rstrip()
 
 
 def limit_text(figure: Figure) -> str:
-    """Return where a figure's verdict turns; empty where it is only reported."""
+    """Return the limits of a figure; empty if it is only reported."""
     limits = [x for x in (figure.warn_limit, figure.fail_limit) if x is not None]
     if not limits:
         return ""

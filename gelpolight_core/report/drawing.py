@@ -1,4 +1,4 @@
-"""What all drawings of the report share: sizes, colours, pictures and maps in millimetres."""
+"""Common parts of all drawings of the report: sizes, colours, images and maps in millimetres."""
 
 from __future__ import annotations
 
@@ -15,20 +15,19 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gelpolight_core.export.drawing_thread import in_drawing_thread
+from gelpolight_core.channels import channel_name
+from gelpolight_core.drawing_thread import in_drawing_thread
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.report.document import Drawing
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 FULL_MM = 180.0
-"""The width between the margins of an A4 page."""
+"""Width between the margins of an A4 page."""
 DPI = 200
-CHANNELS = ("red", "green", "blue")
 COLOURS = ("#c62828", "#2e7d32", "#1f4fbf")
 MARKERS = ("o", "s", "^")
-"""A shape beside each channel's colour, for colour-blind readers and grey printers."""
+"""A marker shape for each channel, for colour-blind readers and grey printers."""
 ACCENT = "#e69f00"
 MAP_COLOURS = "cividis"
 _STYLE: dict[Any, Any] = {
@@ -43,7 +42,7 @@ _STYLE: dict[Any, Any] = {
     "ytick.labelsize": 7.0,
     "legend.fontsize": 7.0,
     "legend.frameon": False,
-    # Names of files may hold dollar signs.
+    # File names may contain dollar signs.
     "text.parse_math": False,
 }
 
@@ -52,7 +51,7 @@ _STYLE: dict[Any, Any] = {
 def draw(
     caption: str, height_mm: float, paint: Callable[[Figure], None], *, width_mm: float = FULL_MM
 ) -> Drawing:
-    """Return what `paint` draws on an empty figure of that size."""
+    """Return the drawing made by `paint` on an empty figure of the given size."""
     with rc_context(_STYLE):
         figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
         FigureCanvasAgg(figure)
@@ -63,20 +62,15 @@ def draw(
 
 
 def round_to_one_digit(value: float) -> float:
-    """Return a positive value with one digit that counts, for magnifications."""
+    """Return a positive value rounded to one significant digit, for magnifications."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(round(value / power), 1) * power
-
-
-def channel_name(channel: int) -> str:
-    """Return the channel's name for people."""
-    return tr(CHANNELS[channel])
 
 
 def show_picture(
     axes: Axes, rgb: Map, *, width_px: int = 900, extent: Sequence[float] = ()
 ) -> None:
-    """Show a linear picture with the screen's gamma, in its own pixel coordinates or `extent`."""
+    """Show a linear image with the screen's gamma, in its own pixel coordinates or `extent`."""
     rows, columns = rgb.shape[:2]
     shown = rgb
     if columns > width_px:
@@ -94,7 +88,7 @@ def show_picture(
 
 
 def grid_extent(grid: MembraneGrid) -> tuple[float, float, float, float]:
-    """Return a map's edges in mm as matplotlib wants them; y grows downward, as in the picture."""
+    """Return a map's edges in mm for matplotlib; y increases downwards, as in the image."""
     half = 0.5 * grid.pitch_mm
     x, y = grid.x_mm, grid.y_mm
     return float(x[0] - half), float(x[-1] + half), float(y[-1] + half), float(y[0] - half)
@@ -103,7 +97,7 @@ def grid_extent(grid: MembraneGrid) -> tuple[float, float, float, float]:
 def three_maps(
     figure: Figure, maps: Map, known: NDArray[np.bool_], grid: MembraneGrid, label: str
 ) -> Sequence[Axes]:
-    """Show one map per channel with one common scale, robust against specks; return their axes."""
+    """Show one map per channel with a common scale, robust against specks; return their axes."""
     shown = np.where(known[..., None], maps, np.nan)
     low, high = np.nanpercentile(shown, [0.5, 99.5]) if known.any() else (0.0, 1.0)
     step = max(maps.shape[1] // 420, 1)

@@ -1,11 +1,11 @@
-"""The evaluation as a document: the paper's Fig. 13, the gauge's repeatability, every press."""
+"""The evaluation as a document: the paper's Fig. 13, repeatability of the gauge, every press."""
 
 from __future__ import annotations
 
 import io
 import math
 
-from gelpolight_core.export.drawing_thread import in_drawing_thread
+from gelpolight_core.drawing_thread import in_drawing_thread
 from gelpolight_core.measurement.evaluation import (
     ALL,
     DIRECTIONS,
@@ -19,6 +19,7 @@ from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.report.document import Drawing, Listing, Report, Section, Validation
 from gelpolight_core.report.drawing import DPI, FULL_MM
+from gelpolight_core.report.labels import label
 from gelpolight_core.translation import tr
 
 PLUS_MINUS = "\N{PLUS-MINUS SIGN}"
@@ -38,7 +39,7 @@ def evaluation_document(
     evaluation : Evaluation
         Presses compared with their truth.
     facts : tuple of (label, value), optional
-        Sensor, calibration and whatever else is to stand at its head.
+        Sensor, calibration and other facts for the head of the report.
     limits_percent : (float, float), optional
         Largest mean absolute errors, planar and in depth, for it to pass.
     """
@@ -51,8 +52,8 @@ def evaluation_document(
             "errors",
             tr("Errors by size and height"),
             tr(
-                "As in the paper's Fig. 13: planar errors are those of diameters and sides, depth "
-                "errors those of heights"
+                "As in the paper's Fig. 13: planar errors are errors of diameters and sides, "
+                "depth errors are errors of heights"
             ),
             errors,
             drawings=(_drawing(evaluation),),
@@ -73,9 +74,9 @@ def evaluation_document(
 
 
 def _judged(evaluation: Evaluation, direction: str, limits: dict[str, float]) -> tuple[Figure, ...]:
-    name = {"planar": tr("planar"), "depth": tr("depth")}[direction]
+    name = label(direction)
     if not evaluation.series(direction):
-        return ()  # no press was made yet that says something of this direction
+        return ()  # there is no press for this direction yet
     found = [
         judge(
             f"{direction}_mean",
@@ -83,18 +84,19 @@ def _judged(evaluation: Evaluation, direction: str, limits: dict[str, float]) ->
             evaluation.overall(direction).mean_absolute_percent,
             "%",
             fail=limits[direction],
-            advice=tr("Calibrate again, or look at the presses that are worst"),
+            advice=tr("Calibrate again, or check the worst presses"),
         )
     ]
     for group in evaluation.groups:
         overall = group.shape == ALL and group.dimension_mm is None and group.regions != ALL
         mean = group.statistic.mean_absolute_percent
         if group.direction == direction and overall and math.isfinite(mean):
-            label = tr("Mean absolute error, {direction}, {regions}")
             found.append(
                 judge(
                     f"{direction}_{group.regions.replace(' ', '_')}",
-                    label.format(direction=name, regions=tr(group.regions)),
+                    tr("Mean absolute error, {direction}, {regions}").format(
+                        direction=name, regions=label(group.regions)
+                    ),
                     mean,
                     "%",
                 )
@@ -110,7 +112,7 @@ def _drawing(evaluation: Evaluation) -> Drawing:
     figure.savefig(stream, format="png", dpi=DPI * FULL_MM / 25.4 / width)
     caption = tr(
         "Absolute errors: bars are means, whiskers one standard deviation, dots the presses; the "
-        "dashed line is the mean that the paper reports"
+        "dashed line is the mean reported in the paper"
     )
     return Drawing(caption, stream.getvalue(), FULL_MM, FULL_MM * float(height / width))
 
@@ -118,9 +120,9 @@ def _drawing(evaluation: Evaluation) -> Drawing:
 def _groups(evaluation: Evaluation) -> Listing:
     rows = tuple(
         (
-            tr(g.regions),
-            tr(g.direction),
-            tr(g.shape),
+            label(g.regions),
+            label(g.direction),
+            label(g.shape),
             "" if g.dimension_mm is None else f"{g.dimension_mm:g}",
             str(g.statistic.count),
             _percent(g.statistic.mean_absolute_percent),
@@ -153,8 +155,8 @@ def _gauge_section(evaluation: Evaluation, gauge: tuple[GaugeRow, ...]) -> Secti
         "gauge",
         tr("Repeatability of the gauge"),
         tr(
-            "Repeatability is the standard deviation of presses in one region; reproducibility is "
-            "what other regions add to it"
+            "Repeatability is the standard deviation of presses in one region; reproducibility "
+            "is the additional scatter between regions"
         ),
         QualityTable(()),
         facts,
@@ -186,8 +188,8 @@ def gauge_listing(gauge: tuple[GaugeRow, ...]) -> Listing:
     """
     rows = tuple(
         (
-            tr(row.direction),
-            tr(row.truth.shape),
+            label(row.direction),
+            label(row.truth.shape),
             f"{row.true_mm:g}",
             str(row.same.count),
             _millimetres(row.same.mean_mm),
@@ -217,7 +219,7 @@ def gauge_listing(gauge: tuple[GaugeRow, ...]) -> Listing:
 
 def _presses(evaluation: Evaluation) -> Listing:
     heads = (
-        tr("picture"),
+        tr("image"),
         tr("size (mm)"),
         tr("measured"),
         tr("error"),
@@ -243,7 +245,7 @@ def _press_row(result: PressResult) -> tuple[str, ...]:
         height,
         f"{found.height_mm:.3f} {PLUS_MINUS} {found.sd['height_mm']:.3f}",
         f"{result.depth_percent:+.2f} %",
-        f"{tr(found.verdict)}: {found.reason}" if found.reason else tr(found.verdict),
+        f"{label(found.verdict)}: {found.reason}" if found.reason else label(found.verdict),
     )
 
 

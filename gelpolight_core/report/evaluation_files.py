@@ -7,11 +7,11 @@ import io
 import math
 from pathlib import Path
 
-from gelpolight_core.calibration.calibration import Calibration
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.evaluation import PAPER_PERCENT, Evaluation
 from gelpolight_core.measurement.evaluation_report import write_evaluation
 from gelpolight_core.measurement.gauge import GaugeRow, gauge_rows
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration
 from gelpolight_core.report.evaluation_document import evaluation_document
 from gelpolight_core.report.file import write_report
 from gelpolight_core.translation import tr
@@ -35,7 +35,7 @@ def write_evaluation_files(
     evaluation: Evaluation,
     folder: Path,
     *,
-    calibration: Calibration | None = None,
+    calibration: AnyCalibration | None = None,
     limits_percent: tuple[float, float] = (PAPER_PERCENT["planar"], PAPER_PERCENT["depth"]),
 ) -> tuple[Path, ...]:
     """Write ``evaluation.txt``, ``.csv``, ``.json``, ``.png``, ``.html``, ``.pdf`` and a gauge CSV.
@@ -45,7 +45,7 @@ def write_evaluation_files(
     evaluation : Evaluation
         Presses compared with their truth.
     folder : Path
-        Where to; it must exist.
+        Destination; it must exist.
     calibration : Calibration, optional
         Named in the report.
     limits_percent : (float, float), optional
@@ -54,12 +54,12 @@ def write_evaluation_files(
     Returns
     -------
     tuple of Path
-        What was written; ``gauge.csv`` only where presses have regions.
+        The files written; ``gauge.csv`` only if presses have regions.
 
     Raises
     ------
     InputError
-        A file cannot be written.
+        If a file cannot be written.
     """
     written = list(write_evaluation(evaluation, folder))
     document = evaluation_document(
@@ -78,15 +78,15 @@ def write_evaluation_files(
     return tuple(written)
 
 
-def calibration_facts(calibration: Calibration | None) -> tuple[tuple[str, str], ...]:
-    """Return what stands of a calibration at the head of a report."""
+def calibration_facts(calibration: AnyCalibration | None) -> tuple[tuple[str, str], ...]:
+    """Return the facts about a calibration for the head of a report."""
     if calibration is None:
         return ()
     made = calibration.provenance
     return (
         (tr("Sensor"), calibration.sensor.serial),
         (tr("Calibration"), calibration.identity),
-        (tr("Made"), f"{made.created}, {made.operator}".rstrip(", ")),
+        (tr("Created"), f"{made.created}, {made.operator}".rstrip(", ")),
         (tr("Program"), f"GelPoLight Studio {made.program_version}"),
     )
 

@@ -1,11 +1,11 @@
-"""The report's file: HTML or PDF by its name's ending, whole or not at all."""
+"""The report file: HTML or PDF depending on its extension, written completely or not at all."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.html import report_html
 from gelpolight_core.report.pdf import report_pdf
@@ -15,7 +15,7 @@ ENDINGS = (".html", ".pdf")
 
 
 def refuse_other_endings(path: Path) -> None:
-    """Refuse a report's name that ends neither in .html nor in .pdf.
+    """Refuse a report name that ends in neither .html nor .pdf.
 
     Raises
     ------
@@ -24,9 +24,9 @@ def refuse_other_endings(path: Path) -> None:
     """
     if path.suffix.lower() not in ENDINGS:
         raise InputError(
-            tr("a report is written as HTML or PDF"),
+            tr("A report can only be written as HTML or PDF"),
             where=str(path),
-            advice=tr("Let the file's name end in .html or .pdf"),
+            advice=tr("Use a file name that ends in .html or .pdf"),
         )
 
 
@@ -36,14 +36,14 @@ def write_report(report: Report, path: Path) -> None:
     Parameters
     ----------
     report : Report
-        What it says.
+        The report.
     path : Path
         Ending in ``.html`` or ``.pdf``.
 
     Raises
     ------
     InputError
-        If the name ends otherwise, or the file cannot be written.
+        If the name has another extension, or the file cannot be written.
     """
     refuse_other_endings(path)
     content = report_pdf(report) if path.suffix.lower() == ".pdf" else report_html(report).encode()

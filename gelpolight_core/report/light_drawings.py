@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Ellipse
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.channels import channel_name
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.report.document import Drawing
@@ -17,29 +17,29 @@ from gelpolight_core.report.drawing import (
     MARKERS,
     Array,
     Map,
-    channel_name,
     draw,
     round_to_one_digit,
     show_picture,
     three_maps,
 )
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.translation import tr
 
 LEAST_CROP_PX = 6
 ELLIPSE_MM = 2.0
 FAINT = 0.4
-"""The mirror picture is dark by purpose: shown brighter, so that glints can be seen too."""
+"""The mirror image is dark on purpose: it is shown brighter, so that glints are visible too."""
 
 
 def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
-    """Show the mirror picture with the three LEDs' spots, what was rejected, and the spots near.
+    """Show the mirror image with the spots of the three LEDs, rejected spots, and close-ups.
 
     Parameters
     ----------
     spots : MirrorSpots
-        What was found.
+        The detected spots.
     picture : (rows, columns, 3) float32
-        The mirror picture.
+        The mirror image.
     """
     reach = 0.035 * picture.shape[1]
 
@@ -61,9 +61,11 @@ def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
             whole.plot(*spot.centre_px, "x", color="0.75", markersize=6)
             whole.annotate(f" {number}", spot.centre_px, color="0.75", fontsize=7)
 
-    caption = tr("The mirror picture with the LEDs' spots, and each spot near with its centroid")
+    caption = tr(
+        "The mirror image with the LED spots, and a close-up of each spot with its centroid"
+    )
     if spots.rejected:
-        caption += "; " + tr("grey crosses are glints that were rejected (table below)")
+        caption += "; " + tr("grey crosses are rejected glints (table below)")
     return draw(caption, 80.0, paint)
 
 
@@ -94,7 +96,7 @@ def draw_led_plan(calibration: Calibration, bright_points_mm: Array | None = Non
     calibration : Calibration
         LEDs, covariance and the working area.
     bright_points_mm : (3, 2) or (3, 3), optional
-        Where the mirror reflected each LED, where it is known.
+        Points on the mirror that reflected each LED, if known.
     """
     covariance = calibration.led_covariance_mm2
     largest = float(np.sqrt(np.linalg.eigvalsh(covariance[:, :2, :2]).max()))
@@ -108,8 +110,9 @@ def draw_led_plan(calibration: Calibration, bright_points_mm: Array | None = Non
 
     return draw(
         tr(
-            "LED positions in the sensor frame (x and y as in the picture). Ellipses: one standard "
-            "deviation, drawn {factor:.0f} times as large; bars: one standard deviation"
+            "LED positions in the sensor frame (x and y as in the image). Ellipses: one "
+            "standard deviation, drawn {factor:.0f} times as large; bars: one standard "
+            "deviation"
         ).format(factor=factor),
         80.0,
         paint,
@@ -127,7 +130,7 @@ def _draw_plan(
         levels=[0.5, 1.5],
         colors=["0.88"],
     )
-    axes.plot([], [], "s", color="0.85", label=tr("seen membrane"))
+    axes.plot([], [], "s", color="0.85", label=tr("visible membrane"))
     axes.add_patch(
         Circle((0, 0), calibration.sensor.working_diameter_mm / 2, fill=False, color="0.6", ls="--")
     )
@@ -188,7 +191,7 @@ def _sd_ellipse(centre: Array, covariance: Array, channel: int) -> Ellipse:
 
 
 def draw_led_moves(calibration: Calibration) -> Drawing:
-    """Show where the joint refinement moved the LEDs, against the mirror's uncertainty.
+    """Show how the joint refinement moved the LEDs, compared with the uncertainty of the mirror.
 
     Parameters
     ----------
@@ -218,8 +221,8 @@ def draw_led_moves(calibration: Calibration) -> Drawing:
             )
             axes.set(xlim=(-reach, reach), ylim=(reach, -reach), aspect="equal")
             axes.set_title(tr("{name} LED").format(name=channel_name(k)), color=COLOURS[k])
-            axes.set_xlabel(tr("moved in x (mm)"))
-        plans[0].set_ylabel(tr("moved in y (mm)"))
+            axes.set_xlabel(tr("shift in x (mm)"))
+        plans[0].set_ylabel(tr("shift in y (mm)"))
         for k in range(3):
             before, after = k - 0.15, k + 0.15
             heights.set_xlim(-0.6, 2.6)
@@ -239,8 +242,8 @@ def draw_led_moves(calibration: Calibration) -> Drawing:
 
     return draw(
         tr(
-            "LEDs before the joint refinement (grey crosses, with the mirror's standard deviation) "
-            "and after it (coloured)"
+            "LEDs before the joint refinement (grey crosses, with the standard deviation from "
+            "the mirror) and after it (coloured)"
         ),
         52.0,
         paint,
@@ -248,7 +251,7 @@ def draw_led_moves(calibration: Calibration) -> Drawing:
 
 
 def draw_radiance(calibration: Calibration, result: RadianceResult | None = None) -> Drawing:
-    """Show the light intensity of each LED, and what was filled in where a run tells.
+    """Show the light intensity of each LED and, for a run, the filled areas.
 
     Parameters
     ----------
@@ -262,7 +265,9 @@ def draw_radiance(calibration: Calibration, result: RadianceResult | None = None
     filled = None
     if result is not None and (result.saturated | result.dust).any():
         filled = result.saturated | result.dust
-        caption += tr("; outlined in white: saturated or dusty places, filled from around")
+        caption += tr(
+            "; outlined in white: saturated or dusty areas, filled from their surroundings"
+        )
 
     def paint(figure: Figure) -> None:
         panels = three_maps(
@@ -298,8 +303,9 @@ def draw_factors(calibration: Calibration) -> Drawing:
     factors = calibration.factors
     return draw(
         tr(
-            "Reflectance factor of the bare membrane (Eq. 9): 1 is as bright as theory says. Dark "
-            "specks are dirt or holes; a slope from side to side would be light that has moved"
+            "Reflectance factor of the bare membrane (Eq. 9): 1 means as bright as predicted. "
+            "Dark specks are dirt or holes; a slope from one side to the other indicates that a "
+            "light has moved"
         ),
         62.0,
         lambda figure: _paint_factors(figure, factors, calibration),

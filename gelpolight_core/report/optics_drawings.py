@@ -1,4 +1,4 @@
-"""Drawings of the lens and of the top surface: pictures with corners, residuals, coverage."""
+"""Drawings of the lens and the top surface: images with corners, residuals, coverage."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ VIEWS_ACROSS = 4
 
 
 def draw_lens_views(result: LensResult, pictures: Mapping[str, Map]) -> Drawing:
-    """Show every checkerboard picture with its corners, the ones left out with the reason.
+    """Show every checkerboard image with its corners; those left out are marked.
 
     Parameters
     ----------
     result : LensResult
         The lens.
     pictures : mapping
-        The stage's pictures by name.
+        The stage's images by name.
     """
     views = result.views
     rows = math.ceil(len(views) / VIEWS_ACROSS)
@@ -50,7 +50,7 @@ def draw_lens_views(result: LensResult, pictures: Mapping[str, Map]) -> Drawing:
 
     height = min(rows * FULL_MM / VIEWS_ACROSS * 0.86, 230.0)
     return draw(
-        tr("Checkerboard views with the corners found; views that were left out have a red cross"),
+        tr("Checkerboard views with the detected corners; views left out have a red cross"),
         height,
         paint,
     )
@@ -74,7 +74,7 @@ def _draw_view(axes: Axes, view: LensView, picture: Map) -> None:
 
 
 def draw_lens_residuals(result: LensResult) -> Drawing:
-    """Show where the corners were seen, how many per part, and what each was off by."""
+    """Show where corners were found, how many per part, and their residuals."""
     camera = result.camera
     used = [v for v in result.views if v.used and v.board is not None]
     corners = np.concatenate([v.board.corners_px for v in used if v.board is not None])
@@ -92,7 +92,9 @@ def draw_lens_residuals(result: LensResult) -> Drawing:
         )
         factor = _draw_arrows(left, corners, off, 0.03 * camera.width)
         left.set_title(
-            tr("Residuals, {factor:.0f} times, over corners per part").format(factor=factor)
+            tr("Residuals, {factor:.0f} times enlarged, over corners per part").format(
+                factor=factor
+            )
         )
         left.set_xlabel("u (px)")
         left.set_ylabel("v (px)")
@@ -103,13 +105,14 @@ def draw_lens_residuals(result: LensResult) -> Drawing:
         right.axvline(0.0, color="0.7", linewidth=0.6)
         right.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
         right.set_title(tr("All residuals"))
-        right.set_xlabel(tr("across (px)"))
-        right.set_ylabel(tr("down (px)"))
+        right.set_xlabel(tr("horizontal (px)"))
+        right.set_ylabel(tr("vertical (px)"))
 
     return draw(
         tr(
-            "Residuals of the fit. Arrows that point alike in one part of the picture, or a ring "
-            "on the right, would mean that the lens model does not fit; white parts were not seen"
+            "Residuals of the fit. Arrows with a common direction in one part of the image, or a "
+            "ring in the right plot, would mean that the lens model does not fit; white parts "
+            "contain no corners"
         ),
         74.0,
         paint,
@@ -135,14 +138,14 @@ def _draw_arrows(axes: Axes, at: Array, off: Array, length_px: float) -> float:
 
 
 def draw_top_pose(result: TopPoseResult, pictures: Mapping[str, Map]) -> tuple[Drawing, ...]:
-    """Show each used picture of the board on the top surface, with corners and residuals.
+    """Show each used image of the board on the top surface, with corners and residuals.
 
     Parameters
     ----------
     result : TopPoseResult
         The top surface.
     pictures : mapping
-        The stage's pictures by name.
+        The stage's images by name.
     """
     return tuple(
         _draw_pose(view, pictures[view.name], result)
@@ -165,7 +168,7 @@ def _draw_pose(view: TopPoseView, picture: Map, result: TopPoseResult) -> Drawin
         right.set_aspect("equal")
         right.invert_yaxis()
         right.set_title(
-            tr("Residuals, {factor:.0f} times; RMS {rms:.3f} px").format(
+            tr("Residuals, {factor:.0f} times enlarged; RMS {rms:.3f} px").format(
                 factor=factor,
                 rms=view.pose.rms_px,  # type: ignore[union-attr]
             )

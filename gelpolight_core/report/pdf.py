@@ -15,7 +15,7 @@ from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
-from gelpolight_core.export.drawing_thread import in_drawing_thread
+from gelpolight_core.drawing_thread import in_drawing_thread
 from gelpolight_core.quality import QualityTable, Verdict, verdict_word
 from gelpolight_core.report.document import (
     MARKS,
@@ -42,7 +42,7 @@ _STYLE: dict[Any, Any] = {"text.parse_math": False, "pdf.fonttype": 42}
 
 
 class _Pages:
-    """Writes from the top of a page downward, and turns it when it is full."""
+    """Writes pages from top to bottom, and begins a new page when one is full."""
 
     def __init__(self, stream: io.BytesIO, title: str) -> None:
         information = {"Title": title, "Creator": "GelPoLight Studio", "CreationDate": None}
@@ -66,7 +66,7 @@ class _Pages:
         self._begin()
 
     def need(self, height_mm: float) -> None:
-        """Turn the page unless that much is left on it."""
+        """Begin a new page unless the given height is left on this one."""
         if self.y_mm + height_mm > BOTTOM_MM and self.y_mm > MARGIN_MM:
             self.turn()
 
@@ -87,7 +87,7 @@ class _Pages:
         end: bool = False,
         family: str = PLAIN,
     ) -> None:
-        """Set one line with its top at `y_mm`; with `end`, it ends at `x_mm`."""
+        """Write one line with its top at `y_mm`; with `end`, it ends at `x_mm`."""
         self._figure.text(
             x_mm / PAGE_MM[0],
             1.0 - (y_mm + size * POINT_MM) / PAGE_MM[1],
@@ -127,7 +127,7 @@ class _Pages:
     def lines(
         self, lines: Sequence[str], *, size: float = 8.5, colour: str = DARK, bold: bool = False
     ) -> None:
-        """Set lines at the left margin, and go on below them."""
+        """Write lines at the left margin, and move below them."""
         for line in lines:
             self.need(size * POINT_MM * LINE)
             self.text(MARGIN_MM, self.y_mm, line, size=size, colour=colour, bold=bold)
@@ -135,7 +135,7 @@ class _Pages:
 
 
 def wrap(text: str, width_mm: float, size: float, *, family: str = PLAIN) -> list[str]:
-    """Break text into lines of at most that width; a word that is too long is broken too."""
+    """Break text into lines of limited width; a word that is too long is broken too."""
     lines = [""]
     for word in printable(text).split(" "):
         longer = f"{lines[-1]} {word}".strip()
@@ -152,7 +152,7 @@ def wrap(text: str, width_mm: float, size: float, *, family: str = PLAIN) -> lis
 
 
 def line_width_mm(text: str, size: float, family: str = PLAIN) -> float:
-    """Return how wide a line is."""
+    """Return the width of a line."""
     font = FontProperties(family=family, size=size)
     width, _, _ = text_to_path.get_text_width_height_descent(text or " ", font, ismath=False)
     return float(width) * POINT_MM
@@ -197,7 +197,7 @@ def _table(
     colours: Sequence[Sequence[str]] = (),
     last_fixed: bool = False,
 ) -> None:
-    """Set a table whose cells wrap; the heads are repeated on each page."""
+    """Write a table whose cells wrap; the headings are repeated on each page."""
     shares = np.asarray(widths, np.float64) / float(np.sum(widths))
     starts = MARGIN_MM + WIDTH_MM * np.concatenate([[0.0], np.cumsum(shares)[:-1]])
     step = size * POINT_MM * LINE
@@ -207,7 +207,7 @@ def _table(
         for k, cell in enumerate(cells):
             fixed = last_fixed and not bold and k == len(cells) - 1
             family = FIXED if fixed else PLAIN
-            # A bold face is wider than the one that is measured.
+            # Bold text is wider than the text that is measured.
             room = (WIDTH_MM * shares[k] - 2.0) * (0.9 if bold else 1.0)
             columns.append((wrap(cell, float(room), size, family=family), family))
         height = step * max(len(lines) for lines, _ in columns) + 1.4

@@ -1,30 +1,40 @@
-"""What the report says of each stage in words and numbers, from the calibration alone."""
+"""Descriptions and numbers of each stage for the report, from the calibration alone."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gelpolight_core.calibration.calibration import Calibration, FullModel
-from gelpolight_core.report.drawing import CHANNELS
+from gelpolight_core.channels import channel_name
+from gelpolight_core.report.labels import label
+from gelpolight_core.sensor_calibration import Calibration, FullModel
 from gelpolight_core.translation import tr
 
 Facts = tuple[tuple[str, str], ...]
-INTROS = {
-    "lens": "Checkerboard views at several tilts give focal length, principal point and distortion",
-    "top_pose": "A checkerboard on the top surface says where that surface is",
-    "lights": "A mirror on the top surface shows each LED; the ray back gives its position",
-    "response": "One scene at several exposures shows how the camera's numbers follow the light",
-    "crosstalk": "Each LED's light is seen by the other channels too; that share is taken away",
-    "radiance": "A white diffuse board measures the light that each LED sends to the membrane",
-    "reflectance": "Balls of known radius show the membrane at known angles to the light",
-    "factors": "The bare membrane against theory: where it reflects more or less than on average",
-    "joint": "LEDs, membrane and balls are fitted together to what all ball presses show",
-}
 
 
 def stage_intro(key: str) -> str:
-    """Return what a stage does, as a clause without a full stop."""
-    return tr(INTROS[key]) if key in INTROS else ""
+    """Return the description of a stage, as a sentence without a full stop."""
+    intros = {
+        "lens": tr("Finds focal length, principal point and distortion from tilted checkerboards"),
+        "top_pose": tr("Finds the top surface from a checkerboard that lies on it"),
+        "lights": tr("Finds the LED positions from their reflections in a mirror"),
+        "response": tr("Measures how pixel values depend on light, from several exposures"),
+        "crosstalk": tr("Removes the light of each LED that the other channels see"),
+        "radiance": tr("Measures the light of each LED on the membrane with a white diffuse board"),
+        "reflectance": tr("Measures the reflectance of the membrane with balls of known radius"),
+        "factors": tr(
+            "Compares the brightness of the bare membrane with the theory, pixel by pixel"
+        ),
+        "joint": tr("Fits LEDs, membrane and balls together to all ball presses"),
+        "scale": tr("Size of a camera pixel on the membrane, stated or measured"),
+        "balls": tr("Finds the pressed balls, whose slopes are known"),
+        "in_place": tr(
+            "Fits slope as a function of the change of colour and of the place. Each press is "
+            "compared with what the other presses give"
+        ),
+        "gel": tr("Keeps the slopes of an earlier gel with the background of this one"),
+    }
+    return intros.get(key, "")
 
 
 def stage_facts(c: Calibration, key: str) -> Facts:
@@ -46,7 +56,7 @@ def stage_facts(c: Calibration, key: str) -> Facts:
 def _lens_facts(c: Calibration) -> Facts:
     camera = c.camera
     return (
-        (tr("Picture"), f"{camera.width} \N{MULTIPLICATION SIGN} {camera.height} px"),
+        (tr("Image"), f"{camera.width} \N{MULTIPLICATION SIGN} {camera.height} px"),
         (tr("Focal length fx, fy"), f"{camera.fx:.2f}, {camera.fy:.2f} px"),
         (tr("Principal point cx, cy"), f"{camera.cx:.2f}, {camera.cy:.2f} px"),
         (
@@ -75,17 +85,17 @@ def _plane_facts(c: Calibration) -> Facts:
 def _led_facts(leds_mm: np.ndarray, sd_mm: np.ndarray) -> Facts:
     return tuple(
         (
-            tr("{name} LED x, y, z").format(name=tr(name).capitalize()),
+            tr("{name} LED x, y, z").format(name=channel_name(k).capitalize()),
             ", ".join(f"{x:.3f} \N{PLUS-MINUS SIGN} {s:.3f}" for x, s in zip(led, sd, strict=True))
             + " mm",
         )
-        for name, led, sd in zip(CHANNELS, leds_mm, sd_mm, strict=True)
+        for k, (led, sd) in enumerate(zip(leds_mm, sd_mm, strict=True))
     )
 
 
 def _crosstalk_facts(c: Calibration) -> Facts:
     off = c.crosstalk[~np.eye(3, dtype=bool)]
-    return ((tr("Crosstalk between channels, most"), f"{100.0 * float(off.max()):.1f} %"),)
+    return ((tr("Largest crosstalk between channels"), f"{100.0 * float(off.max()):.1f} %"),)
 
 
 def _joint_facts(c: Calibration) -> Facts:
@@ -96,34 +106,34 @@ def _joint_facts(c: Calibration) -> Facts:
         *_led_facts(c.full.led_positions_mm, c.full.led_sd_mm),
         *_loss_facts(c.full),
         (
-            tr("Membrane ({form})").format(form=tr(c.full.membrane_kept)),
-            tr(
-                "gloss {gloss:.3f}, roughness {roughness:.3f}, light from around {bounce:.3f}"
-            ).format(gloss=m.gloss, roughness=m.roughness, bounce=m.bounce),
+            tr("Membrane ({form})").format(form=label(c.full.membrane_kept)),
+            tr("gloss {gloss:.3f}, roughness {roughness:.3f}, interreflection {bounce:.3f}").format(
+                gloss=m.gloss, roughness=m.roughness, bounce=m.bounce
+            ),
         ),
     )
 
 
 def _kept_facts(full: FullModel) -> Facts:
     kept = {
-        "refined": tr("the refined ones: they explain held-out presses better"),
-        "mirror": tr("the mirror's: refining them did not help on held-out presses"),
+        "refined": tr("refined: they fit held-out presses better"),
+        "mirror": tr("from the mirror: refinement did not improve held-out presses"),
     }.get(full.kept, full.kept)
     if full.kept == "mirror" and not _held_out(full):
-        kept = tr("the mirror's: there were too few presses to hold any out")
-    return ((tr("LEDs that are used"), kept),)
+        kept = tr("from the mirror: there were too few presses to hold any out")
+    return ((tr("LEDs used"), kept),)
 
 
 def _loss_facts(full: FullModel) -> Facts:
     if not _held_out(full):
         return ()
     before, after = full.held_out
-    text = tr("{before:.3g} with the mirror's LEDs, {after:.3g} refined")
+    text = tr("{before:.3g} with the LEDs from the mirror, {after:.3g} refined")
     return ((tr("Loss on held-out presses"), text.format(before=before, after=after)),)
 
 
 def _held_out(full: FullModel) -> bool:
-    """Return whether presses were held out: without any, no loss was measured."""
+    """Return whether presses were held out; otherwise no loss was measured."""
     return full.held_out[0] > 0.0
 
 

@@ -1,4 +1,4 @@
-"""What the face of the pages and drawings can show."""
+"""Replace characters that the font of pages and drawings does not have."""
 
 from __future__ import annotations
 
@@ -19,6 +19,6 @@ def _characters() -> frozenset[int]:
 
 
 def printable(text: str) -> str:
-    """Return text on one line, a white square for every character that the face does not have."""
+    """Return text on one line, with a white square for every character that the font lacks."""
     shown = " ".join(text.split())
     return "".join(c if ord(c) in _characters() else "\N{WHITE SQUARE}" for c in shown)

@@ -1,1 +1,1 @@
-"""The camera's response: from the numbers it delivers to linear light."""
+"""The camera response: from pixel values to linear light."""

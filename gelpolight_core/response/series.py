@@ -1,9 +1,9 @@
-"""Fit a camera's inverse response to pictures of one still scene at different exposures.
+"""Fit a camera's inverse response to images of one still scene at different exposures.
 
-The local exponent d(ln light)/d(ln value) is a broken line over the value: 1 everywhere for a
-linear camera, 2.2 everywhere for a gamma of 2.2. Its integral is linear in its corners, rises as
-long as they are positive, and the light of each place in the scene drops out in closed form, so
-that the fit is one small bounded least-squares problem per channel.
+The local exponent d(ln light)/d(ln value) is a piecewise linear function of the value: 1 everywhere
+for a linear camera, 2.2 everywhere for a gamma of 2.2. Its integral is linear in the corner values
+and increases as long as they are positive. The light of each point in the scene is eliminated in
+closed form, so the fit is one small bounded least-squares problem per channel.
 """
 
 from __future__ import annotations
@@ -12,30 +12,31 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 from scipy.optimize import lsq_linear
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Dense where numbers are small, as the eye's and most cameras' curves bend there.
+# Denser at small values, where most camera curves bend.
 CORNERS = (np.arange(1, 13) / 12.0) ** 2
+_PLACES = np.log(CORNERS)
+_GAPS = np.diff(_PLACES)
 LEAST_EXPONENT, LARGEST_EXPONENT = 0.05, 20.0
-# From corner to corner sRGB's exponent changes by 0.1 on average and 0.4 at most; where nothing is
-# seen, the exponent is expected to change by this.
+# From corner to corner the exponent of sRGB changes by 0.1 on average and by 0.4 at most; without
+# data, the exponent is expected to change by this.
 EXPONENT_STEP = 0.2
-# About 1, far wider than any camera's, so that pictures that say nothing leave it there.
+# About 1 and far wider than for any camera, so that images without information leave it there.
 EXPONENT_SD = 10.0
 # Shutters and lamps repeat to about this share of the light.
 REPEATABILITY = 0.003
 BLOCKS = 1200
-# A block in which values differ by more holds an edge, or is mostly noise: bent noise is no longer
-# centred on the bent value (0.15 % off at this limit and a gamma of 2.2).
+# A block with a larger spread of values contains an edge or mostly noise. Noise that passed through
+# a curve is no longer centred (0.15 % off at this limit and a gamma of 2.2).
 LARGEST_SPREAD = 0.05
-# Noise of 0.28 steps, 0.4 with the rounding itself, leaves a mean wrong by up to 0.07 steps.
+# With noise of 0.28 steps (0.4 with the rounding itself) the mean is wrong by up to 0.07 steps.
 DITHER = 0.4
 ROUNDS = 10
-# Before the curve has found its shape, whole pictures would look like outliers.
+# Before the curve has found its shape, whole images would look like outliers.
 ROUNDS_OF_ALL = 4
 TUKEY = 4.7
 
@@ -51,9 +52,9 @@ class Series:
     noise : (pictures, blocks)
         Standard deviation of ln(value) from the pixels' noise and rounding.
     usable : (pictures, blocks) bool
-        Neither dark nor saturated nor uneven, and so in two pictures at least.
+        Neither dark nor saturated nor uneven, in at least two images.
     log_time : (pictures,)
-        Logarithm of the exposure times.
+        Natural logarithm of the exposure times.
     """
 
     value: Array
@@ -62,7 +63,7 @@ class Series:
     log_time: Array
 
     def without(self, picture: int) -> Series:
-        """Return the series without one of its pictures."""
+        """Return the series without one of its images."""
         keep = np.arange(len(self.log_time)) != picture
         return Series(
             self.value[keep], self.noise[keep], _paired(self.usable[keep]), self.log_time[keep]
@@ -70,7 +71,7 @@ class Series:
 
     @property
     def covered(self) -> tuple[float, float]:
-        """Lowest and highest encoded value that has data (all but one block in 200)."""
+        """Lowest and highest encoded value with data (for all but one block in 200)."""
         low, high = np.quantile(self.value[self.usable], [0.005, 0.995])
         return float(low), float(high)
 
@@ -85,7 +86,7 @@ def gather_series(channel: NDArray[np.float32], times_ms: Array, *, step: float)
     times_ms : (pictures,)
         Exposure times.
     step : float
-        To which the values are rounded.
+        Rounding step of the values.
     """
     count, rows, columns = channel.shape
     side = 2 * max(1, round(np.sqrt(rows * columns / BLOCKS) / 2.0))
@@ -93,13 +94,13 @@ def gather_series(channel: NDArray[np.float32], times_ms: Array, *, step: float)
     blocks = blocks.reshape(count, rows // side, side, columns // side, side)
     blocks = blocks.transpose(0, 1, 3, 2, 4).reshape(count, -1, side, side)
     mean, spread = blocks.mean(axis=(2, 3)), blocks.std(axis=(2, 3))
-    # The checkerboard difference of 2x2 pixels is free of the scene's own shading.
+    # The checkerboard difference of 2x2 pixels does not contain the shading of the scene.
     rows_apart = blocks[:, :, ::2] - blocks[:, :, 1::2]
     apart = (rows_apart[..., ::2] - rows_apart[..., 1::2]) / 2.0
     pixel_noise = np.sqrt((apart**2).mean(axis=(2, 3)))
     usable = (blocks.min(axis=(2, 3)) > 0.0) & (blocks.max(axis=(2, 3)) < 1.0)
-    # Without noise that carries the values over several steps, a whole even scene is rounded alike
-    # and nothing averages out.
+    # Without noise that spreads the values over several steps, a uniform scene is rounded the same
+    # everywhere and nothing averages out.
     rounding = np.where(pixel_noise < DITHER * step, step / 2.0, 0.0)
     usable &= np.hypot(spread, rounding) <= LARGEST_SPREAD * mean
     safe = np.where(usable, mean, 1.0)
@@ -114,23 +115,23 @@ def _paired(usable: Mask) -> Mask:
 def fit_exponents(series: Series) -> Array:
     """Return the local exponents at :data:`CORNERS` that explain a series best.
 
-    Minimises the squared differences between the values and those that one light per block and the
-    exposure times lead to, each in units of its noise, with Tukey's biweight against dust and
-    movement. The curve is taken at the values led to, not at the noisy ones: noise along the
-    curve's own argument would flatten it wherever a scene is even.
+    Minimises the squared differences between the measured values and those predicted from one light
+    per block and the exposure times, in units of their noise, with Tukey's biweight against dust
+    and movement. The curve is evaluated at the predicted values, not at the noisy ones: noise in
+    its argument would flatten the curve where a scene is uniform.
     """
-    log_time, place = series.log_time[:, None, None], np.log(series.value)
-    outlier = np.ones_like(place)
+    log_time, log_value = series.log_time[:, None, None], np.log(series.value)
+    outlier = np.ones_like(log_value)
     steps = np.diff(np.eye(len(CORNERS)), axis=0) / EXPONENT_STEP
     expected = np.eye(len(CORNERS)) / EXPONENT_SD**2
-    # In an even scene noise is all that tells one place from the next: it must not be the start.
+    # In a uniform scene only noise distinguishes the blocks: it must not decide the start value.
     exponents = np.full(len(CORNERS), _single_exponent(series))
     clean = _led_to(series, exponents, outlier)
     for number in range(ROUNDS):
         slope = np.interp(clean, np.log(CORNERS), exponents)
         weight = outlier * _weight(series, slope)
         left = _centred(_terms(clean), weight)
-        wanted = log_time - (slope * (place - clean))[..., None]
+        wanted = log_time - (slope * (log_value - clean))[..., None]
         right = _centred(wanted, weight)
         flat = (left * weight[..., None]).reshape(-1, len(CORNERS))
         normal = flat.T @ left.reshape(-1, len(CORNERS)) + steps.T @ steps + expected
@@ -142,14 +143,14 @@ def fit_exponents(series: Series) -> Array:
         slope = np.interp(clean, np.log(CORNERS), exponents)
         if number < ROUNDS_OF_ALL:
             continue
-        error = slope * (place - clean) * np.sqrt(_weight(series, slope))
+        error = slope * (log_value - clean) * np.sqrt(_weight(series, slope))
         scale = max(1.4826 * float(np.median(np.abs(error[series.usable]))), 1.0)
         outlier = np.clip(1.0 - (error / (TUKEY * scale)) ** 2, 0.0, None) ** 2
     return exponents
 
 
 def _single_exponent(series: Series) -> float:
-    """Return the exponent of the power law that explains a series best."""
+    """Return the exponent of the power law that fits a series best."""
     weight = _weight(series, np.ones_like(series.value))[..., None]
     value = _centred(np.log(series.value)[..., None], weight[..., 0])
     time = _centred(np.broadcast_to(series.log_time[:, None, None], value.shape), weight[..., 0])
@@ -158,17 +159,17 @@ def _single_exponent(series: Series) -> float:
 
 
 def _led_to(series: Series, exponents: Array, outlier: Array) -> Array:
-    """Return ln(value) that each block's light, over all pictures, leads to at each time."""
+    """Return ln(value) predicted from each block's light over all images, at each time."""
     weight = outlier * _weight(series, local_exponent(exponents, series.value))
     total = np.maximum(weight.sum(axis=0), 1e-300)
     light = (weight * _logs(series, exponents)).sum(axis=0) / total + series.log_time[:, None]
-    places = np.linspace(np.log(CORNERS[0]) - 4.0, 0.0, 2000)
-    return np.asarray(np.interp(light, _terms(places) @ exponents, places))
+    log_values = np.linspace(np.log(CORNERS[0]) - 4.0, 0.0, 2000)
+    return np.asarray(np.interp(light, _log_light(log_values, exponents), log_values))
 
 
 def light_of(exponents: Array, value: Array) -> Array:
-    """Return the linear light of encoded values > 0, 1 at the end of the scale."""
-    return np.asarray(np.exp(_terms(np.log(value)) @ exponents))
+    """Return the linear light of encoded values > 0; 1 is full scale."""
+    return np.asarray(np.exp(_log_light(np.log(value), exponents)))
 
 
 def local_exponent(exponents: Array, value: Array) -> Array:
@@ -177,9 +178,9 @@ def local_exponent(exponents: Array, value: Array) -> Array:
 
 
 def disagreement(series: Series, exponents: Array) -> float:
-    """Return by what share of the light the pictures disagree about their blocks.
+    """Return by what share of the light the images disagree about their blocks.
 
-    The root mean square, less what the pixels' noise explains.
+    The root mean square, with the part explained by pixel noise removed.
     """
     noise, weight = _light_noise(series, exponents)
     error = _centred(_logs(series, exponents)[..., None], weight)[..., 0]
@@ -188,10 +189,10 @@ def disagreement(series: Series, exponents: Array) -> float:
 
 
 def held_out_disagreement(series: Series, picture: int) -> float:
-    """Return by what share of the light a picture differs from what the others say.
+    """Return by what share of the light an image differs from the prediction of the others.
 
-    The root mean square, less what the pixels' noise explains, over the values that lie within the
-    others'; NaN where none do.
+    The root mean square, with the part explained by pixel noise removed, over the values within the
+    range of the others; NaN if there are none.
     """
     others = series.without(picture)
     if not others.usable.any():
@@ -208,7 +209,7 @@ def held_out_disagreement(series: Series, picture: int) -> float:
 
 
 def _logs(series: Series, exponents: Array) -> Array:
-    return np.asarray(_terms(np.log(series.value)) @ exponents - series.log_time[:, None])
+    return _log_light(np.log(series.value), exponents) - series.log_time[:, None]
 
 
 def _light_noise(series: Series, exponents: Array) -> tuple[Array, Array]:
@@ -228,20 +229,46 @@ def _excess(error: Array, noise: Array, weight: Array) -> float:
     return float(np.sqrt(max(beyond, 0.0) / total)) if total > 0.0 else float("nan")
 
 
-def _terms(place: Array) -> Array:
-    """Return the integrals (..., corners) of each corner's share, from ln(value) = 0 to a place."""
-    corners = np.log(CORNERS)
-    knots = np.concatenate([corners[:1], corners, corners[-1:]])
-    hats = BSpline(knots, np.eye(len(corners)), 1)
-    inside = np.maximum(place, corners[0])
-    whole = hats.antiderivative()
-    terms = whole(inside) - whole(corners[-1])
-    terms[..., 0] += place - inside  # below the lowest corner its exponent goes on
+def _terms(log_value: Array) -> Array:
+    """Return the integrals (..., corners) of each corner's share, from ln(value) = 0."""
+    below, along, bent = _within(log_value)
+    terms = _TERMS_AT_CORNERS[below]
+    flat, rows = terms.reshape(-1, len(CORNERS)), np.arange(below.size)
+    flat[rows, below.ravel()] += (along - bent).ravel()
+    flat[rows, below.ravel() + 1] += bent.ravel()
     return np.asarray(terms)
 
 
+def _log_light(log_value: Array, exponents: Array) -> Array:
+    """Return ln(light) at ln(value): ``_terms(log_value) @ exponents``, at a lower cost."""
+    below, along, bent = _within(log_value)
+    at_corners = _TERMS_AT_CORNERS @ exponents
+    rise = np.diff(exponents)
+    return np.asarray(at_corners[below] + along * exponents[below] + bent * rise[below])
+
+
+def _within(log_value: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return the corner below each value, the distance from it, and its integral over the gap.
+
+    Below the lowest corner its exponent continues; the highest corner is 0, where values end.
+    """
+    below = np.clip(np.searchsorted(_PLACES, log_value) - 1, 0, len(CORNERS) - 2)
+    along = log_value - _PLACES[below]
+    return below, along, 0.5 * along * np.maximum(along, 0.0) / _GAPS[below]
+
+
+def _terms_at_corners() -> Array:
+    """Return :func:`_terms` at the corners themselves, by the trapezoidal rule."""
+    halves = 0.5 * _GAPS[:, None] * (np.eye(len(CORNERS))[1:] + np.eye(len(CORNERS))[:-1])
+    from_lowest = np.concatenate([np.zeros((1, len(CORNERS))), np.cumsum(halves, axis=0)])
+    return np.asarray(from_lowest - from_lowest[-1])
+
+
 def _centred(values: Array, weight: Array) -> Array:
-    """Return values (pictures, blocks, n) less their weighted mean over the pictures."""
+    """Return values (pictures, blocks, n) less their weighted mean over the images."""
     total = np.maximum(weight.sum(axis=0), 1e-300)
     mean = (values * weight[..., None]).sum(axis=0) / total[:, None]
     return np.asarray(values - mean)
+
+
+_TERMS_AT_CORNERS = _terms_at_corners()

@@ -1,9 +1,9 @@
-"""The first stage: whether the camera's numbers are linear light, and if not, what makes them so.
+"""The first stage: check whether pixel values are linear light, and find the curve if not.
 
-A session may declare the camera's response, or hold a series of pictures of one still scene at
-different exposures from which it is measured. What is measured is used, and what is declared is
-then held against it. Where neither is given the camera is taken to be linear and nothing is done:
-no other picture of a session tells a bent response from uneven light.
+A session may declare the camera response, or contain a series of images of one still scene at
+different exposures. A measured response is used, and a declared one is then only compared with it.
+If there is neither, the camera is assumed to be linear: no other image of a session can distinguish
+a non-linear response from uneven light.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.response import NODES, CameraResponse, declared_response, distance
 from gelpolight_core.quality import Figure, QualityTable, judge
-from gelpolight_core.response.curve import NODES, CameraResponse, declared_response, distance
 from gelpolight_core.response.series import (
     REPEATABILITY,
     Series,
@@ -26,43 +27,42 @@ from gelpolight_core.response.series import (
     held_out_disagreement,
     light_of,
 )
-from gelpolight_core.session.picture import Picture
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
 LEAST_PICTURES = 3
 LEAST_SPAN = 4.0
-# A picture with fewer blocks between dark and saturated adds nothing but its worst pixels.
+# An image with fewer blocks between dark and saturated adds only its worst pixels.
 LEAST_SHARE = 0.02
-# Over a span of 4, light that repeats to 3 % leaves the exponent uncertain by 0.03 / ln 4 = 2 %;
-# an exponent wrong by 5 % costs 4 % of depth.
+# Over a factor of 4, light that repeats to 3 % leaves the exponent uncertain by 0.03 / ln 4 = 2 %;
+# an exponent wrong by 5 % causes a depth error of 4 %.
 WARN_RESIDUAL, LARGEST_RESIDUAL = 0.01, 0.03
-# An exponent of 0.95 departs by 1.9 % of the scale and costs 4 % of depth, so that this costs half
-# a percent, no more than the rest of a calibration leaves.
+# An exponent of 0.95 deviates by 1.9 % of full scale and causes a depth error of 4 %, so this limit
+# costs half a percent, no more than the rest of a calibration.
 NEGLIGIBLE = 0.0025
 SIGNIFICANT = 3.0
-# As much as an exponent of 0.95: a curve known no better may cost more depth than it mends.
+# As much as an exponent of 0.95: a curve known less well may do more harm than good.
 LARGEST_SD = 0.02
 PLACES = 200
 
 
 @dataclass(frozen=True, slots=True)
 class ResponseResult:
-    """What is known of the camera's response.
+    """The known camera response.
 
     Attributes
     ----------
     response : CameraResponse or None
-        To be applied to every picture; None where the camera is linear.
+        Applied to every image; None if the camera is linear.
     source : str
         ``undeclared``, ``declared`` or ``measured``.
     measured : CameraResponse or None
-        What the pictures say, also where it is linear within the noise and left out.
+        The measured curve, even if it is linear within the noise and therefore not applied.
     covered : (3, 2)
-        Encoded values between which each channel was measured; 0 where it was not.
+        Range of encoded values in which each channel was measured; 0 if it was not.
     quality : QualityTable
-        Figures, limits and advice; empty where nothing was declared or measured.
+        Figures, limits and advice; empty if nothing was declared or measured.
     """
 
     response: CameraResponse | None
@@ -73,13 +73,15 @@ class ResponseResult:
 
     @property
     def summary(self) -> str:
-        """What was done, in words."""
+        """Short description of the result."""
         if self.source == "undeclared":
-            return tr("left out (nothing declared or measured: taken as linear)")
+            return tr("not applied (nothing declared or measured: assumed linear)")
         if self.source == "declared":
-            return tr("left out (declared linear)") if self.response is None else tr("as declared")
+            return (
+                tr("not applied (declared linear)") if self.response is None else tr("as declared")
+            )
         if self.response is None:
-            return tr("left out (measured: linear within the noise)")
+            return tr("not applied (measured: linear within the noise)")
         return tr("as measured")
 
 
@@ -89,7 +91,7 @@ def declare_response(declared: str | float | None) -> ResponseResult:
     Parameters
     ----------
     declared : str, float or None
-        ``linear``, ``srgb``, a gamma, or None where nothing is declared.
+        ``linear``, ``srgb``, a gamma, or None if nothing is declared.
     """
     response = declared_response(declared)
     figures: tuple[Figure, ...] = ()
@@ -97,7 +99,7 @@ def declare_response(declared: str | float | None) -> ResponseResult:
         figures = (
             judge(
                 "response_departure_percent",
-                tr("Departure from linear, as declared"),
+                tr("Declared response, deviation from linear"),
                 100.0 * response.departure,
                 "%",
             ),
@@ -112,26 +114,26 @@ def measure_response(
     *,
     declared: str | float | None = None,
 ) -> ResponseResult:
-    """Measure the response from pictures of one still, evenly lit scene.
+    """Measure the response from images of one still, evenly lit scene.
 
     Parameters
     ----------
     pictures : sequence of Picture
-        As the camera encodes them, all of one size.
+        As encoded by the camera, all of the same size.
     exposures_ms : sequence of float
         Exposure time of each.
     declared : str, float or None, optional
-        What the session declares; only compared.
+        Response declared by the session; only compared.
 
     Raises
     ------
     InputError
         If there are fewer than three different exposures or they span less than a factor of four
-        (counting only pictures that are neither dark nor saturated), if they leave
-        the curve uncertain or unchecked, or if the scene moved or its light changed.
+        (counting only images that are neither dark nor saturated), if the curve stays uncertain or
+        cannot be checked, or if the scene moved or its light changed.
     """
     times = np.asarray(exposures_ms, np.float64)
-    _refuse_narrow(times, tr("there are {n} different exposures, over a factor of {r:.3g}"))
+    _refuse_narrow(times, tr("There are only {n} different exposures over a factor of {r:.3g}"))
     step = 1.0 / (2.0 ** min(p.bit_depth for p in pictures) - 1.0)
     channels = []
     for k in range(3):
@@ -154,7 +156,7 @@ def measure_response(
 
 @dataclass(frozen=True, slots=True)
 class _Channel:
-    """One channel's fit, its departure from linear and that one's standard deviation."""
+    """Fit of one channel, its deviation from linear and the standard deviation of that."""
 
     series: Series
     curve: Array
@@ -169,30 +171,33 @@ class _Channel:
         return bool((np.abs(self.departure) <= limit).all())
 
     @property
-    def places(self) -> Array:
+    def values(self) -> Array:
         return np.linspace(*self.series.covered, PLACES)
 
 
 def _fit_channel(series: Series) -> _Channel:
-    series = _lit_pictures(series)
+    series = _lit_images(series)
     count = len(series.log_time)
     exponents = fit_exponents(series)
-    places = np.linspace(*series.covered, PLACES)
-    straight = distance(light_of(exponents, places), places)
+    values = np.linspace(*series.covered, PLACES)
+    straight = distance(light_of(exponents, values), values)
     held_out = [held_out_disagreement(series, picture) for picture in range(count)]
     known = [value for value in held_out if np.isfinite(value)]
     if not known:
         raise InputError(
-            tr("no exposure can be checked by the others: no place is well exposed in three"),
+            tr(
+                "No exposure can be checked against the others: no part of the scene is well "
+                "exposed in three images"
+            ),
             where="response",
-            advice=tr("Add exposures in between"),
+            advice=tr("Add exposures between the present ones"),
         )
-    # Exposures that are not quite what is stated bend the curve more than pixels' noise does.
-    doubt = max(REPEATABILITY, float(np.median(known)))
+    # Small errors of the stated exposure times bend the curve more than pixel noise does.
+    uncertainty = max(REPEATABILITY, float(np.median(known)))
     variance = np.zeros(PLACES)
-    for disturbance in doubt * np.eye(count):
+    for disturbance in uncertainty * np.eye(count):
         fitted = fit_exponents(replace(series, log_time=series.log_time + disturbance))
-        variance += (distance(light_of(fitted, places), places) - straight) ** 2
+        variance += (distance(light_of(fitted, values), values) - straight) ** 2
     return _Channel(
         series,
         _as_curve(exponents),
@@ -210,14 +215,14 @@ def _as_curve(exponents: Array) -> Array:
     return curve
 
 
-def _lit_pictures(series: Series) -> Series:
-    """Leave out the pictures of a series that are dark or saturated nearly everywhere."""
+def _lit_images(series: Series) -> Series:
+    """Leave out the images of a series that are dark or saturated nearly everywhere."""
     lit = series.usable.mean(axis=1) >= LEAST_SHARE
     _refuse_narrow(
         np.exp(series.log_time[lit]),
         tr(
-            "only {n} different exposures are neither dark, saturated nor noise, over a factor of "
-            "{r:.3g}"
+            "Only {n} different exposures over a factor of {r:.3g} are usable (not dark, "
+            "saturated or noisy)"
         ),
     )
     for picture in np.flatnonzero(~lit)[::-1]:
@@ -234,8 +239,9 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
             found.format(n=count, r=span),
             where="response",
             advice=tr(
-                "Capture one still, evenly lit scene at {n} exposures or more, the longest {r:g} "
-                "times the shortest or more, neither black nor saturated"
+                "Capture one still, evenly lit scene at {n} or more exposures. The longest "
+                "must be at least {r:g} times the shortest, and none may be black or "
+                "saturated"
             ).format(n=LEAST_PICTURES, r=LEAST_SPAN),
         )
 
@@ -243,12 +249,12 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
 def _refuse_unsteady(residual: float) -> None:
     if residual > LARGEST_RESIDUAL:
         raise InputError(
-            tr("the pictures disagree by {x:.1%} of their light").format(x=residual),
+            tr("The images disagree by {x:.1%} of their light").format(x=residual),
             where="response",
             advice=tr(
-                "Capture the series again with a still scene, steady light and the lens untouched, "
-                "state each picture's true exposure time, and switch off automatic gain and "
-                "white balance"
+                "Capture the series again with a still scene, steady light and an untouched "
+                "lens. State the true exposure time of each image, and switch off automatic gain "
+                "and white balance"
             ),
         )
 
@@ -256,13 +262,11 @@ def _refuse_unsteady(residual: float) -> None:
 def _refuse_unknown(departure_sd: float) -> None:
     if departure_sd > LARGEST_SD:
         raise InputError(
-            tr("the pictures leave the curve uncertain by {x:.1%} of the scale").format(
-                x=departure_sd
-            ),
+            tr("The response curve is uncertain by {x:.1%} of full scale").format(x=departure_sd),
             where="response",
             advice=tr(
-                "Add exposures in between, or show a scene with some places twice as bright "
-                "as others"
+                "Add exposures between the present ones, or show a scene with some areas twice "
+                "as bright as others"
             ),
         )
 
@@ -275,40 +279,40 @@ def _judge(
     figures = [
         judge(
             "response_departure_percent",
-            tr("Departure from linear, worst channel"),
+            tr("Deviation from linear, worst channel"),
             100.0 * float(np.abs(worst.departure).max()),
             "%",
         ),
         judge(
             "response_departure_sd_percent",
-            tr("Departure from linear, standard deviation"),
+            tr("Deviation from linear, standard deviation"),
             100.0 * max(float(c.departure_sd.max()) for c in channels),
             "%",
             warn=0.5,
             fail=100.0 * LARGEST_SD,
-            advice=tr("Add exposures, and check that their times are true"),
+            advice=tr("Add exposures, and check the stated exposure times"),
         ),
         judge(
             "response_residual_percent",
-            tr("Disagreement of the exposures about the light, beyond noise"),
+            tr("Disagreement between exposures, beyond noise"),
             100.0 * residual,
             "%",
             warn=100.0 * WARN_RESIDUAL,
             fail=100.0 * LARGEST_RESIDUAL,
-            advice=tr("Keep scene and light still, and check the exposure times"),
+            advice=tr("Keep scene and light constant, and check the exposure times"),
         ),
         judge(
             "response_held_out_percent",
-            tr("Disagreement of an exposure held out, worst, beyond noise"),
+            tr("Disagreement of a held-out exposure, worst case, beyond noise"),
             100.0 * held_out,
             "%",
             warn=100.0 * WARN_RESIDUAL,
             fail=100.0 * LARGEST_RESIDUAL,
-            advice=tr("Keep scene and light still, check the exposure times, add exposures"),
+            advice=tr("Keep scene and light constant, check the exposure times, and add exposures"),
         ),
         judge(
             "response_lowest_percent",
-            tr("Scale covered, from"),
+            tr("Measured range, lower end"),
             100.0 * max(c.series.covered[0] for c in channels),
             "%",
             warn=30.0,
@@ -316,16 +320,16 @@ def _judge(
         ),
         judge(
             "response_highest_percent",
-            tr("Scale covered, to"),
+            tr("Measured range, upper end"),
             100.0 * min(c.series.covered[1] for c in channels),
             "%",
             warn=80.0,
             higher_is_better=True,
-            advice=tr("Add longer exposures, up to where the scene begins to saturate"),
+            advice=tr("Add longer exposures, until the scene begins to saturate"),
         ),
         judge(
             "response_exposure_span",
-            tr("Longest over shortest exposure used"),
+            tr("Ratio of longest to shortest exposure used"),
             float(times.max() / times.min()),
         ),
     ]
@@ -339,15 +343,13 @@ def _declared_figure(channels: Sequence[_Channel], declared: str | float) -> Fig
     stated = np.tile(nodes, (3, 1)) if response is None else response.curves
     difference = 0.0
     for channel, curve in zip(channels, stated, strict=True):
-        light, said = (np.interp(channel.places, nodes, c) for c in (channel.curve, curve))
-        difference = max(difference, float(np.abs(distance(light, said)).max()))
+        light, expected = (np.interp(channel.values, nodes, c) for c in (channel.curve, curve))
+        difference = max(difference, float(np.abs(distance(light, expected)).max()))
     return judge(
         "response_declared_difference_percent",
-        tr("Declared response less the measured one (which is used)"),
+        tr("Declared response minus measured response (the measured one is used)"),
         100.0 * difference,
         "%",
         warn=1.0,
-        advice=tr(
-            "Correct or remove what is declared of the camera; the measured response was used"
-        ),
+        advice=tr("Correct or remove the declared camera response; the measured response was used"),
     )

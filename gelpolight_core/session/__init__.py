@@ -1,1 +1,1 @@
-"""Session folders: what was captured of one sensor, read and checked."""
+"""Session folders: the images captured of one sensor, read and checked."""

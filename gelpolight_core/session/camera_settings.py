@@ -1,4 +1,4 @@
-"""The camera of a session and how it was set: kept with the pictures and with the calibration."""
+"""The camera of a session and its settings, kept with the images and with the calibration."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ _CONTROL = "control."
 
 @dataclass(frozen=True, slots=True)
 class CameraSettings:
-    """How a camera was set.
+    """Settings of a camera.
 
     Attributes
     ----------
     name : str
-        What people read.
+        Display name.
     identity : str
-        Tells it from others, however it is plugged in.
+        Identifies this camera, whichever port it is plugged into.
     model : str
-        Vendor and product, such as ``046d:081b``; empty where they are not known.
+        Vendor and product id, such as ``046d:081b``; empty if unknown.
     pixel_format : str
-        Four characters, such as ``YUYV``; empty where it is not known.
+        Four characters, such as ``YUYV``; empty if unknown.
     size : (int, int)
-        Width and height of its pictures, px.
+        Width and height of its images, px.
     rate_hz : float
-        Pictures per second.
+        Frames per second.
     controls : mapping
-        Value of every setting, such as ``exposure_ms``; switches are 0 or 1.
+        Value of each setting, such as ``exposure_ms``; on/off settings are 0 or 1.
     """
 
     name: str
@@ -46,11 +46,11 @@ class CameraSettings:
     controls: Mapping[str, float] = field(default_factory=dict)
 
     def is_of(self, identity: str, model: str) -> bool:
-        """Whether these are the settings of a camera, or of another one of its make."""
+        """Whether these settings belong to this camera, or to another one of the same model."""
         return self.identity == identity or (bool(self.model) and self.model == model)
 
     def as_table(self) -> dict[str, Any]:
-        """Return it as tables of ``session.toml``."""
+        """Return the settings as tables of ``session.toml``."""
         device = {
             "name": self.name,
             "identity": self.identity,
@@ -63,7 +63,7 @@ class CameraSettings:
         return {"device": device, "controls": dict(self.controls)}
 
     def as_texts(self) -> dict[str, str]:
-        """Return it as texts, as a calibration keeps it; :func:`settings_of_texts` reads them."""
+        """Return the settings as texts for a calibration file; see :func:`settings_of_texts`."""
         texts = {key: str(value) for key, value in self.as_table()["device"].items()}
         return texts | {f"{_CONTROL}{key}": f"{v:.10g}" for key, v in self.controls.items()}
 
@@ -74,12 +74,12 @@ def parse_settings(camera: Table) -> CameraSettings:
     Raises
     ------
     InputError
-        If a key is unknown, of the wrong kind or out of range.
+        If a key is unknown, has the wrong type, or is out of range.
     """
     device = camera.table("device")
     given = camera.table("controls") if "controls" in camera.content else Table({}, "", camera.path)
     if len(given.content) > MOST:
-        raise camera.wrong("controls", tr("names more settings than any camera has"))
+        raise camera.wrong("controls", tr("has more settings than any camera"))
     controls = {str(key): given.number(str(key), -1e9, 1e9) for key in given.content}
     device.no_more("name", "identity", "model", "pixel_format", "width", "height", "rate_hz")
     return CameraSettings(
@@ -99,9 +99,10 @@ def _maybe(table: Table, key: str) -> str:
 
 
 def settings_of_texts(texts: Mapping[str, str]) -> CameraSettings | None:
-    """Return what a calibration keeps of its camera; None where that is nothing that can be used.
+    """Return the camera settings stored in a calibration; None if there are no usable ones.
 
-    A calibration's file comes from anywhere: what is no number or no text there is left out.
+    A calibration file can come from anywhere: values that are not valid numbers or texts are left
+    out.
     """
     plain = {k: v for k, v in list(texts.items())[: 2 * MOST] if isinstance(v, str)}
     name, identity = plain.get("name", ""), plain.get("identity", "")

@@ -1,4 +1,4 @@
-"""Does a camera whose settings are locked really stand still? Judged on its own pictures."""
+"""Check on a camera's own images that its locked settings really stay constant."""
 
 from __future__ import annotations
 
@@ -15,24 +15,23 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 
 BANDS = 16
-"""Bands of rows: light that flickers passes through a rolling shutter's picture as stripes."""
+"""Bands of rows: flickering light shows as stripes in the image of a rolling shutter."""
 FRAMES = 30
 SPAN_S = 3.0
-"""An exposure that follows the light takes about a second to show it."""
+"""Automatic exposure takes about a second to react."""
 DARKEST = 0.02
-CHANNELS = ("red", "green", "blue")
 
 
 def band_levels(rgb: NDArray[Any]) -> Array:
-    """Return the mean of each band of a picture, (bands, 3), 0..1.
+    """Return the mean of each band of an image, (bands, 3), 0..1.
 
     Parameters
     ----------
     rgb : (height, width, 3) uint8 or uint16
-        As the camera gave it.
+        As delivered by the camera.
     """
     full = 255.0 if rgb.dtype == np.uint8 else 65535.0
-    # First across, then down: both are averages over areas, exact whatever the height.
+    # First across, then down: both are area averages, exact for any height.
     narrow = cv2.reduce(rgb, 1, cv2.REDUCE_AVG, dtype=cv2.CV_64F)
     edges = np.linspace(0, len(narrow), BANDS + 1).astype(int)
     bands = [narrow[first : max(last, first + 1), 0] for first, last in pairwise(edges)]
@@ -47,23 +46,23 @@ def judge_steadiness(
     rate_hz: float = 0.0,
     repeated: int = 0,
 ) -> QualityTable:
-    """Judge how steady a camera is that looks at something that does not change.
+    """Judge how steady a camera is while it views an unchanging scene.
 
     Parameters
     ----------
     levels : (frames, bands, 3) float64
-        Of :func:`band_levels`.
+        From :func:`band_levels`.
     times_s : (frames,) float64
-        When the frames came.
+        Arrival time of each frame.
     rate_hz : float, optional
-        The rate that the camera promised; 0 where it promised none.
+        The requested frame rate; 0 if unknown.
     repeated : int, optional
-        How many frames were the same as the one before, to the last bit.
+        Number of frames that were identical to the previous one.
 
     Raises
     ------
     ValueError
-        If there are fewer than three frames, or not one time for each.
+        If there are fewer than three frames, or the number of times differs.
     """
     if levels.ndim != 3 or levels.shape[2] != 3 or len(levels) < 3:
         raise ValueError(f"levels have the shape (3 or more, bands, 3), not {levels.shape}")
@@ -76,26 +75,28 @@ def judge_steadiness(
     figures = [
         judge(
             "camera_level",
-            tr("Brightness of the picture"),
+            tr("Image brightness"),
             100.0 * bright,
             "%",
             warn=100.0 * DARKEST,
             fail=0.4,
             higher_is_better=True,
-            advice=tr("Switch the LEDs on, and lock with a longer exposure"),
+            advice=tr("Switch the LEDs on and lock a longer exposure"),
         ),
         judge(
             "camera_drift_percent",
-            tr("Drift of brightness during the test"),
+            tr("Brightness change during the test"),
             abs(even),
             "%",
             warn=0.5,
             fail=2.0,
-            advice=tr("Lock exposure and gain, let the LEDs warm up for minutes, and test again"),
+            advice=tr(
+                "Lock exposure and gain, let the LEDs warm up for a few minutes, and test again"
+            ),
         ),
         judge(
             "camera_colour_drift_percent",
-            tr("Drift of a colour by itself"),
+            tr("Change of one colour relative to the others"),
             float(np.abs(trend - even).max()),
             "%",
             warn=0.5,
@@ -109,16 +110,19 @@ def judge_steadiness(
             "%",
             warn=0.4,
             fail=1.5,
-            advice=tr("Shade the sensor from lamps, or expose for a multiple of 10 ms at 50 Hz"),
+            advice=tr(
+                "Shade the sensor from room lamps, or set the exposure to a multiple of 10 ms "
+                "(50 Hz mains)"
+            ),
         ),
         judge(
             "camera_repeated",
-            tr("Copies of the picture before"),
+            tr("Repeated frames"),
             100.0 * repeated / (len(levels) - 1),
             "%",
             warn=0.0,
             fail=50.0,
-            advice=tr("The camera hangs: plug it in again, at another socket or without hub"),
+            advice=tr("The camera is stuck: reconnect it to another port, without a hub"),
         ),
     ]
     if rate_hz > 0.0:
@@ -126,20 +130,23 @@ def judge_steadiness(
         figures.append(
             judge(
                 "camera_rate_percent",
-                tr("Rate, of what was asked for"),
+                tr("Frame rate, share of the requested rate"),
                 100.0 * (len(times_s) - 1) / max(span_s, 1e-6) / rate_hz,
                 "%",
                 warn=85.0,
                 fail=30.0,
                 higher_is_better=True,
-                advice=tr("Choose a shorter exposure or a lower rate; use a socket without hub"),
+                advice=tr(
+                    "Use a shorter exposure or a lower frame rate, and connect the camera "
+                    "without a hub"
+                ),
             )
         )
     return QualityTable(tuple(figures))
 
 
 def _trend_percent(whole: Array, times_s: Array) -> Array:
-    """Return how far each channel has come from begin to end, as a straight line, percent."""
+    """Return the change of each channel from start to end, by a straight-line fit, percent."""
     time = times_s - times_s.mean()
     slope = (time[:, None] * whole).sum(axis=0) / max(float((time**2).sum()), 1e-12)
     change = slope * float(times_s[-1] - times_s[0])
@@ -147,7 +154,7 @@ def _trend_percent(whole: Array, times_s: Array) -> Array:
 
 
 def _flicker_percent(levels: Array, times_s: Array) -> float:
-    """Return the root mean square of what is left of the bands' levels beside a straight line."""
+    """Return the root mean square of the band levels about a straight line."""
     time = times_s - times_s.mean()
     slope = np.einsum("t,tbc->bc", time, levels) / max(float((time**2).sum()), 1e-12)
     left = levels - levels.mean(axis=0) - time[:, None, None] * slope

@@ -1,4 +1,4 @@
-"""Keep what a camera has shown: average frames of one view, and write them as a picture."""
+"""Average camera frames of one view and write them as an image file."""
 
 from __future__ import annotations
 
@@ -11,20 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.translation import tr
 
 Frame = NDArray[Any]
 
 
 def average_frames(frames: Sequence[Frame]) -> Frame:
-    """Return the average of frames, in 16 bit where there are several.
-
-    Parameters
-    ----------
-    frames : sequence of (rows, columns, 3) uint8 or uint16
-        Of one view.
-    """
+    """Return the average of frames, as 16 bit if there are several."""
     if len(frames) == 1:
         return frames[0]
     scale = 65535.0 / float(np.iinfo(frames[0].dtype).max)
@@ -40,11 +34,11 @@ def write_picture(rgb: Frame, path: Path, *, new: bool = False, inside: Path | N
     Parameters
     ----------
     rgb : (rows, columns, 3) uint8 or uint16
-        The picture.
+        The image.
     path : Path
-        Where; its folder is made.
+        Destination; its folder is created.
     new, inside
-        As in :func:`~gelpolight_core.export.atomic.write_atomically`.
+        As in :func:`~gelpolight_core.io.atomic.write_atomically`.
 
     Raises
     ------
@@ -55,6 +49,6 @@ def write_picture(rgb: Frame, path: Path, *, new: bool = False, inside: Path | N
     done, data = cv2.imencode(".png", np.ascontiguousarray(rgb[..., ::-1]))
     if not done:
         raise InputError(
-            tr("the picture cannot be encoded"), where=str(path), advice=tr("Capture it again")
+            tr("The image cannot be encoded"), where=str(path), advice=tr("Capture it again")
         )
     write_atomically(path, lambda stream: stream.write(data.tobytes()), new=new, inside=inside)

@@ -1,8 +1,8 @@
-"""What a person decided about a session's pictures: ``decisions.toml`` beside ``session.toml``.
+"""The user's decisions about the images of a session: ``decisions.toml`` beside ``session.toml``.
 
-Detection proposes; where it is wrong a person corrects it. The corrections are kept apart from
-what was captured, so that they can be taken back, and every way of calibrating the same folder
-honours them: the desktop program and the command line give the same calibration.
+Detection makes a proposal and the user corrects it where it is wrong. The corrections are stored
+apart from the captured images, so they can be undone, and the desktop program and the command line
+both use them: they give the same calibration.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import Any, BinaryIO
 
 import tomli_w
 
+from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import write_atomically
-from gelpolight_core.reading import NEWEST, brief, parse_toml, read_file
+from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.io.reading import NEWEST, brief, parse_toml, read_file
 from gelpolight_core.translation import tr
 
 FILE_NAME = "decisions.toml"
 FORMAT = "gelpolight-decisions"
 VERSION = 1
-CHANNEL_KEYS = ("red", "green", "blue")
 MOST_NODES = 200
 SIZE_LIMIT = 4_000_000
 
@@ -33,7 +33,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class PlacedCircle:
-    """The picture of a contact's edge, placed by hand in the raw picture; pixels."""
+    """The edge of a contact, drawn by hand in the raw image; pixels."""
 
     u_px: float
     v_px: float
@@ -42,18 +42,18 @@ class PlacedCircle:
 
 @dataclass(frozen=True, slots=True)
 class Decisions:
-    """A person's corrections.
+    """Corrections made by the user.
 
     Attributes
     ----------
     excluded : frozenset of str
-        Pictures not to be used, such as ``balls/ball_03.png``.
+        Images that are not used, such as ``balls/ball_03.png``.
     spots_px : mapping of int to (u, v)
-        Mirror spot of an LED (0, 1, 2), placed by hand in the raw picture.
+        Mirror spot of an LED (0, 1, 2), set by hand in the raw image.
     balls : mapping of str to PlacedCircle
-        Contact placed by hand, by the file's name in ``balls``.
+        Contact drawn by hand, by the file's name in ``balls``.
     curves : mapping of int to nodes
-        Reflectance of a channel as edited by hand: (cosine, value) nodes, both rising.
+        Reflectance curve of a channel edited by hand: (cosine, value) nodes, both increasing.
     """
 
     excluded: frozenset[str] = frozenset()
@@ -63,12 +63,12 @@ class Decisions:
 
 
 def read_decisions(folder: Path) -> Decisions:
-    """Read a session's decisions; none where there is no such file.
+    """Read the decisions of a session; empty if there is no such file.
 
     Raises
     ------
     InputError
-        If the file is damaged, of a newer version, or holds what no decision is.
+        If the file is damaged, has a newer version, or contains invalid entries.
     """
     path = folder / FILE_NAME
     try:
@@ -76,9 +76,9 @@ def read_decisions(folder: Path) -> Decisions:
         version = content.get("version")
         if content.get("format") == FORMAT and type(version) is int and VERSION < version < NEWEST:
             raise InputError(
-                tr("the decisions have version {v} and this program knows version {k}").format(
-                    v=version, k=VERSION
-                ),
+                tr(
+                    "The decisions have version {v}, but this program only reads up to version {k}"
+                ).format(v=version, k=VERSION),
                 where=str(path),
                 advice=tr("Use a newer version of GelPoLight Studio"),
             )
@@ -89,21 +89,21 @@ def read_decisions(folder: Path) -> Decisions:
         return Decisions()
     except (ValueError, TypeError, KeyError, AttributeError, ArithmeticError) as error:
         raise InputError(
-            tr("the decisions cannot be used ({reason})").format(reason=brief(str(error), 200)),
+            tr("The decisions cannot be used ({reason})").format(reason=brief(str(error), 200)),
             where=str(path),
-            advice=tr("Mend the file, or move it away to go back to what was detected"),
+            advice=tr("Correct the file, or move it away to return to the detected values"),
         ) from error
 
 
 def write_decisions(decisions: Decisions, folder: Path) -> None:
-    """Write a session's decisions, whole or not at all.
+    """Write the decisions of a session, completely or not at all.
 
     Parameters
     ----------
     decisions : Decisions
-        What a person decided.
+        The user's decisions.
     folder : Path
-        The session's.
+        The session folder.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def _numbers(values: Any, count: int) -> Any:
 def _circle(values: Any) -> tuple[float, float, float]:
     u, v, radius = _numbers(values, 3)
     if radius <= 0.0:
-        raise ValueError(f"a radius of {radius:g} px")
+        raise ValueError(f"{radius:g} px is not a valid radius")
     return u, v, radius
 
 
@@ -175,5 +175,5 @@ def _nodes(values: Any) -> tuple[Point, ...]:
     nodes = tuple(_numbers(node, 2) for node in values)
     for (c0, v0), (c1, v1) in pairwise(nodes):
         if not (c1 > c0 and v1 >= v0):
-            raise ValueError("the nodes of a curve do not rise")
+            raise ValueError("the nodes of a curve are not increasing")
     return nodes

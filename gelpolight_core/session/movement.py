@@ -1,4 +1,4 @@
-"""What changed between two frames of a camera by more than its noise and its light's flicker."""
+"""Detect changes between two frames of a camera that exceed noise and flicker."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reflectance.noise import REPEATABILITY, pixel_noise
+from gelpolight_core.image.noise import REPEATABILITY, pixel_noise
 
 Frame = NDArray[Any]
 Float = NDArray[np.float32]
 
 BLOCK_PX = 8
-"""Averaging over blocks of this side lifts a movement out of the noise of single pixels."""
+"""Averaging over blocks of this side raises a movement above the noise of single pixels."""
 NOISE_SD = 8.0
-"""Bright places have up to twice the noise of the median pixel, and of tens of thousands of blocks
-some reach four standard deviations: below eight everything may be noise."""
+"""Bright areas have up to twice the noise of the median pixel, and some of the many blocks reach
+four standard deviations: anything below eight may be noise."""
 
 MOVING_SHARE = 0.001
-"""A few blocks may twinkle (hot pixels, a flickering glint) while nothing moves."""
+"""A few blocks may vary (hot pixels, a flickering glint) although nothing moves."""
 
 
 def changed_blocks(
     before: Frame, now: Frame, *, flicker: float = REPEATABILITY
 ) -> NDArray[np.bool_]:
-    """Return which blocks of the picture changed by more than noise and flicker.
+    """Return which blocks of the image changed by more than noise and flicker.
 
     Parameters
     ----------
     before, now : (rows, columns, 3) uint8 or uint16
-        Frames of one size and depth.
+        Frames of the same size and bit depth.
     flicker : float, optional
-        Share of its brightness by which a block may change all the same.
+        Relative change of brightness that a block may have without counting as changed.
 
     Returns
     -------
@@ -48,26 +48,26 @@ def changed_blocks(
 
 
 def moving_share(before: Frame, now: Frame) -> float:
-    """Return which share of the picture changed between two frames by more than noise and flicker.
+    """Return the share of the image that changed by more than noise and flicker.
 
     Parameters
     ----------
     before, now : (rows, columns, 3) uint8 or uint16
-        Frames of one size and depth.
+        Frames of the same size and bit depth.
     """
     return float(changed_blocks(before, now).mean())
 
 
 def _blocks(rgb: Frame) -> Float:
     size = (max(rgb.shape[1] // BLOCK_PX, 1), max(rgb.shape[0] // BLOCK_PX, 1))
-    # In floating point: the mean of 64 pixels is finer than one step of the camera.
+    # Floating point: the mean of 64 pixels is finer than one grey level of the camera.
     return np.asarray(cv2.resize(rgb.astype(np.float32), size, interpolation=cv2.INTER_AREA))
 
 
 def _noise(before: Frame, now: Frame) -> Float:
-    """Return the standard deviation (3,) of the difference from pixel to pixel, 1 is full scale.
+    """Return the standard deviation (3,) of the pixel differences; 1 is full scale.
 
-    Every eighth pair of lines is enough, and neighbours stay neighbours.
+    Every eighth pair of rows is enough; neighbouring rows stay neighbours.
     """
     rows = now.shape[0] // BLOCK_PX * BLOCK_PX
     pairs = [

@@ -1,4 +1,4 @@
-"""A table of session.toml, whose every mistake is named with its key."""
+"""A table of session.toml that reports every mistake with its key."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.reading import brief, is_file_name, plain_text
+from gelpolight_core.io.reading import brief, is_file_name, plain_text
 from gelpolight_core.translation import tr
 
 MOST_WHOLE = 2**53
@@ -26,17 +26,17 @@ class Table:
         return f"[{self.name}] {brief(key)}" if self.name else brief(key)
 
     def wrong(self, key: str, what: str) -> InputError:
-        """Return the error about a key; that it is missing goes before what else is said."""
+        """Return the error for a key; `what` is ignored if the key is missing."""
         if key not in self.content:
             what = tr("is missing")
         return InputError(
             f"{self._key(key)} {what}",
             where=str(self.path),
-            advice=tr("Mend the key {key}").format(key=self._key(key)),
+            advice=tr("Correct the key {key}").format(key=self._key(key)),
         )
 
     def text(self, key: str) -> str:
-        """Return a text that says something."""
+        """Return a text that is not empty."""
         value = self.content.get(key)
         if not isinstance(value, str) or not value.strip():
             raise self.wrong(key, tr("is not a text"))
@@ -44,7 +44,7 @@ class Table:
             return plain_text(value, TEXT_LENGTH)
         except ValueError as error:
             raise self.wrong(
-                key, tr("is not a plain text of at most {n} characters").format(n=TEXT_LENGTH)
+                key, tr("is not plain text of at most {n} characters").format(n=TEXT_LENGTH)
             ) from error
 
     def whole(self, key: str) -> int:
@@ -55,7 +55,7 @@ class Table:
         return value
 
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
-        """Return a number between two others, or the default where the key is missing."""
+        """Return a number within a range, or the default if the key is missing."""
         value = self.content.get(key, default)
         good = isinstance(value, int | float) and not isinstance(value, bool)
         if not good or not low <= value <= high:  # type: ignore[operator]
@@ -64,25 +64,25 @@ class Table:
         return float(value)  # type: ignore[arg-type]
 
     def table(self, key: str) -> Table:
-        """Return a table in this one."""
+        """Return a sub-table."""
         value = self.content.get(key)
         if not isinstance(value, dict):
             raise self.wrong(key, tr("is not a table"))
         return Table(value, key, self.path)
 
     def file_names(self) -> tuple[str, ...]:
-        """Return the keys, each of which is to name a file in a stage's folder."""
+        """Return the keys, each of which must be the name of a file in a stage's folder."""
         for key in self.content:
             if not is_file_name(key):
-                raise self.wrong(key, tr("is not the name of a picture in the stage's folder"))
+                raise self.wrong(key, tr("is not the name of an image in the stage's folder"))
         return tuple(self.content)
 
     def no_more(self, *known: str) -> None:
-        """Refuse keys other than those known."""
+        """Refuse unknown keys."""
         for key in self.content:
             if key not in known:
                 raise InputError(
-                    tr("the key {key} is unknown").format(key=self._key(key)),
+                    tr("The key {key} is unknown").format(key=self._key(key)),
                     where=str(self.path),
                     advice=tr("Remove it, or correct its spelling"),
                 )

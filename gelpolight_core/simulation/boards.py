@@ -1,4 +1,4 @@
-"""Checkerboards before the virtual camera: patterns, poses and their pictures, in air."""
+"""Checkerboards in front of the virtual camera: patterns, poses and their images, in air."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from gelpolight_core.simulation.rays import (
 Array = NDArray[np.float64]
 
 WHITE, BLACK, ROOM = 200.0 / 255.0, 9.5 / 255.0, 58.7 / 255.0
-"""Brightness of printed white, printed black and what lies behind a board under room light."""
+"""Brightness of printed white, printed black and the area behind a board under room light."""
 DARK_ROOM = 2.2 / 255.0
-"""Brightness beside the working circle when the board lies on the sensor's top."""
+"""Brightness next to the working circle when the board lies on top of the sensor."""
 
 _SAMPLES = 4
 _PICTURE_EDGE_SHARE = 0.02
@@ -43,12 +43,12 @@ class BoardPose:
     axes : (3, 3)
         Rows: the board's x, y and normal in the camera frame.
     centre_mm : (3,)
-        Middle of the pattern, camera frame.
+        Centre of the pattern, camera frame.
     disc_radius_mm : float
-        The board is seen inside this circle about `disc_centre_mm`; infinite: the board is a
+        The board is visible inside this circle around `disc_centre_mm`; if infinite, the board is a
         rectangle with a white border of one square.
     disc_centre_mm : (2,)
-        In the board's own x and y.
+        In the board's x and y.
     """
 
     inner_corners: tuple[int, int]
@@ -71,7 +71,7 @@ class BoardPose:
 def _board_value(
     x: float, y: float, columns: int, rows: int, square: float
 ) -> float:  # pragma: no cover - compiled
-    """Return 0 black, 1 white, -1 off the board; the pattern's middle is the origin."""
+    """Return 0 for black, 1 for white, -1 outside the board; the pattern's centre is the origin."""
     a, b = x / square + 0.5 * (columns + 1), y / square + 0.5 * (rows + 1)
     if 0.0 <= a < columns + 1 and 0.0 <= b < rows + 1:
         return float((math.floor(a) + math.floor(b)) % 2)
@@ -116,7 +116,7 @@ def _draw(
     return out
 
 
-def board_picture(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt = never) -> Array:
+def board_image(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt = never) -> Array:
     """Return (rows, columns): the board's brightness at each pixel, without blur and noise.
 
     Parameters
@@ -124,9 +124,9 @@ def board_picture(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt
     camera : CameraDesign
         The lens.
     pose : BoardPose
-        How the board is held.
+        Pose of the board.
     interrupt : callable, optional
-        Called now and then; what it raises stops the work.
+        Called regularly; an exception raised by it stops the work.
     """
     disc = (*pose.disc_centre_mm, min(pose.disc_radius_mm, 1e308))
     round_board = math.isfinite(pose.disc_radius_mm)
@@ -135,7 +135,7 @@ def board_picture(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt
     out = np.empty((camera.height_px, camera.width_px))
     for start, stop in bands(0, camera.height_px):
         interrupt()
-        # Directions at the pixels' corners: within a pixel the lens is straight to 1e-8.
+        # Directions at the pixel corners: within a pixel the lens is linear to 1e-8.
         v, u = np.mgrid[start : stop + 1, : camera.width_px + 1] - 0.5
         directions = pixel_directions(camera, u, v)
         out[start:stop] = _draw(
@@ -145,7 +145,7 @@ def board_picture(camera: CameraDesign, pose: BoardPose, *, interrupt: Interrupt
 
 
 def _turned(rx: float, ry: float, rz: float) -> Array:
-    """Return board axes (rows) after turning about z, then y, then x."""
+    """Return board axes (rows) after rotation about z, then y, then x."""
     cx, sx, cy, sy = math.cos(rx), math.sin(rx), math.cos(ry), math.sin(ry)
     cz, sz = math.cos(rz), math.sin(rz)
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, sx], [0.0, -sx, cx]])
@@ -162,10 +162,10 @@ def board_views(
     inner_corners: tuple[int, int] = (9, 6),
     square_mm: float = 3.0,
 ) -> tuple[BoardPose, ...]:
-    """Return poses of a hand-held board with all its inner corners in the picture.
+    """Return poses of a hand-held board with all its inner corners in the image.
 
-    The board is tilted by up to 32 degrees, fills half to nine tenths of the picture's width, and
-    leans towards the four corners in turn, so that the views together reach the picture's borders.
+    The board is tilted by up to 32 degrees, fills half to nine tenths of the image width, and is
+    shifted towards the four corners in turn, so that all views together reach the image borders.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def board_views(
     rng : Generator
         Source of the poses.
     count, inner_corners, square_mm
-        How many views of which board.
+        Number of views, and the board.
     """
     length = (inner_corners[0] + 1) * square_mm
     size = np.array([camera.width_px, camera.height_px], dtype=np.float64)
@@ -190,18 +190,18 @@ def board_views(
             tilt = rng.uniform(-1.0, 1.0, 2) * math.radians(32.0)
             axes = _turned(tilt[0], tilt[1], math.radians(rng.uniform(-25.0, 25.0)))
             pose = BoardPose(inner_corners, square_mm, axes, distance * direction)
-            if _in_picture(camera, pose):
+            if _in_image(camera, pose):
                 poses.append(pose)
                 break
     return tuple(poses)
 
 
-def _in_picture(camera: CameraDesign, pose: BoardPose) -> bool:
+def _in_image(camera: CameraDesign, pose: BoardPose) -> bool:
     corners = pose.corners_mm()
     if corners[:, 2].min() <= 0.0:
         return False
     room = _PICTURE_EDGE_SHARE * camera.width_px
-    # One square of room, so that the squares around the outer corners are seen whole.
+    # One square of margin, so that the squares around the outer corners are completely visible.
     middle = corners.mean(axis=0)
     pixels = project_to_pixels(camera, middle + 1.35 * (corners - middle))
     low, high = pixels.min(axis=0), pixels.max(axis=0)

@@ -1,4 +1,4 @@
-"""One decorator for the compiled loops of the simulation, and how long work is stopped."""
+"""The decorator for compiled loops of the simulation, and the way to stop long work."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numba
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 Interrupt = Callable[[], None]
-"""Called now and then during long work; what it raises stops the work."""
+"""Called regularly during long work; an exception raised by it stops the work."""
 
 
 def compiled(function: Function) -> Function:
-    """Compile a loop once, keep it on disk, and let other threads run beside it.
+    """Compile a loop once, cache it on disk, and release the GIL while it runs.
 
-    Never ``parallel=True``: numba's workqueue layer aborts when two threads enter it.
+    Never use ``parallel=True``: numba's workqueue layer aborts when two threads enter it.
     """
     return cast(Function, numba.njit(function, cache=True, nogil=True, error_model="numpy"))
 
 
 def never() -> None:
-    """Let the work run to its end."""
+    """Never interrupt the work."""

@@ -1,4 +1,4 @@
-"""Shadow under point light and under directional light (the paper's Fig. 1), in numbers."""
+"""Shadow under point light and under directional light (the paper's Fig. 1), as numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gelpolight_core.export.drawing_thread import in_drawing_thread
+from gelpolight_core.design.parts import LedDesign
+from gelpolight_core.drawing_thread import in_drawing_thread
 from gelpolight_core.simulation.indenters import Cylinder, press
 from gelpolight_core.simulation.lamps import Lamp, ParallelLamp, PointLamp, lamp_table
 from gelpolight_core.simulation.occlusion import lit_share
@@ -23,12 +24,12 @@ Array = NDArray[np.float64]
 
 _AZIMUTHS_DEG = (90.0, 210.0, 330.0)
 _LIT = 0.5
-"""A cell counts as shadow when less than half of a lamp's disc is seen from it."""
+"""A cell counts as shadow if less than half of a lamp's disc is visible from it."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShadowRow:
-    """Shadow of one lighting at one depth.
+    """Shadow of one kind of light at one depth.
 
     Attributes
     ----------
@@ -41,9 +42,9 @@ class ShadowRow:
     mean_shadow_mm2 : float
         Area dark under one light, mean of the three.
     any_shadow_mm2 : float
-        Area dark under at least one light: there the plain three-light solution fails.
+        Area dark under at least one light, where the plain three-light solution fails.
     two_dark_mm2 : float
-        Area dark under two or three lights: there no light-based solution exists.
+        Area dark under two or three lights, where no light-based solution exists.
     """
 
     lighting: str
@@ -64,7 +65,7 @@ class ShadowComparison:
     y_mm: float
 
     def curve(self, lighting: str, setting: float) -> tuple[Array, Array]:
-        """Return (depth_mm, any_shadow_mm2) of one lighting."""
+        """Return (depth_mm, any_shadow_mm2) for one kind of light."""
         chosen = [r for r in self.rows if r.lighting == lighting and r.setting == setting]
         return (
             np.array([r.depth_mm for r in chosen]),
@@ -89,7 +90,7 @@ def point_lamps(height_mm: float, circle_radius_mm: float) -> tuple[PointLamp, .
 def shadow_areas(surface: PressedSurface, lamps: tuple[Lamp, ...]) -> tuple[float, float, float]:
     """Return the areas dark under one lamp (mean), under any, and under two or more, in mm2.
 
-    Attached shadow (the surface is turned away) and cast shadow both count.
+    Both attached shadow (the surface faces away) and cast shadow count.
 
     Parameters
     ----------
@@ -123,6 +124,7 @@ def shadow_areas(surface: PressedSurface, lamps: tuple[Lamp, ...]) -> tuple[floa
 
 def shadow_comparison(
     *,
+    leds: Sequence[LedDesign] = (),
     led_heights_mm: Sequence[float] = (8.0, 13.7, 20.0),
     elevations_deg: Sequence[float] = (15.0, 30.0, 45.0),
     depths_mm: Sequence[float] = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5),
@@ -137,26 +139,31 @@ def shadow_comparison(
 
     Parameters
     ----------
+    leds : sequence of LedDesign, optional
+        The LEDs of a design; they replace the lamps on a circle.
     led_heights_mm : sequence of float, optional
-        Heights of the point lamps below the top surface.
+        Heights below the top surface of lamps on a circle, each tested in turn.
     elevations_deg : sequence of float, optional
         Elevations of the directional light above the surface.
     depths_mm : sequence of float, optional
         Indentation depths.
     diameter_mm, x_mm, y_mm : float, optional
-        The cylinder and where it is pressed.
+        The cylinder and its position.
     circle_radius_mm : float, optional
-        Radius on which the point lamps stand.
+        Radius of the circle of point lamps.
     decay_mm, pitch_mm : float, optional
-        Decay length of the membrane, cell of the surface.
+        Decay length of the membrane, cell size of the surface.
 
     Returns
     -------
     ShadowComparison
     """
+    own = tuple(PointLamp(led.x_mm, led.y_mm, led.height_mm) for led in leds)
     lightings: list[tuple[str, float, tuple[Lamp, ...]]] = [
         ("point", height, point_lamps(height, circle_radius_mm)) for height in led_heights_mm
     ]
+    if own:
+        lightings = [("point", float(np.mean([lamp.height_mm for lamp in own])), own)]
     lightings += [
         ("directional", elevation, directional_lamps(elevation)) for elevation in elevations_deg
     ]
@@ -180,7 +187,7 @@ def shadow_comparison(
 
 
 def _longest_shadow(depth_mm: float, elevation_deg: float) -> float:
-    """Length of the shadow that the lowest directional light throws, with some room."""
+    """Length of the shadow from the lowest directional light, with some margin."""
     return 0.5 + depth_mm / math.tan(math.radians(elevation_deg))
 
 
@@ -193,7 +200,7 @@ def draw_shadow_comparison(comparison: ShadowComparison, file: Path | BinaryIO) 
     comparison : ShadowComparison
         The table.
     file : Path or binary file
-        Where the PNG goes.
+        Destination of the PNG.
     """
     figure = Figure(figsize=(6.4, 4.2), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)

@@ -1,9 +1,9 @@
-"""How the membrane lies over an indenter: an elastic foundation with an obstacle.
+"""The shape of the membrane over an indenter: an elastic foundation with an obstacle.
 
-Outside the contact the depth w obeys ``lambda^2 laplacian(w) = w``; where the indenter touches, the
-membrane follows it; everywhere w is at least the indenter's depth. For a shape with an axis the
+Outside the contact the depth w satisfies ``lambda^2 laplacian(w) = w``; in the contact the membrane
+follows the indenter; everywhere w is at least the indenter's depth. For an axisymmetric shape the
 free part is ``w = w_b K0(r / lambda) / K0(b / lambda)``, and the membrane leaves the shape at the
-radius b at which both slopes agree.
+radius b at which both slopes are equal.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from gelpolight_core.simulation.compiled import Interrupt, compiled, never
 Array = NDArray[np.float64]
 
 NOWHERE_MM = -1e9
-"""Depth of an obstacle where there is none."""
+"""Depth of an obstacle outside its outline."""
 
 _COARSEST_CELLS = 24
 _MOST_SWEEPS = 4000
-_SWEEPS_AT_ONCE = 25  # a few hundredths of a second on the finest grids
+_SWEEPS_AT_ONCE = 25  # takes a few hundredths of a second on the finest grids
 
 
 def contact_radius(
     profile: Callable[[float], tuple[float, float]], edge_mm: float, decay_mm: float
 ) -> float:
-    """Return the radius at which the membrane leaves a shape with an axis.
+    """Return the radius at which the membrane leaves an axisymmetric shape.
 
     Parameters
     ----------
     profile : callable
-        Radius in mm -> (depth of the shape, how fast it falls per mm of radius); falling ever
-        faster.
+        Maps the radius in mm to (depth of the shape, its decrease per mm of radius); the decrease
+        must grow with the radius.
     edge_mm : float
-        Radius at which the shape ends.
+        Radius of the shape's edge.
     decay_mm : float
         Decay length lambda of the foundation.
 
     Returns
     -------
     float
-        b in mm; the edge when the membrane holds on to the shape up to there.
+        b in mm; the edge radius if the membrane stays on the shape up to its edge.
     """
 
     def steeper(radius: float) -> float:
@@ -92,7 +92,7 @@ def _sweep(
 def _relax(
     depth: Any, obstacle: Any, weight: float, relaxation: float, tolerance: float, most: int
 ) -> bool:  # pragma: no cover - compiled
-    """Sweep until the change is below the tolerance; return whether it is."""
+    """Sweep until the change is below the tolerance; return whether this was reached."""
     for _ in range(most):
         if _sweep(depth, obstacle, weight, relaxation) < tolerance:
             return True
@@ -108,14 +108,14 @@ def solve_drape(
     tolerance_mm: float = 2e-7,
     interrupt: Interrupt = never,
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Solve the obstacle problem on a grid whose border lies flat.
+    """Solve the obstacle problem on a grid with a flat border.
 
-    Projected successive over-relaxation, started from the same problem on grids of twice the pitch.
+    Projected successive over-relaxation, started from the solution on grids of twice the pitch.
 
     Parameters
     ----------
     obstacle : callable
-        (x_mm, y_mm) -> depth of the indenter; `NOWHERE_MM` beside it.
+        (x_mm, y_mm) -> depth of the indenter; `NOWHERE_MM` outside it.
     x_mm, y_mm : (columns,), (rows,)
         Evenly spaced positions with one common pitch.
     decay_mm : float
@@ -123,7 +123,7 @@ def solve_drape(
     tolerance_mm : float, optional
         Largest change of the last sweep.
     interrupt : callable, optional
-        Called now and then; what it raises stops the work.
+        Called regularly; an exception raised by it stops the work.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def solve_drape(
     depth[0], depth[-1], depth[:, 0], depth[:, -1] = 0.0, 0.0, 0.0, 0.0
     weight = (decay_mm / pitch) ** 2
     radius = 4.0 * weight / (1.0 + 4.0 * weight)
-    # Young's optimal factor for the problem without the obstacle, which is the slower one.
+    # Young's optimal factor for the problem without the obstacle, which converges more slowly.
     relaxation = 2.0 / (1.0 + math.sqrt(1.0 - radius * radius))
     for _ in range(0, _MOST_SWEEPS, _SWEEPS_AT_ONCE):
         interrupt()

@@ -1,4 +1,4 @@
-"""From brightness to the camera's numbers: blur, crosstalk, noise, saturation, response, steps."""
+"""From brightness to pixel values: blur, crosstalk, noise, saturation, response, quantisation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 def blurred(picture: Array, sigma_px: float) -> Array:
-    """Return the picture after the optics' Gaussian blur."""
+    """Return the image after the Gaussian blur of the optics."""
     if sigma_px <= 0.0:
         return picture
     sigma = (sigma_px, sigma_px) + (0.0,) * (picture.ndim - 2)
@@ -21,12 +21,12 @@ def blurred(picture: Array, sigma_px: float) -> Array:
 
 
 def mixed(brightness: Array, crosstalk: tuple[tuple[float, ...], ...]) -> Array:
-    """Return camera channels (rows, columns, 3) from the lamps' shares (rows, columns, 3)."""
+    """Return camera channels (rows, columns, 3) from the light of the lamps (rows, columns, 3)."""
     return np.asarray(brightness @ np.array(crosstalk).T)
 
 
 def encoded(light: Array, camera: CameraDesign) -> Array:
-    """Return light 0..1 as the camera's response encodes it, 0..1."""
+    """Return light 0..1 encoded by the camera response, 0..1."""
     if camera.response == "gamma":
         return np.asarray(light ** (1.0 / camera.gamma))
     if camera.response == "srgb":
@@ -38,10 +38,10 @@ def encoded(light: Array, camera: CameraDesign) -> Array:
 def exposed(
     signal: Array, camera: CameraDesign, rng: np.random.Generator, *, averaged: int = 1
 ) -> Frame:
-    """Return the camera's numbers for a signal.
+    """Return the pixel values for a signal.
 
     Shot noise has the variance ``shot_variance * signal``, read noise ``read_sd ** 2``; averaging
-    frames divides both. What exceeds 1 saturates; what is left is encoded and rounded.
+    frames divides both. Values above 1 saturate; the result is encoded and rounded.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is pressed into the virtual sensor, and the surface that the membrane takes on it."""
+"""Objects pressed into the virtual sensor, and the resulting membrane surface."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.wholeness import decode_picture
+from gelpolight_core.image.file import decode_picture
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
@@ -26,27 +26,28 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float64]
 
 PITCH_MM = 0.025
-"""Default cell of a pressed surface: the size of a pixel of the default sensor's picture."""
+"""Default cell size of a pressed surface: one pixel of the default sensor's image."""
 
 MARGIN_DECAYS = 8.0
-"""Room around an indenter in decay lengths: the depth has fallen to exp(-8) of its edge's."""
+"""Margin around an indenter in decay lengths: the depth falls to exp(-8) of its value at the edge.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Ball:
-    """A ball whose lowest point goes `depth_mm` deep."""
+    """A ball whose lowest point is `depth_mm` deep."""
 
     radius_mm: float
     depth_mm: float
 
     @property
     def reach_mm(self) -> float:
-        """Radius of the circle that holds all of it that can touch."""
+        """Radius of the circle that contains the possible contact."""
         rest = max(self.radius_mm - self.depth_mm, 0.0)
         return math.sqrt(self.radius_mm**2 - rest**2)
 
     def profile(self, radius_mm: float) -> tuple[float, float]:
-        """Return (depth, fall per mm) at a distance from the axis."""
+        """Return (depth, decrease per mm) at a distance from the axis."""
         root = math.sqrt(max(self.radius_mm**2 - radius_mm**2, 1e-300))
         return self.depth_mm - self.radius_mm + root, radius_mm / root
 
@@ -56,7 +57,7 @@ class Ball:
         Parameters
         ----------
         x_mm, y_mm : (...)
-            From its middle, before it is turned.
+            Relative to its centre, before rotation.
         """
         inside = self.radius_mm**2 - x_mm**2 - y_mm**2
         root = np.sqrt(np.maximum(inside, 0.0))
@@ -77,7 +78,7 @@ class Cylinder:
         return 0.5 * self.diameter_mm
 
     def profile(self, radius_mm: float) -> tuple[float, float]:
-        """Return (depth, fall per mm) at a distance from the axis."""
+        """Return (depth, decrease per mm) at a distance from the axis."""
         drop, fall = _rounding(np.array(self.reach_mm - radius_mm), self.edge_radius_mm)
         return self.depth_mm - float(drop), float(fall)
 
@@ -87,7 +88,7 @@ class Cylinder:
         Parameters
         ----------
         x_mm, y_mm : (...)
-            From its middle, before it is turned.
+            Relative to its centre, before rotation.
         """
         inside = self.reach_mm - np.hypot(x_mm, y_mm)
         drop, _ = _rounding(inside, self.edge_radius_mm)
@@ -113,7 +114,7 @@ class Cuboid:
         Parameters
         ----------
         x_mm, y_mm : (...)
-            From its middle, before it is turned.
+            Relative to its centre, before rotation.
         """
         inside = self.reach_mm - np.maximum(np.abs(x_mm), np.abs(y_mm))
         drop, _ = _rounding(inside, self.edge_radius_mm)
@@ -127,11 +128,11 @@ class Relief:
     Attributes
     ----------
     height_mm : (rows, columns)
-        Above its base; NaN where there is no material.
+        Height above the base; NaN without material.
     pitch_mm : float
-        Distance between heights.
+        Grid spacing of the heights.
     depth_mm : float
-        Of the highest point.
+        Depth of the highest point.
     """
 
     height_mm: Array
@@ -144,22 +145,22 @@ class Relief:
         return 0.5 * self.pitch_mm * float(max(self.height_mm.shape) - 1)
 
     def obstacle(self, x_mm: Array, y_mm: Array) -> Array:
-        """Return the relief's depth around its middle.
+        """Return the relief's depth around its centre.
 
         Parameters
         ----------
         x_mm, y_mm : (...)
-            From its middle, before it is turned.
+            Relative to its centre, before rotation.
         """
         rows, columns = self.height_mm.shape
-        place = [
+        position = [
             y_mm / self.pitch_mm + 0.5 * (rows - 1),
             x_mm / self.pitch_mm + 0.5 * (columns - 1),
         ]
         missing = np.isnan(self.height_mm)
         filled = np.where(missing, 0.0, self.height_mm)
-        height = map_coordinates(filled, place, order=1, mode="constant", cval=0.0)
-        gap = map_coordinates(missing.astype(float), place, order=1, mode="constant", cval=1.0)
+        height = map_coordinates(filled, position, order=1, mode="constant", cval=0.0)
+        gap = map_coordinates(missing.astype(float), position, order=1, mode="constant", cval=1.0)
         depth = height - float(np.nanmax(self.height_mm)) + self.depth_mm
         return np.where(gap > 1e-6, NOWHERE_MM, depth)
 
@@ -169,16 +170,16 @@ Indenter = Ball | Cylinder | Cuboid | Relief
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Settled:
-    """The membrane on a shape without an axis, in the shape's own frame, its middle at (0, 0).
+    """The membrane on a shape that is not axisymmetric, in the shape's own frame, centre at (0, 0).
 
     Attributes
     ----------
     depth_mm, contact : (2 count + 1, 2 count + 1)
-        Depth, and where the shape is touched.
+        Depth, and contact with the shape.
     step_mm : float
         Distance between cells.
     count : int
-        Cells from the middle to the border.
+        Cells from the centre to the border.
     """
 
     depth_mm: Array
@@ -188,7 +189,7 @@ class Settled:
 
 
 def _rounding(inside_mm: Array, edge_mm: float) -> tuple[Array, Array]:
-    """Return how far a rounded edge has dropped at a distance inside the outline, and its slope."""
+    """Return the drop of a rounded edge at a distance inside the outline, and its slope."""
     if edge_mm <= 0.0:
         return np.zeros_like(inside_mm), np.zeros_like(inside_mm)
     beyond = np.clip(edge_mm - inside_mm, 0.0, edge_mm)
@@ -210,26 +211,26 @@ def press(
 ) -> PressedSurface:
     """Return the membrane's surface under an indenter.
 
-    A shape with an axis is solved in closed form, any other on a grid in its own frame, which is
-    then turned.
+    An axisymmetric shape is solved in closed form; any other on a grid in its own frame, which is
+    then rotated.
 
     Parameters
     ----------
     indenter : Ball, Cylinder, Cuboid or Relief
-        What is pressed.
+        The pressed object.
     x_mm, y_mm, yaw_deg : float, optional
-        Where, and how turned (from x to y).
+        Position, and rotation (from x to y).
     decay_mm : float, optional
         Decay length of the membrane.
     pitch_mm : float, optional
-        Cell of the surface.
+        Cell size of the surface.
     margin_mm : float, optional
-        Room around the indenter; at least as much as the membrane needs to come to rest.
+        Margin around the indenter; at least as much as the membrane needs to become flat.
     settled : Settled, optional
-        From :func:`settle` with the same indenter, decay length and cell, which saves solving it
-        for every place anew.
+        From :func:`settle` with the same indenter, decay length and cell size; saves solving it
+        again for every position.
     interrupt : callable, optional
-        Called now and then; what it raises stops the work.
+        Called regularly; an exception raised by it stops the work.
     """
     margin = max(MARGIN_DECAYS * decay_mm, margin_mm)
     turned = not isinstance(indenter, (Ball, Cylinder))
@@ -254,7 +255,7 @@ def _square_reach(yaw_deg: float) -> float:
 
 
 def _cells(middle: float, half: float, pitch: float) -> Array:
-    """Return cells on whole multiples of the pitch, so that all surfaces share one lattice."""
+    """Return cells at whole multiples of the pitch, so that all surfaces share one lattice."""
     first, last = math.floor((middle - half) / pitch), math.ceil((middle + half) / pitch)
     return pitch * np.arange(first, last + 1, dtype=np.float64)
 
@@ -279,7 +280,7 @@ def settle(
     pitch_mm: float = PITCH_MM,
     interrupt: Interrupt = never,
 ) -> Settled:
-    """Return how the membrane settles on a shape without an axis, in the shape's own frame.
+    """Return the membrane on a shape that is not axisymmetric, in the shape's own frame.
 
     Parameters
     ----------
@@ -287,7 +288,7 @@ def settle(
         As in :func:`press`.
     """
     half = indenter.reach_mm + MARGIN_DECAYS * decay_mm
-    # The outline falls on cells, so that the block has its nominal side.
+    # The outline lies on cells, so that the block has its nominal side.
     count = math.ceil(half / pitch_mm)
     step = indenter.reach_mm / max(1, round(indenter.reach_mm / pitch_mm))
     cells = step * np.arange(-count, count + 1, dtype=np.float64)
@@ -300,48 +301,46 @@ def settle(
 def _turned_drape(
     indenter: Cuboid | Relief, along: Array, across: Array, settled: Settled
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Read the solution in the indenter's frame at turned positions."""
-    place = [across / settled.step_mm + settled.count, along / settled.step_mm + settled.count]
+    """Read the solution in the indenter's frame at rotated positions."""
+    position = [across / settled.step_mm + settled.count, along / settled.step_mm + settled.count]
     turned = map_coordinates(
-        settled.depth_mm, place, order=3, mode="constant", cval=0.0, prefilter=True
+        settled.depth_mm, position, order=3, mode="constant", cval=0.0, prefilter=True
     )
-    touched = map_coordinates(settled.contact.astype(np.float64), place, order=1, cval=0.0) > 0.5
+    touched = map_coordinates(settled.contact.astype(np.float64), position, order=1, cval=0.0) > 0.5
     return np.clip(turned, 0.0, indenter.depth_mm), touched
 
 
-def relief_from_picture(
-    path: Path, *, width_mm: float, relief_mm: float, depth_mm: float
-) -> Relief:
-    """Read a relief from a grey picture of 8 or 16 bit; black is its base, white its highest.
+def relief_from_image(path: Path, *, width_mm: float, relief_mm: float, depth_mm: float) -> Relief:
+    """Read a relief from a grey image of 8 or 16 bit; black is the base, white the highest.
 
     Parameters
     ----------
     path : Path
         PNG or TIFF.
     width_mm : float
-        Width of the picture on the object.
+        Width of the image on the object.
     relief_mm : float
         Height of white above black.
     depth_mm : float
-        How deep the highest point is pressed.
+        Depth of the highest point.
 
     Raises
     ------
     InputError
-        If the file is no grey picture of 8 or 16 bit, or shows no heights.
+        If the file is not a grey image of 8 or 16 bit, or has only one grey level.
     """
     picture = decode_picture(path)
     if picture is None or picture.ndim != 2 or picture.dtype not in (np.uint8, np.uint16):
         raise InputError(
-            tr("the file is not a grey picture of 8 or 16 bit"),
+            tr("The file is not a grey image of 8 or 16 bit"),
             where=str(path),
             advice=tr("Save the heights as a grey PNG or TIFF"),
         )
     if min(picture.shape) < 2 or picture.min() == picture.max():
         raise InputError(
-            tr("the picture shows no heights"),
+            tr("The image has only one grey level"),
             where=str(path),
-            advice=tr("Use a picture whose grey follows the height"),
+            advice=tr("Use an image whose grey level represents the height"),
         )
     full = 255.0 if picture.dtype == np.uint8 else 65535.0
     height = picture.astype(np.float64) / full * relief_mm
@@ -366,11 +365,11 @@ def coin(diameter_mm: float = 8.0, depth_mm: float = 0.6, *, pitch_mm: float = P
     Parameters
     ----------
     diameter_mm : float, optional
-        Of the coin.
+        Diameter of the coin.
     depth_mm : float, optional
-        Of its highest point when pressed.
+        Depth of its highest point when pressed.
     pitch_mm : float, optional
-        Distance between its heights.
+        Grid spacing of the heights.
     """
     radius = 0.5 * diameter_mm
     flank = 0.02 * diameter_mm
@@ -408,7 +407,7 @@ def nut(
         r, angle = np.hypot(x, y), np.arctan2(y, x)
         turn = np.mod(angle, math.radians(60.0)) - math.radians(30.0)
         inside = flat - r * np.cos(turn)
-        # The crown's bevel is 30 degrees to the face, the countersink 45.
+        # The crown has a bevel of 30 degrees to the face, the countersink 45 degrees.
         crown = math.tan(math.radians(30.0)) * np.clip(r - 0.95 * flat, 0.0, None)
         sink = np.clip(1.15 * hole - r, 0.0, None)
         return np.where((inside >= 0.0) & (r >= hole), 1.0 - crown - sink, np.nan)

@@ -1,4 +1,4 @@
-"""The lights of the virtual sensor: small lamps close by, or parallel light from far away."""
+"""The lights of the virtual sensor: small near lamps, or parallel light."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 
 Array = NDArray[np.float64]
 
-# Columns of the table that the compiled code reads.
+# Columns of the lamp table read by the compiled code.
 X, Y, Z, POWER, LOBE, RADIUS, PARALLEL = range(7)
 
 
@@ -27,9 +27,9 @@ class PointLamp:
     power : float
         Irradiance on a facing surface at 1 mm on the lamp's axis.
     lobe_exponent : float
-        Intensity goes as cos^exponent of the angle to the lamp's axis.
+        Intensity is cos^exponent of the angle to the lamp's axis.
     diameter_mm : float
-        Of the disc; gives shadows their soft edge.
+        Diameter of the disc; gives shadows their soft edge.
     """
 
     x_mm: float
@@ -40,7 +40,7 @@ class PointLamp:
     diameter_mm: float = 0.2
 
     def row(self) -> tuple[float, ...]:
-        """Return the lamp as the compiled code reads it."""
+        """Return the lamp in the format of the compiled code."""
         radius = 0.5 * self.diameter_mm
         return (
             self.x_mm, self.y_mm, -self.height_mm, self.power, self.lobe_exponent, radius, 0.0
@@ -54,9 +54,9 @@ class ParallelLamp:
     Attributes
     ----------
     azimuth_deg : float
-        Side of the sensor on which the light stands, from x to y.
+        Direction of the light source, from x to y.
     elevation_deg : float
-        Between the light's direction and the top surface; 90: perpendicular to it.
+        Angle between the light and the top surface; 90 is perpendicular.
     power : float
         Irradiance on a facing surface.
     """
@@ -66,7 +66,7 @@ class ParallelLamp:
     power: float = 1.0
 
     def row(self) -> tuple[float, ...]:
-        """Return the lamp as the compiled code reads it: x, y, z hold the unit direction to it."""
+        """Return the lamp for the compiled code; x, y, z are the unit direction to it."""
         azimuth, elevation = math.radians(self.azimuth_deg), math.radians(self.elevation_deg)
         flat = math.cos(elevation)
         return (

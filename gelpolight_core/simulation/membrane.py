@@ -21,16 +21,16 @@ def reflectance_factor(
     Parameters
     ----------
     membrane : MembraneDesign
-        Its variation and specks.
+        Properties of its variation and specks.
     rng : Generator
         Source of the pattern.
 
     Returns
     -------
     factor : (cells, cells)
-        About 1.
+        Factor around 1.
     first_mm, pitch_mm : float
-        Position of the first cell in x and in y, and the cell.
+        Position of the first cell in x and y, and the cell size.
     rim_mm : float
         Radius of the working circle.
     """
@@ -47,14 +47,14 @@ def reflectance_factor(
 
 def _smooth(size: int, scale_mm: float, rng: np.random.Generator) -> Array:
     """Return a random field of unit variance that varies over `scale_mm`."""
-    # Drawn on a lattice far finer than the field varies, then read off linearly.
+    # Drawn on a lattice much finer than the variation, then interpolated linearly.
     step = max(1, int(scale_mm / FACTOR_PITCH_MM / 12))
     coarse = rng.standard_normal((size // step + 2, size // step + 2))
     sigma = scale_mm / (2.0 * FACTOR_PITCH_MM * step)
     coarse = gaussian_filter(coarse, sigma, mode="wrap")
     coarse /= max(float(coarse.std()), 1e-12)
-    place = np.arange(size) / step
-    i, a = place.astype(int), place % 1.0
+    position = np.arange(size) / step
+    i, a = position.astype(int), position % 1.0
     rows = coarse[i] * (1.0 - a)[:, None] + coarse[i + 1] * a[:, None]
     return np.asarray(rows[:, i] * (1.0 - a) + rows[:, i + 1] * a)
 

@@ -1,7 +1,7 @@
-"""Which point of the membrane a ray meets, and how much of a lamp that point sees.
+"""Which membrane point a ray meets, and which share of a lamp that point sees.
 
-Both march over the depth map itself, so hidden walls, perspective and cast shadows come out of the
-geometry and not out of an approximation.
+Both march over the depth map itself, so hidden walls, perspective and cast shadows follow from the
+geometry without approximation.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 _ROOT_STEPS = 30
 _SHADOW_STEP = 0.7
-"""Marching step towards a lamp in cells: below one, so that no ridge is stepped over."""
+"""Step of the march towards a lamp in cells: below one, so that no ridge is skipped."""
 
 
 @compiled
@@ -64,13 +64,13 @@ def visible_depth(
     Parameters
     ----------
     depth, tile_max, tile_min : arrays
-        Of the :class:`PressedSurface`.
+        Maps of the :class:`PressedSurface`.
     deepest : float
         Greatest depth of the whole surface.
     cell : (column, row)
-        Where the ray would meet the undeformed surface.
+        Intersection of the ray with the undeformed surface.
     move : (columns, rows)
-        How far the ray moves per mm of depth.
+        Lateral shift of the ray per mm of depth.
     """
     end = (cell[0] + deepest * move[0], cell[1] + deepest * move[1])
     high, low = tile_range(tile_max, tile_min, cell, end)
@@ -80,7 +80,7 @@ def visible_depth(
     count = max(1, math.ceil((high - low) * sideways))
     step = (high - low) / count
     above, below, f_above, f_below = high, low, 0.0, 0.0
-    # From the camera's side towards the membrane: the first crossing is what the camera sees.
+    # From the camera's side towards the membrane: the camera sees the first crossing.
     for number in range(count + 1):
         d = high - number * step
         f = d - sample(depth, cell[0] + d * move[0], cell[1] + d * move[1])
@@ -94,7 +94,7 @@ def visible_depth(
         if above - below < 1e-9:
             break
         d = 0.5 * (above + below)
-        # Regula falsi is exact where the surface is straight; the guard keeps it from creeping.
+        # Regula falsi is exact where the surface is flat; the guard prevents slow convergence.
         guess = below - f_below * (above - below) / (f_above - f_below)
         if number < 6 and above > guess > below:
             d = guess
@@ -110,28 +110,28 @@ def visible_depth(
 
 @compiled
 def steepest_horizon(
-    depth: Any, tile_max: Any, deepest: float, cell: Any, d: float, way: Any, rise: float
+    depth: Any, tile_max: Any, deepest: float, cell: Any, d: float, direction: Any, rise: float
 ) -> float:  # pragma: no cover - compiled
-    """Return the steepest slope, per cell, of what stands between a point and a lamp.
+    """Return the steepest slope, per cell, of the obstacles between a point and a lamp.
 
     Parameters
     ----------
     depth, tile_max, deepest
-        Of the :class:`PressedSurface`.
+        Maps of the :class:`PressedSurface`.
     cell : (column, row)
         The point.
     d : float
         Its depth in mm.
-    way : (columns, rows)
-        Unit direction to the lamp's foot, in cells.
+    direction : (columns, rows)
+        Unit direction to the foot of the lamp, in cells.
     rise : float
-        Depth that a ray to the lamp's highest reach gains per cell of way.
+        Depth that a ray to the lamp's highest point gains per cell.
     """
     steepest = -1e300
     along = 1.0
     rows, columns = tile_max.shape
     while d + rise * along < deepest:
-        x, y = cell[0] + way[0] * along, cell[1] + way[1] * along
+        x, y = cell[0] + direction[0] * along, cell[1] + direction[1] * along
         j, i = math.floor(x / TILE), math.floor(y / TILE)
         if not (0 <= i < rows and 0 <= j < columns):
             break
@@ -140,24 +140,24 @@ def steepest_horizon(
             steepest = max(steepest, slope)
             along += _SHADOW_STEP
         else:
-            along += _tile_exit(x, y, way, i, j)
+            along += _tile_exit(x, y, direction, i, j)
     return steepest
 
 
 @compiled
 def _tile_exit(
-    x: float, y: float, way: Any, i: int, j: int
+    x: float, y: float, direction: Any, i: int, j: int
 ) -> float:  # pragma: no cover - compiled
-    """Return how far it is along `way` to leave tile (i, j)."""
+    """Return the distance along `direction` to leave tile (i, j)."""
     far = 1e300
-    if way[0] > 1e-12:
-        far = min(far, ((j + 1) * TILE - x) / way[0])
-    elif way[0] < -1e-12:
-        far = min(far, (j * TILE - x) / way[0])
-    if way[1] > 1e-12:
-        far = min(far, ((i + 1) * TILE - y) / way[1])
-    elif way[1] < -1e-12:
-        far = min(far, (i * TILE - y) / way[1])
+    if direction[0] > 1e-12:
+        far = min(far, ((j + 1) * TILE - x) / direction[0])
+    elif direction[0] < -1e-12:
+        far = min(far, (j * TILE - x) / direction[0])
+    if direction[1] > 1e-12:
+        far = min(far, ((i + 1) * TILE - y) / direction[1])
+    elif direction[1] < -1e-12:
+        far = min(far, (i * TILE - y) / direction[1])
     return far + 1e-6
 
 
@@ -180,9 +180,9 @@ def lamp_share(
     Parameters
     ----------
     depth, tile_max
-        Of the :class:`PressedSurface`.
+        Maps of the :class:`PressedSurface`.
     grid : (x0_mm, y0_mm, pitch_mm, deepest_mm)
-        Where the depth map lies.
+        Position of the depth map.
     point : (x_mm, y_mm, depth_mm)
         The point.
     lamp : (7,)
@@ -202,13 +202,13 @@ def lamp_share(
         return 0.0
     if away < 1e-9:
         return 1.0
-    way = (dx / away, dy / away)
+    direction = (dx / away, dy / away)
     cell = ((point[0] - x0) / pitch, (point[1] - y0) / pitch)
     slope = rise_mm / (away + radius)
-    steepest = steepest_horizon(depth, tile_max, deepest, cell, d, way, slope * pitch) / pitch
+    steepest = steepest_horizon(depth, tile_max, deepest, cell, d, direction, slope * pitch) / pitch
     if steepest <= slope:
         return 1.0
-    # The horizon cuts the lamp's plane at this distance; what lies beyond it is hidden.
+    # The horizon cuts the lamp's plane at this distance; everything beyond is hidden.
     cut = rise_mm / steepest
     if radius <= 0.0:
         return 0.0 if cut < away else 1.0
@@ -219,16 +219,16 @@ def lamp_share(
 def lit_share(
     depth: Any, tile_max: Any, grid: Any, slopes: Any, lamps: Any
 ) -> Any:  # pragma: no cover - compiled
-    """Return (rows, columns, lamps): the share of each lamp that the cells see.
+    """Return (rows, columns, lamps): the visible share of each lamp from each cell.
 
-    A cell whose surface is turned away from a lamp does not see it.
+    A cell whose surface faces away from a lamp does not see it.
 
     Parameters
     ----------
     depth, tile_max, grid
         As in :func:`lamp_share`.
     slopes : (slope_x, slope_y)
-        Of the depth map.
+        Slopes of the depth map.
     lamps : (lamps, 7)
         Lamp table.
     """

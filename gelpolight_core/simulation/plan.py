@@ -1,4 +1,4 @@
-"""What a simulated session holds: its stages, the names of its files, its exposures."""
+"""The contents of a simulated session: stages, file names, exposures."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ AVERAGED = {
     "response": 1,
     "single_led": 8,
 }
-"""How many frames each stage's picture is the average of."""
+"""Number of frames averaged for the image of each stage."""
 
 EXPOSURE_MS = 8.0
-"""Exposure time of the whiteboard's picture; only the ratios to it matter."""
+"""Exposure time of the whiteboard image; only the ratios to it matter."""
 
 
 def session_stages(design: SensorDesign) -> tuple[str, ...]:
-    """Return the folders of pictures that a session of a design has."""
+    """Return the image folders of a session of a design."""
     left_out = set()
     if design.session.response_pictures == 0:
         left_out.add("response")
@@ -35,7 +35,7 @@ def session_stages(design: SensorDesign) -> tuple[str, ...]:
 
 
 def exposure_series(design: SensorDesign) -> dict[str, float]:
-    """Return the files of the stage ``response`` and their exposures over the whiteboard's own."""
+    """Return the files of the stage ``response`` and their exposures relative to the whiteboard."""
     count = design.session.response_pictures
     exposures = np.geomspace(1.0 / 32.0, 2.0, count) if count > 1 else np.ones(count)
     return {f"exp_{number:02d}.png": float(x) for number, x in enumerate(exposures)}
@@ -54,13 +54,19 @@ def press_names(presses: tuple[Press, ...]) -> tuple[str, ...]:
     return tuple(names)
 
 
+def camera_table(design: SensorDesign) -> str:
+    """Return the lines of session.toml that declare the camera response, if any."""
+    camera = design.camera
+    if not design.session.declares_response or camera.response == "linear":
+        return ""
+    gamma = camera.response == "gamma"
+    line = f"gamma = {camera.gamma!r}" if gamma else f'response = "{camera.response}"'
+    return f"\n[camera]\n{line}\n"
+
+
 def response_tables(design: SensorDesign) -> str:
-    """Return what session.toml says of the camera's response and of its series, if anything."""
-    camera, text = design.camera, ""
-    if design.session.declares_response and camera.response != "linear":
-        gamma = camera.response == "gamma"
-        line = f"gamma = {camera.gamma!r}" if gamma else f'response = "{camera.response}"'
-        text += f"\n[camera]\n{line}\n"
+    """Return the lines of session.toml for the camera response and its series, if any."""
+    text = camera_table(design)
     series = exposure_series(design)
     if series:
         lines = (f'"{name}" = {EXPOSURE_MS * x!r}\n' for name, x in series.items())

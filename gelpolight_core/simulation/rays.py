@@ -1,8 +1,8 @@
 """Camera rays of the virtual sensor, from a pixel through the layers to the top surface and back.
 
-Written for the simulation alone: the calibration has its own optics, so that a fault in either
-shows as a difference. In the sensor frame the layers are perpendicular to z, which makes the stack
-axially symmetric whatever its tilt; only the camera is turned.
+Written only for the simulation: the calibration has its own optics, so that an error in either one
+shows as a difference. In the sensor frame the layers are perpendicular to z, so the stack is
+axially symmetric for any tilt; only the camera is rotated.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from gelpolight_core.simulation.compiled import Interrupt, never
 Array = NDArray[np.float64]
 
 _NEWTON_STEPS = 12
-_NEWTON_END = 1e-14  # of a direction; 1e-11 of a pixel
+_NEWTON_END = 1e-14  # for a direction; 1e-11 of a pixel
 
-_ROWS_AT_ONCE = 64  # small enough for the processor's cache
+_ROWS_AT_ONCE = 64  # small enough for the processor cache
 
 
 @dataclass(frozen=True, slots=True)
 class RayTable:
-    """Where the ray of each pixel meets the flat top surface, and how it runs below.
+    """Intersection of each pixel's ray with the flat top surface, and its direction below.
 
     Attributes
     ----------
     x_mm, y_mm : (rows, columns), or the shape of the points traced
         Point on the undeformed top surface, sensor frame.
     slope_x, slope_y : (rows, columns)
-        Sideways move per mm of depth: the ray is at ``x_mm - depth * slope_x`` at a depth below the
+        Lateral shift per mm of depth: the ray is at ``x_mm - depth * slope_x`` at a depth below the
         top surface.
     transmission : (rows, columns)
-        Share of the light that comes through all faces to the camera (Fresnel, unpolarised).
+        Share of the light that passes all faces to the camera (Fresnel, unpolarised).
     """
 
     x_mm: Array
@@ -108,7 +108,7 @@ def camera_points(layers: LayerDesign, points_mm: Array) -> Array:
 
 
 def _steps(layers: LayerDesign, height_mm: Array | float) -> list[tuple[Array, float]]:
-    """(thickness, index) of what lies between the camera and a height below the top surface."""
+    """(thickness, index) of the layers between the camera and a height below the top surface."""
     elastomer, window = layers.elastomer_thickness_mm, layers.window_thickness_mm
     in_elastomer = np.clip(elastomer - np.asarray(height_mm, dtype=np.float64), 0.0, None)
     in_window = np.clip(elastomer + window - height_mm, 0.0, window)
@@ -132,7 +132,7 @@ def radius_through_layers(
     sine_in_air : (...)
         Sine of the angle between the ray in air and the layers' normal.
     height_mm : (...) or float, optional
-        Below the top surface; may lie in the elastomer, the window or the air.
+        Height below the top surface; may be in the elastomer, the window or the air.
     """
     total = np.zeros(np.shape(sine_in_air))
     for thickness, index in _steps(layers, height_mm):
@@ -142,7 +142,7 @@ def radius_through_layers(
 
 
 def project_through_layers(camera: CameraDesign, layers: LayerDesign, points_mm: Array) -> Array:
-    """Return the pixels at which points inside the stack are seen.
+    """Return the pixels at which points inside the stack are visible.
 
     Solves the monotone radius equation for the sine in air by Newton's method with bisection.
 
@@ -209,7 +209,7 @@ def reflection(invariant: Array, first_index: float, second_index: float) -> Arr
 
 
 def bands(first: int, last: int) -> Iterator[tuple[int, int]]:
-    """Yield (start, stop) of portions of rows that are quickly done."""
+    """Yield (start, stop) of short blocks of rows."""
     for start in range(first, last, _ROWS_AT_ONCE):
         yield start, min(start + _ROWS_AT_ONCE, last)
 
@@ -224,7 +224,7 @@ def trace_pixels(
     camera, layers : CameraDesign, LayerDesign
         The sensor.
     interrupt : callable, optional
-        Called now and then; what it raises stops the work.
+        Called regularly; an exception raised by it stops the work.
 
     Returns
     -------
@@ -241,14 +241,14 @@ def trace_pixels(
 
 
 def trace_points(camera: CameraDesign, layers: LayerDesign, u: Array, v: Array) -> RayTable:
-    """Trace the rays of any points of the picture to the undeformed top surface.
+    """Trace the rays of any image points to the undeformed top surface.
 
     Parameters
     ----------
     camera, layers : CameraDesign, LayerDesign
         The sensor.
     u, v : (...)
-        Pixel coordinates; they need not lie inside the picture.
+        Pixel coordinates; they may lie outside the image.
 
     Returns
     -------
@@ -259,7 +259,7 @@ def trace_points(camera: CameraDesign, layers: LayerDesign, u: Array, v: Array) 
     sideways = np.hypot(direction[..., 0], direction[..., 1])
     length = np.hypot(sideways, direction[..., 2])
     sine = np.where(direction[..., 2] > 0.0, sideways / length, np.nan)
-    # On the axis the direction sideways is 0 / tiny = 0.
+    # On the axis the lateral direction is 0 / tiny = 0.
     away = np.maximum(sideways, 1e-300)
     unit_x, unit_y = direction[..., 0] / away, direction[..., 1] / away
     radius = radius_through_layers(layers, sine)

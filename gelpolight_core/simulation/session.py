@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -22,10 +20,10 @@ from scipy.ndimage import map_coordinates
 from gelpolight_core.design.parts import BallPress, Press
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import make_folder, write_atomically
+from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.simulation.boards import BoardPose, board_views
+from gelpolight_core.simulation.closed import CLOSED_STAGES, closed_session_toml
 from gelpolight_core.simulation.compiled import Interrupt, never
-from gelpolight_core.simulation.drape import contact_radius
 from gelpolight_core.simulation.indenters import (
     PITCH_MM,
     Ball,
@@ -46,8 +44,8 @@ from gelpolight_core.simulation.plan import (
     response_tables,
     session_stages,
 )
-from gelpolight_core.simulation.rays import camera_points
 from gelpolight_core.simulation.surface import PressedSurface
+from gelpolight_core.simulation.truth import truth_csv, truth_table
 from gelpolight_core.simulation.virtual_sensor import (
     BareMembrane,
     BoardOnTop,
@@ -74,7 +72,7 @@ _THREADS = 2
 
 @dataclass(frozen=True, slots=True)
 class _Shot:
-    """One picture to be made."""
+    """One image to simulate."""
 
     stage: str
     file: str
@@ -89,49 +87,58 @@ def simulate_session(
     seed: int = 0,
     scale: float = 1.0,
     presses_only: bool = False,
+    closed: bool = False,
     progress: Progress | None = None,
 ) -> None:
     """Write a session folder of the virtual sensor with ``truth.json`` and ``truth/*.npz``.
 
-    The folder holds 16 checkerboard views, the board on the top surface, mirror, whiteboard,
-    background, the balls and presses of the design, and what its ``session`` asks for besides: the
-    whiteboard at several exposures, and with one LED lit.
+    The folder contains 16 checkerboard views, the board on the top surface, mirror, whiteboard,
+    background, the balls and presses of the design, and the optional stages of its ``session``: the
+    whiteboard at several exposures, and with a single LED on.
 
     Parameters
     ----------
     design : SensorDesign
-        The sensor and what is pressed into it.
+        The sensor and its presses.
     out : Path
-        Folder to be made; it must not exist, or be empty.
+        Folder to create; it must not exist, or be empty.
     seed : int, optional
-        Of the membrane's pattern, the board's poses and the noise.
+        Seed of the membrane's pattern, the board poses and the noise.
     scale : float, optional
-        Size of the pictures; the geometry in mm stays.
+        Relative size of the images; the geometry in mm stays.
     presses_only : bool, optional
-        Whether only the presses are wanted, for a sensor that is calibrated already.
+        Whether only the presses are written, for a sensor that is already calibrated.
+    closed : bool, optional
+        Whether the sensor is closed: background, balls, presses and the scale only.
     progress : callable, optional
-        Called with the file just written and the share done, 0..1; what it raises stops the work.
+        Called with the last file written and the share done, 0..1; an exception raised by it stops
+        the work.
 
     Raises
     ------
     InputError
-        If the folder holds files already or cannot be written, or the design does not hold
-        together; nothing is left in the folder then.
+        If the folder already contains files or cannot be written, or the parts of the design do not
+        fit together; the folder is then left empty.
     """
     out = Path(out)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(
-            tr("there are files already"), where=str(out), advice=tr("Name a new folder")
+            tr("The folder already contains files"),
+            where=str(out),
+            advice=tr("Choose a new folder"),
         )
     sensor = VirtualSensor(design.scaled(scale), seed)
     made = not out.exists()
-    folders = (*session_stages(design), "truth")
+    stages = CLOSED_STAGES if closed else session_stages(design)
+    folders = (*stages, "truth")
     for stage in folders:
         make_folder(out / stage)
     try:
-        _write_session(out, sensor, presses_only, progress)
+        _write_texts(out, sensor, stages, closed)
+        shots = (shot for shot in _shots(sensor) if shot.keeps_truth or not presses_only)
+        _write_images(out, sensor, [shot for shot in shots if shot.stage in stages], progress)
     except BaseException:
-        # A part of a session is of no use, and would stand in the way of the next try.
+        # An incomplete session is useless, and would block the next attempt.
         for stage in folders:
             shutil.rmtree(out / stage, ignore_errors=True)
         for text in _TEXTS:
@@ -141,11 +148,9 @@ def simulate_session(
         raise
 
 
-def _write_session(
-    out: Path, sensor: VirtualSensor, presses_only: bool, progress: Progress | None
+def _write_images(
+    out: Path, sensor: VirtualSensor, shots: Sequence[_Shot], progress: Progress | None
 ) -> None:
-    _write_texts(out, sensor)
-    shots = tuple(s for s in _shots(sensor) if s.keeps_truth or not presses_only)
     with ThreadPoolExecutor(_THREADS) as pool:
         jobs = [(shot, pool.submit(_take, sensor, shot, out)) for shot in shots]
         try:
@@ -160,7 +165,7 @@ def _write_session(
 
 def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
     design = sensor.design
-    # The dearest first, so that the last picture does not keep one thread waiting.
+    # The slowest first, so that the last image does not keep a single thread busy.
     for name, item in zip(press_names(design.presses), design.presses, strict=True):
         yield _Shot("presses", f"{name}.png", _press_maker(design, item), keeps_truth=True)
     for number, ball in enumerate(design.balls):
@@ -180,21 +185,21 @@ def _shots(sensor: VirtualSensor) -> Iterable[_Shot]:
 
 
 def checkerboard_poses(design: SensorDesign, seed: int = 0) -> tuple[BoardPose, ...]:
-    """Return how the board is held in the lens views of a session.
+    """Return the board poses in the lens views of a session.
 
     Parameters
     ----------
     design : SensorDesign
-        Whose camera looks at it.
+        With the camera.
     seed : int, optional
-        Of the poses.
+        Seed of the poses.
     """
     rng = np.random.default_rng([seed, 2])
     return board_views(design.camera, rng, inner_corners=_INNER_CORNERS, square_mm=_VIEW_SQUARE_MM)
 
 
 def indenter_of(item: Press) -> Indenter:
-    """Return the shape that a design's press asks for."""
+    """Return the indenter for a press of a design."""
     if item.shape == "cylinder":
         return Cylinder(item.size_mm, item.depth_mm, item.edge_radius_mm)
     if item.shape == "cuboid":
@@ -223,20 +228,20 @@ def pressed_membrane(
     settled: Settled | None = None,
     interrupt: Interrupt = never,
 ) -> PressedMembrane:
-    """Return the sensor with an indenter in its membrane, as fine as its picture calls for.
+    """Return the sensor with an indenter in its membrane, as fine as its image requires.
 
     Parameters
     ----------
     design : SensorDesign
         The sensor.
     indenter : Ball, Cylinder, Cuboid or Relief
-        What is pressed.
+        The pressed object.
     x_mm, y_mm, yaw_deg : float
-        Where, and how turned.
+        Position and rotation.
     settled : Settled, optional
         From :func:`settled_membrane` with the same design and indenter.
     interrupt : callable, optional
-        Called now and then; what it raises stops the work.
+        Called regularly; an exception raised by it stops the work.
     """
     return PressedMembrane(
         press(
@@ -253,21 +258,21 @@ def pressed_membrane(
 
 
 def settled_membrane(design: SensorDesign, indenter: Cuboid | Relief) -> Settled:
-    """Return how a sensor's membrane settles on a shape without an axis, wherever it is pressed.
+    """Return the membrane on a shape that is not axisymmetric, for any position.
 
     Parameters
     ----------
     design : SensorDesign
         The sensor.
     indenter : Cuboid or Relief
-        What is pressed.
+        The pressed object.
     """
     decay_mm = design.membrane.decay_length_mm
     return settle(indenter, decay_mm=decay_mm, pitch_mm=_pitch_mm(design))
 
 
 def _pitch_mm(design: SensorDesign) -> float:
-    """Return the cell of a pressed surface that a design's picture calls for."""
+    """Return the cell size of a pressed surface that a design's image requires."""
     return max(PITCH_MM, 0.7 * design.layers.top_distance_mm / design.camera.fx)
 
 
@@ -299,7 +304,7 @@ def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:
 def truth_grid(
     surface: PressedSurface,
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_], float, float]:
-    """Return (depth_mm, contact, x0_mm, y0_mm) of a surface on the truth's coarser grid."""
+    """Return (depth_mm, contact, x0_mm, y0_mm) of a surface on the coarser grid of the truth."""
     step = TRUTH_PITCH_MM
     columns = np.arange(
         math.ceil(surface.x_mm[0] / step - 1e-9), math.floor(surface.x_mm[-1] / step + 1e-9) + 1
@@ -317,26 +322,16 @@ def truth_grid(
     return depth.astype(np.float32), contact > 0.5, float(columns[0] * step), float(rows[0] * step)
 
 
-def _write_texts(out: Path, sensor: VirtualSensor) -> None:
+def _write_texts(out: Path, sensor: VirtualSensor, stages: Sequence[str], closed: bool) -> None:
     design = sensor.design
-    texts = (session_toml(design), json.dumps(truth_table(sensor), indent=1), _truth_csv(design))
+    description = closed_session_toml(sensor) if closed else session_toml(design)
+    texts = (description, json.dumps(truth_table(sensor, stages), indent=1), truth_csv(design))
     for name, text in zip((*_TEXTS, "presses/truth.csv"), texts, strict=True):
         write_atomically(out / name, lambda stream, text=text: stream.write(text.encode()))  # type: ignore[misc]
 
 
-def _truth_csv(design: SensorDesign) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["file", "shape", "diameter_mm", "side_mm", "height_mm"])
-    for name, item in zip(press_names(design.presses), design.presses, strict=True):
-        if item.shape in ("cylinder", "cuboid"):
-            size = [item.size_mm, ""] if item.shape == "cylinder" else ["", item.size_mm]
-            writer.writerow([f"{name}.png", item.shape, *size, item.depth_mm])
-    return stream.getvalue()
-
-
 def session_toml(design: SensorDesign) -> str:
-    """Return the session's description as the program reads it."""
+    """Return the content of session.toml."""
     layers = design.layers
     balls = "\n".join(
         f'"ball_{number:02d}.png" = {ball.radius_mm!r}' for number, ball in enumerate(design.balls)
@@ -365,76 +360,3 @@ square_mm = {_TOP_SQUARE_MM}
 [balls]
 {balls}
 {response_tables(design)}"""
-
-
-def truth_table(sensor: VirtualSensor) -> dict[str, Any]:
-    """Return what the pictures were made from, as plain values for JSON."""
-    design = sensor.design
-    camera, layers, membrane = design.camera, design.layers, design.membrane
-    places = [
-        camera_points(layers, np.array([led.x_mm, led.y_mm, -led.height_mm])) for led in design.leds
-    ]
-    return {
-        "camera": {
-            "fx": camera.fx,
-            "fy": camera.fy,
-            "cx": camera.cx,
-            "cy": camera.cy,
-            "k1_k2_p1_p2": list(camera.distortion),
-        },
-        "top_plane": {
-            "normal_camera": layers.normal_camera.tolist(),
-            "offset_mm": layers.top_distance_mm,
-        },
-        "leds": {
-            name: {"camera_mm": place.tolist(), "relative_power": led.power}
-            for name, place, led in zip("RGB", places, design.leds, strict=True)
-        },
-        "crosstalk_camera_from_led": [list(row) for row in design.photometry.crosstalk],
-        "balls": [
-            {
-                "file": f"ball_{number:02d}.png",
-                "radius_mm": ball.radius_mm,
-                "depth_mm": ball.depth_mm,
-                "contact_radius_mm": _ball_contact(ball, membrane.decay_length_mm),
-                "centre_sensor_xy_mm": [ball.x_mm, ball.y_mm],
-            }
-            for number, ball in enumerate(design.balls)
-        ],
-        "membrane": {
-            "kind": "blend" if membrane.specular_weight > 0.0 else "diffuse",
-            "diffuse": membrane.diffuse_reflectance,
-            "spec_weight": membrane.specular_weight,
-            "alpha": membrane.roughness,
-            "spec_scale": membrane.specular_reflectance,
-            "rho_texture": membrane.variation > 0.0 or membrane.speck_count > 0,
-            "decay_length_mm": membrane.decay_length_mm,
-        },
-        "photometry": _photometry_table(sensor),
-        "transport": "direct light of the LEDs with cast shadows only",
-    }
-
-
-def _photometry_table(sensor: VirtualSensor) -> dict[str, Any]:
-    camera = sensor.design.camera
-    full = 2**camera.bit_depth - 1
-    signal = 200.0 / 255.0
-    sd = math.sqrt(camera.shot_variance * signal + camera.read_sd**2)
-    return {
-        "response": {
-            "linear": f"linear (gamma 1); value = {full}*linear",
-            "srgb": f"sRGB (IEC 61966-2-1); value = {full}*encoded",
-            "gamma": f"gamma {camera.gamma:g}; value = {full}*linear^(1/{camera.gamma:g})",
-        }[camera.response],
-        "exposure_membrane": sensor.exposure,
-        "whiteboard_exposure_relative_to_membrane": 1.0,
-        "psf_gaussian_sigma_px": camera.blur_sigma_px,
-        "noise": {"shot_var_per_unit": camera.shot_variance, "read_sigma": camera.read_sd},
-        "snr_db_at_200": 20.0 * math.log10(signal / sd) if sd > 0.0 else None,
-        "averaged_frames": {s: AVERAGED[s] for s in session_stages(sensor.design)},
-    }
-
-
-def _ball_contact(ball: BallPress, decay_mm: float) -> float:
-    shape = Ball(ball.radius_mm, ball.depth_mm)
-    return contact_radius(shape.profile, shape.reach_mm, decay_mm)

@@ -1,4 +1,4 @@
-"""Brightness of a membrane point under the lamps, and of the pixels that see it."""
+"""Brightness of a membrane point under the lamps, and of the pixels that show it."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from gelpolight_core.simulation.surface import PressedSurface
 
 Array = NDArray[np.float64]
 
-_PIXELS_AT_ONCE = 1 << 15  # a few hundredths of a second of work
+_PIXELS_AT_ONCE = 1 << 15  # takes a few hundredths of a second
 
 _ROUGH_SHARE = 0.002
-"""Departure from the neighbours' mean, as a share of the peak, that asks for more rays."""
+"""Deviation from the neighbours' mean, as a share of the peak, above which more rays are used."""
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """How a surface throws light back.
+    """Reflection properties of a surface.
 
     Attributes
     ----------
     diffuse : float
-        Reflectance of the Lambertian share, its weight included.
+        Reflectance of the Lambertian component, including its weight.
     specular : float
-        Reflectance at normal incidence of the metallic share, its weight included.
+        Reflectance at normal incidence of the metallic component, including its weight.
     roughness : float
-        GGX alpha of the metallic share.
+        GGX alpha of the metallic component.
     """
 
     diffuse: float
@@ -55,7 +55,7 @@ class Material:
 
     @property
     def values(self) -> tuple[float, float, float]:
-        """The material as the compiled code reads it."""
+        """The material in the format of the compiled code."""
         return self.diffuse, self.specular, self.roughness
 
 
@@ -65,8 +65,9 @@ def metallic_lobe(
 ) -> float:  # pragma: no cover - compiled
     """Return pi times the reflectance density of rough metal of unit reflectance.
 
-    Facets spread as GGX (Trowbridge-Reitz), masked and shadowed after Smith; the reflectance of a
-    metal rises to 1 at grazing incidence, which is left to the caller (`v_h` is passed for it).
+    Facets have a GGX (Trowbridge-Reitz) distribution with Smith masking and shadowing. The
+    reflectance of a metal rises to 1 at grazing incidence; the caller applies this (`v_h` is passed
+    for it).
     """
     a2 = alpha * alpha
     spread = n_h * n_h * (a2 - 1.0) + 1.0
@@ -80,9 +81,9 @@ def metallic_lobe(
 def point_brightness(
     point: Any, normal: Any, to_camera: Any, lamp: Any, material: Any
 ) -> float:  # pragma: no cover - compiled
-    """Return the brightness that one unobstructed lamp gives a point.
+    """Return the brightness of a point under one unobstructed lamp.
 
-    Irradiance falls as 1/r^2 times the lamp's lobe times the cosine at the surface; a Lambertian
+    Irradiance is proportional to 1/r^2, the lamp's lobe and the cosine at the surface; a Lambertian
     surface of reflectance 1 has the brightness of its irradiance.
     """
     if lamp[6] > 0.5:
@@ -139,7 +140,7 @@ def flat_brightness(rays: RayTable, lamps: Array, material: Material) -> Array:
 
 @compiled
 def _blend(table: Any, row: float, column: float) -> float:  # pragma: no cover - compiled
-    """Return a smooth per-pixel table between pixels, carried on straight past its border."""
+    """Return a smooth per-pixel table between pixels, extrapolated linearly beyond its border."""
     i = min(max(math.floor(row), 0), table.shape[0] - 2)
     j = min(max(math.floor(column), 0), table.shape[1] - 2)
     a, b = row - i, column - j
@@ -201,12 +202,12 @@ def shade_pressed(
     samples: int = 3,
     interrupt: Interrupt = never,
 ) -> None:
-    """Overwrite the pixels that see a pressed patch with what they see.
+    """Render the pixels that see a pressed patch, in place.
 
     Parameters
     ----------
     out : (rows, columns, lamps)
-        Picture of the bare membrane, changed in place.
+        Image of the bare membrane, modified in place.
     rays : RayTable
         Rays of all pixels.
     surface : PressedSurface
@@ -216,11 +217,11 @@ def shade_pressed(
     lamps : (lamps, 7)
         Lamp table.
     material : Material
-        Of the membrane.
+        Material of the membrane.
     samples : int, optional
         Rays per pixel and side at edges; 1 is fastest.
     interrupt : callable, optional
-        Called now and then; what it raises stops the work.
+        Called regularly; an exception raised by it stops the work.
     """
     deepest = float(surface.depth_mm.max(initial=0.0))
     if deepest <= 0.0:
@@ -263,7 +264,7 @@ def _is_rough(picture: Array, limit: float) -> NDArray[np.bool_]:
 def _seen_window(
     rays: RayTable, surface: PressedSurface, deepest: float
 ) -> tuple[slice, slice] | None:
-    """Return the rows and columns of the pixels whose rays can meet the patch."""
+    """Return the rows and columns of the pixels whose rays may meet the patch."""
     reach = deepest * float(np.nanmax(np.hypot(rays.slope_x, rays.slope_y))) + surface.pitch_mm
     x, y = surface.x_mm, surface.y_mm
     meets = (rays.x_mm > x[0] - reach) & (rays.x_mm < x[-1] + reach)

@@ -1,4 +1,4 @@
-"""A pressed membrane as the virtual sensor keeps it: a depth map with tiles to skip empty space."""
+"""The surface of a pressed membrane: a depth map with tiles to skip empty space."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 Array = NDArray[np.float64]
 
 TILE = 16
-"""Side of a tile in cells; within it only the extremes are known while skipping."""
+"""Side of a tile in cells; only the extremes of each tile are used while skipping."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class PressedSurface:
     depth_mm : (rows, columns)
         Indentation towards the camera.
     contact : (rows, columns) bool
-        Where the indenter touches.
+        Contact with the indenter.
     x0_mm, y0_mm : float
         Position of the first cell's centre, sensor frame.
     pitch_mm : float
@@ -41,7 +41,7 @@ class PressedSurface:
     tile_min: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Derive slopes and tiles."""
+        """Compute slopes and tiles."""
         depth = np.ascontiguousarray(self.depth_mm, dtype=np.float64)
         slope_y, slope_x = np.gradient(depth, self.pitch_mm)
         high, low = _tiles(depth)
@@ -67,7 +67,7 @@ class PressedSurface:
 
 
 def _tiles(depth_mm: Array) -> tuple[Array, Array]:
-    """Return the highest and lowest depth of each tile and of its next cells."""
+    """Return the highest and lowest depth of each tile and of its neighbouring cells."""
     high = maximum_filter(depth_mm, size=3, mode="nearest")
     low = minimum_filter(depth_mm, size=3, mode="nearest")
     rows, columns = (-(-n // TILE) for n in depth_mm.shape)

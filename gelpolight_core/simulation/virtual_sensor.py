@@ -1,4 +1,4 @@
-"""The virtual sensor: shows what the camera would see in each state of a calibration session."""
+"""The virtual sensor: renders the camera image in each state of a calibration session."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.design.sensor_design import SensorDesign, validate_design
-from gelpolight_core.simulation.boards import BoardPose, board_on_top, board_picture
+from gelpolight_core.simulation.boards import BoardPose, board_image, board_on_top
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.exposure import Frame, blurred, exposed, mixed
 from gelpolight_core.simulation.lamps import Lamp, PointLamp, lamp_table, lamps_of
@@ -33,7 +33,7 @@ _MIRROR_SAMPLES = 8
 
 @dataclass(frozen=True, slots=True)
 class Checkerboard:
-    """A checkerboard held before the camera, before anything is mounted."""
+    """A checkerboard held in front of the camera, before anything is mounted."""
 
     pose: BoardPose
 
@@ -55,9 +55,9 @@ class Whiteboard:
     Attributes
     ----------
     exposure : float
-        Relative to that of the membrane's pictures.
+        Exposure relative to the images of the membrane.
     led : int or None
-        The only LED that is lit; None: all.
+        The only LED that is on; None for all.
     """
 
     exposure: float = 1.0
@@ -66,12 +66,12 @@ class Whiteboard:
 
 @dataclass(frozen=True, slots=True)
 class BareMembrane:
-    """The finished sensor that nothing touches."""
+    """The finished sensor without contact."""
 
 
 @dataclass(frozen=True, slots=True)
 class PressedMembrane:
-    """The finished sensor with something pressed into it."""
+    """The finished sensor with an object pressed into it."""
 
     surface: PressedSurface
 
@@ -80,23 +80,24 @@ State = Checkerboard | BoardOnTop | Mirror | Whiteboard | BareMembrane | Pressed
 
 
 class VirtualSensor:
-    """A sensor made of a design.
+    """A sensor built from a design.
 
     Parameters
     ----------
     design : SensorDesign
-        What it is made of.
+        The design.
     seed : int, optional
-        Of the membrane's pattern and of the noise; one seed gives one sequence of bytes.
+        Seed of the membrane's pattern and of the noise; the same seed gives the same sequence of
+        bytes.
     lamps : tuple of PointLamp or ParallelLamp, optional
-        Other lights in place of the design's three LEDs.
+        Lights that replace the design's three LEDs.
     interrupt : callable, optional
-        Called now and then while the sensor is made; what it raises stops the work.
+        Called regularly during construction; an exception raised by it stops the work.
 
     Raises
     ------
     InputError
-        If the design does not hold together (see :func:`validate_design`).
+        If the parts of the design do not fit together (see :func:`validate_design`).
     """
 
     def __init__(
@@ -124,21 +125,21 @@ class VirtualSensor:
         self._membrane = self._flat(self.material) * self._factor_seen()[..., None]
 
     def brightness(self, state: State, *, samples: int = 3, interrupt: Interrupt = never) -> Array:
-        """Return the exact picture (rows, columns, 3), linear, before noise and saturation.
+        """Return the exact image (rows, columns, 3), linear, before noise and saturation.
 
         Parameters
         ----------
         state : State
-            What is before the camera.
+            Scene in front of the camera.
         samples : int, optional
-            Rays per pixel and side at the edges of what is pressed; 1 is fastest.
+            Rays per pixel and side at the edges of the pressed object; 1 is fastest.
         interrupt : callable, optional
-            Called now and then; what it raises stops the work.
+            Called regularly; an exception raised by it stops the work.
         """
         camera, photometry = self.design.camera, self.design.photometry
         if isinstance(state, (Checkerboard, BoardOnTop)):
             pose = state.pose if isinstance(state, Checkerboard) else self.top_pose
-            grey = board_picture(camera, pose, interrupt=interrupt)
+            grey = board_image(camera, pose, interrupt=interrupt)
             return np.repeat(blurred(grey, camera.blur_sigma_px)[..., None], 3, axis=2)
         if isinstance(state, Mirror):
             light = self._mirror() * photometry.mirror_peak
@@ -161,19 +162,19 @@ class VirtualSensor:
     def frame(
         self, state: State, *, averaged: int = 1, stream: str | None = None, samples: int = 3
     ) -> Frame:
-        """Return what the camera delivers, (rows, columns, 3) in RGB order.
+        """Return the camera image, (rows, columns, 3) in RGB order.
 
         Parameters
         ----------
         state : State
-            What is before the camera.
+            Scene in front of the camera.
         averaged : int, optional
-            Number of frames that are averaged.
+            Number of averaged frames.
         stream : str, optional
-            Name of the noise; the same name gives the same noise. Left out, each call gives the
-            next noise of the sensor's sequence.
+            Name of the noise; the same name gives the same noise. Without a name, each call gives
+            the next noise of the sensor's sequence.
         samples : int, optional
-            Rays per pixel and side at the edges of what is pressed; 1 is fastest.
+            Rays per pixel and side at the edges of the pressed object; 1 is fastest.
         """
         if stream is None:
             self._count += 1
@@ -189,7 +190,7 @@ class VirtualSensor:
 
     @property
     def top_pose(self) -> BoardPose:
-        """Where the small checkerboard lies on the top surface."""
+        """Pose of the small checkerboard on the top surface."""
         return board_on_top(
             self.design.layers, working_diameter_mm=self.design.membrane.working_diameter_mm
         )
@@ -215,7 +216,7 @@ class VirtualSensor:
         return sample_all(factor, np.asarray(column), np.asarray(row))
 
     def _exposure(self) -> float:
-        """Exposure at which the whiteboard's brightest point in the picture has its stated peak."""
+        """Exposure at which the brightest point of the whiteboard image has the stated peak."""
         photometry = self.design.photometry
         rim = 0.5 * self.design.membrane.working_diameter_mm
         rays = self.rays
@@ -227,7 +228,7 @@ class VirtualSensor:
         return photometry.whiteboard_peak / peak if peak > 0.0 else 1.0
 
     def _mirror(self) -> Array:
-        """Picture of the lamps' mirror twins, an emitting disc of power 1 having brightness 1."""
+        """Image of the mirrored lamps; an emitting disc of power 1 has brightness 1."""
         camera, layers = self.design.camera, self.design.layers
         out = np.zeros((camera.height_px, camera.width_px, len(self.lamps)))
         rim = 0.5 * self.design.membrane.working_diameter_mm
@@ -246,7 +247,7 @@ class VirtualSensor:
         return out / max(strongest, 1e-12)
 
     def _disc_share(self, lamp: PointLamp, window: tuple[int, int, int, int], rim: float) -> Array:
-        """Share of each pixel of a window that shows the twin of a lamp's disc in the mirror."""
+        """Share of each pixel of a window that shows the mirror image of a lamp's disc."""
         layers, n = self.design.layers, _MIRROR_SAMPLES
         i0, i1, j0, j1 = window
         v = i0 - 0.5 + (np.arange((i1 - i0) * n) + 0.5) / n

@@ -12,16 +12,18 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThread, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 from shiboken6 import isValid
 
+from app.context.context import AppContext
 from app.desktop import make_application, make_context
-from app.shell import theme
-from app.shell.context import AppContext
-from gelpolight_core.export.drawing_thread import THREAD_NAME as DRAWING_THREAD
+from app.theme import theme
+from gelpolight_core.drawing_thread import THREAD_NAME as DRAWING_THREAD
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.threads import THREAD_NAME as ROWS_THREAD
 
 # tqdm's monitor lives as long as the process; numba and its kind start no Python threads.
@@ -84,22 +86,20 @@ class _Started:
 
         monkeypatch.setattr(kind, "start", noted)
 
-    @property
-    def any(self) -> bool:
-        """Whether anything was started."""
-        return bool(self._found)
+    def running(self) -> list[tuple[Any, str]]:
+        """Return those that still run, each with the line that started it."""
+        found = [(reference(), line) for reference, line in self._found]
+        return [(o, line) for o, line in found if o is not None and isValid(o) and self._running(o)]
 
     def left(self) -> list[str]:
         """Return where those were started that still run; stop them."""
         lines = []
-        for reference, line in self._found:
-            this = reference()
-            if this is not None and isValid(this) and self._running(this):
-                lines.append(line)
-                if isinstance(this, QTimer):
-                    this.stop()
-                else:
-                    this.quit()
+        for this, line in self.running():
+            lines.append(line)
+            if isinstance(this, QTimer):
+                this.stop()
+            else:
+                this.quit()
         return list(dict.fromkeys(lines))
 
 
@@ -111,10 +111,21 @@ def _nothing_is_left_behind(qapp: QApplication, monkeypatch: pytest.MonkeyPatch)
     timers, qthreads = _Started(QTimer.isActive), _Started(QThread.isRunning)
     timers.watch(QTimer, monkeypatch)
     qthreads.watch(QThread, monkeypatch)
+    # What was there before is not searched for garbage: that would take most of a test's time.
+    gc.freeze()
     yield
     _delete_what_was_deleted()
+
+    def left() -> bool:
+        running = timers.running() or qthreads.running()
+        return bool(running or _left_windows(windows_before))
+
     # What is only held by a cycle of references is not in use, and goes with it.
-    if _left_windows(windows_before) or timers.any or qthreads.any:
+    if left():
+        gc.collect()
+        _delete_what_was_deleted()
+    gc.unfreeze()
+    if left():  # a cycle that goes through older objects
         gc.collect()
         _delete_what_was_deleted()
     problems = [f"timer started at {line}" for line in timers.left()]
@@ -160,3 +171,28 @@ def _left_threads(before: set[threading.Thread]) -> list[str]:
         if not left or time.monotonic() > end:
             return left
         time.sleep(0.02)
+
+
+@pytest.fixture
+def dome() -> HeightMap:
+    """Return a ball's cap, 0.8 mm deep, in a round working area of 8 mm radius."""
+    x = np.arange(-90, 91) * 0.1
+    y = np.arange(-85, 86) * 0.1
+    xx, yy = np.meshgrid(x, y)
+    depth = np.maximum(0.8 - (np.hypot(xx - 2.0, yy + 1.0) / 3.0) ** 2, 0.0)
+    slope_y, slope_x = np.gradient(depth, 0.1)
+    normals = np.stack([-slope_x, -slope_y, -np.ones_like(depth)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    flags = np.where(np.hypot(xx, yy) > 8.0, Flag.OUTSIDE.value, 0).astype(np.uint8)
+    flags[80:90, 40:50] |= np.uint8(Flag.DARK.value)
+    return HeightMap(
+        depth_mm=depth.astype(np.float32),
+        x_mm=x,
+        y_mm=y,
+        pitch_mm=0.1,
+        normals=normals.astype(np.float32),
+        flags=flags,
+        calibration_id="test",
+        model="full",
+        source="dome.png",
+    )

@@ -86,7 +86,7 @@ def test_a_file_of_ours_alone_opens_the_window_with_it(
     asked = []
     monkeypatch.setattr(desktop, "run", lambda arguments: asked.append(arguments) or 0)
     assert main([str(tmp_path / name)]) == MENDABLE
-    assert "no such file" in capsys.readouterr().err
+    assert "does not exist" in capsys.readouterr().err
     (tmp_path / name).touch()
     assert main([str(tmp_path / name)]) == 0
     assert asked == [[str(tmp_path / name)]]
@@ -102,4 +102,4 @@ def test_without_a_screen_one_sentence_says_what_to_do(
     with pytest.raises(InputError), desktop.screen():
         pass
     assert main([]) == MENDABLE
-    assert "no screen" in capsys.readouterr().err
+    assert "no display" in capsys.readouterr().err

@@ -24,10 +24,10 @@ from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QEvent, QTimer
 from PySide6.QtGui import QPixmapCache
 from PySide6.QtWidgets import QApplication
-sys.path.insert(0, "packaging")
+sys.path.insert(0, "tests/long")
 from allocated import allocated_mb
 from app import desktop
-from app.bench.stated import stated_session
+from app.bench.virtual_session import virtual_session
 from app.calibrate.page import CalibratePage
 from app.shell.main_window import MainWindow
 from app.sources.bench import Bench
@@ -35,7 +35,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.session.description import create_session
 
 folder, rounds = Path(sys.argv[1]), int(sys.argv[2])
-create_session(replace(stated_session(), folder=folder))
+create_session(replace(virtual_session(), folder=folder))
 left = []
 
 class Rounds:
@@ -53,13 +53,13 @@ class Rounds:
     def begin(self):
         self.page.open_path(folder)
         self.seen = []
-        self.page.wizard.controller.watching.detected.connect(self.seen.append)
+        self.page.wizard.model.live.processed.connect(self.seen.append)
         self.page.wizard.go_to("lens")
         self.look.start(10)
 
     def go_on(self):
         wizard = self.page.wizard
-        if not self.seen or wizard.pictures.view.shown_frames < 3:
+        if not self.seen or wizard.area.view.shown_frames < 3:
             return
         self.look.stop()
         if len(left) == rounds - 1:  # the last one is still looking when the window closes

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import gc
-import sys
 from dataclasses import replace
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging"))
 
 from soak_figures import Row, conclude, let_rings_go
 from soak_person import may_be_used

@@ -1,4 +1,4 @@
-"""What the tests of batches share: a small sensor, a day of its frames, workers in this process."""
+"""Shared parts of the batch tests: a small sensor, its frames, and workers in this process."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from gelpolight_core.batch.plan import BatchPlan, Job, Selection, plan_batch
 from gelpolight_core.batch.run import BatchProgress, Runner, run_batch
 from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.batch.stopping import Stopped
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.sensor_calibration import Calibration
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +31,7 @@ def calibration_file(
 
 @pytest.fixture
 def day(small_session: Path, tmp_path: Path) -> Path:
-    """Return a folder with a recording of four frames, and two pictures in a folder of its own."""
+    """Return a folder with a recording of four frames, and two images in their own folder."""
     folder = tmp_path / "day"
     (folder / "left").mkdir(parents=True)
     press = next(iter(sorted((small_session / "presses").glob("*.png"))))
@@ -82,7 +82,7 @@ Go = Callable[..., BatchProgress]
 
 @pytest.fixture
 def go(settings: BatchSettings, plan: Callable[..., BatchPlan]) -> Go:
-    """Return a function that does a run, until so many frames are done where that is said."""
+    """Return a function that runs a batch, optionally only until a number of frames is done."""
 
     def run(*inputs: Path, out: Path, until: int | None = None, **changes: object) -> BatchProgress:
         runner = changes.pop("runner", None) or in_this_process(settings, out)

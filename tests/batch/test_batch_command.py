@@ -1,4 +1,4 @@
-"""``gelpolight batch`` as a person meets it: exit statuses, one line, going on."""
+"""``gelpolight batch`` for the user: exit statuses, one-line messages, resuming."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_second_call_finds_everything_done(
     assert command(day) == 0
     assert "6 depth maps in" in capsys.readouterr().out
     assert command(day) == 0
-    assert "6 of them from before" in capsys.readouterr().out
+    assert "6 of them from earlier runs" in capsys.readouterr().out
 
 
 def test_a_bad_frame_is_named_and_counted_in_one_line(
@@ -78,8 +78,8 @@ def test_ctrl_c_ends_with_the_frames_at_hand(
     monkeypatch.setattr(batch._Progress, "_tell", pressed)
     assert command(day) == INTERRUPTED
     told = capsys.readouterr().err
-    assert "2 of 6 frames are done; the same command goes on from here" in told
-    assert "gelpolight: stopped" in told
+    assert "2 of 6 frames are done" in told
+    assert "gelpolight: Stopped" in told
     monkeypatch.undo()
 
 
@@ -101,10 +101,10 @@ def test_what_is_pressed_can_be_measured(command, day: Path, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--frames", "x"], "x names no frames"),
-        (["--every", "0"], "--every: 0 names no frames"),
-        (["--frames", "99:"], "there are no frames"),
-        (["--formats", "doc"], "unknown format doc"),
+        (["--frames", "x"], "x selects no frames"),
+        (["--every", "0"], "--every: 0 selects no frames"),
+        (["--frames", "99:"], "here are no frames"),
+        (["--formats", "doc"], "Unknown format doc"),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(
@@ -127,17 +127,17 @@ def test_inputs_that_cannot_be_are_refused_in_one_line(
     (frames / "run" / "run_000003.png").write_bytes((day / "left" / "a.png").read_bytes())
     (frames / "run" / "run_000004.png").write_bytes((day / "left" / "a.png").read_bytes())
     for inputs, words in (
-        ([frames], "the name of a frame's result: frames/run/run_000003"),
-        ([tmp_path / "empty"], "there are no frames"),
-        ([tmp_path / "none"], "there is no such file or folder"),
-        ([day, "-o", tmp_path], "the input lies in the folder of the results"),
-        ([day, tmp_path / "other" / "day"], "two inputs would have results named day/run/"),
+        ([frames], "the result of a frame: frames/run/run_000003"),
+        ([tmp_path / "empty"], "here are no frames"),
+        ([tmp_path / "none"], "The file or folder does not exist"),
+        ([day, "-o", tmp_path], "The input is inside the folder of the results"),
+        ([day, tmp_path / "other" / "day"], "Two inputs would have results named day/run/"),
     ):
         assert command(*inputs) == MENDABLE
         assert words in said(capsys)
 
 
-def test_a_picture_called_as_a_frame_that_is_not_wanted_is_no_trouble(
+def test_an_image_named_like_an_excluded_frame_is_accepted(
     command, day: Path, tmp_path: Path
 ) -> None:
     (day / "run").mkdir()

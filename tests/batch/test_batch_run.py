@@ -1,4 +1,4 @@
-"""Runs over many frames: nothing is lost, nothing done twice, the same bits whoever does it."""
+"""Runs over many frames: nothing is lost or repeated, and any worker gives the same bits."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from gelpolight_core.batch.settings import BatchSettings
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import write_heightmap
-from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.io.lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
-from gelpolight_core.session.session import read_picture
+from gelpolight_core.session.images import read_picture
 
 
 def results(out: Path) -> dict[str, bytes]:
@@ -72,7 +72,7 @@ def test_every_frame_has_its_files_and_its_row(go, day: Path, tmp_path: Path) ->
 def test_a_frame_comes_out_as_it_does_alone(
     go, settings: BatchSettings, day: Path, tmp_path: Path
 ) -> None:
-    """As ``reconstruct`` makes it, to the last bit."""
+    """As made by ``reconstruct``, to the last bit."""
     go(day, out=tmp_path / "out")
     calibration = read_calibration(settings.calibration)
     picture = read_picture(day / "left" / "a.png", response=calibration.response)
@@ -99,7 +99,7 @@ def test_a_run_that_was_left_goes_on_without_doing_a_frame_again(
 
 
 def test_a_run_whose_power_was_cut_goes_on(go, day: Path, tmp_path: Path) -> None:
-    """Half a line in the ledger, and half a file, are nothing."""
+    """Half a line in the ledger, and half a file, do not count."""
     out = tmp_path / "out"
     go(day, out=out, until=3)
     before = results(out)
@@ -122,14 +122,14 @@ def test_the_table_can_be_made_again_from_the_ledger(go, day: Path, tmp_path: Pa
     assert (out / "batch.csv").read_bytes() == text
 
 
-def test_a_result_that_was_taken_away_is_made_again(go, day: Path, tmp_path: Path) -> None:
+def test_a_removed_result_is_computed_again(go, day: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     go(day, out=out)
     (out / "day" / "left" / "a.tif").unlink()
     assert (go(day, out=out).done, len(results(out))) == (1, 12)
 
 
-def test_another_picture_of_the_same_name_is_another_frame(go, day: Path, tmp_path: Path) -> None:
+def test_another_image_of_the_same_name_is_another_frame(go, day: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     go(day, out=out)
     picture = day / "left" / "a.png"
@@ -141,7 +141,7 @@ def test_another_picture_of_the_same_name_is_another_frame(go, day: Path, tmp_pa
 def test_frames_that_cannot_be_used_are_noted_and_the_others_done(
     go, day: Path, tmp_path: Path
 ) -> None:
-    """A damaged one, one of another size, a recording that is none; mended, they are done."""
+    """A damaged image, another size, a file that is no recording; repaired, they are done."""
     out = tmp_path / "out"
     good = (day / "left" / "a.png").read_bytes()
     (day / "left" / "a.png").write_bytes(good[:-100])
@@ -153,16 +153,16 @@ def test_frames_that_cannot_be_used_are_noted_and_the_others_done(
     progress = go(day, out=out)
     assert (progress.done, progress.bad, progress.faults) == (4, 4, 0)
     errors = {row["output"]: row["error"] for row in table(out) if row["error"]}
-    assert "not a whole PNG" in errors["day/left/a"]
+    assert "not a complete PNG" in errors["day/left/a"]
     assert "the calibration is for" in errors["day/left/small"]
-    assert "frame 3 is damaged" in errors["day/run/run_000003"]
+    assert "Frame 3 is damaged" in errors["day/run/run_000003"]
     assert "not a recording" in errors["day/torn/torn_000000"]
     (day / "left" / "a.png").write_bytes(good)
     again = go(day, out=out)
     assert (again.before, again.done, again.bad) == (4, 1, 3)
 
 
-def test_a_fault_of_the_program_costs_one_frame_and_is_kept_whole(
+def test_an_internal_error_costs_one_frame_and_is_recorded(
     go, day: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     depth = Reconstructor.depth
@@ -192,9 +192,9 @@ def test_a_full_disk_ends_the_run_and_says_how_far_it_came(
         replace_file(source, target)
 
     monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(InputError, match=r"the disk is full; 3 of 6 frames are done") as told:
+    with pytest.raises(InputError, match=r"The disk is full; 3 of 6 frames are done") as told:
         go(day, out=out)
-    assert "the same command goes on from here" in str(told.value)
+    assert "Run the same command again" in str(told.value)
     monkeypatch.undo()
     goes_on = go(day, out=out)
     assert (goes_on.before, goes_on.done) == (3, 3)
@@ -206,9 +206,9 @@ def test_another_model_in_the_same_folder_is_refused(
     out = tmp_path / "out"
     go(day, out=out, until=1)
     for other, words in (
-        (replace(settings, effort="fast"), "begun with effort best, and this is fast"),
+        (replace(settings, effort="fast"), "started with effort best, but now it is fast"),
         (replace(settings, identity="B-1"), "calibration_id"),
-        (replace(settings, formats=("npz",)), "formats npz,tif, and this is npz"),
+        (replace(settings, formats=("npz",)), "formats npz,tif, but now it is npz"),
         (replace(settings, program="9.9"), "program"),
     ):
         with pytest.raises(InputError, match=words):
@@ -240,7 +240,7 @@ def test_a_part_of_a_day_can_be_done_first(go, day: Path, tmp_path: Path) -> Non
 def test_two_processes_give_the_same_bits_and_one_may_be_killed(
     go, settings: BatchSettings, day: Path, tmp_path: Path
 ) -> None:
-    """The frame that the killed one had is given to another."""
+    """The frame of the killed worker is given to another."""
     out, alone = tmp_path / "out", tmp_path / "alone"
     go(day, out=alone)
     killed: list[int] = []
@@ -265,7 +265,7 @@ def test_two_processes_give_the_same_bits_and_one_may_be_killed(
 def test_the_frame_that_ends_every_process_is_left_out(
     settings: BatchSettings, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """It does not keep the others waiting."""
+    """It does not delay the others."""
     from gelpolight_core.batch import processes
     from gelpolight_core.batch.plan import Job
 
@@ -282,7 +282,7 @@ def test_the_frame_that_ends_every_process_is_left_out(
     runner = ProcessRunner(settings, tmp_path, 1)
     found = [row for rows in runner(iter([job]), 1, lambda: False) for row in rows]
     assert [row.output for row in found] == ["a"]
-    assert "several processes ended" in found[0].error
+    assert "Several processes ended" in found[0].error
 
 
 def test_a_worker_that_does_not_see_the_run_halts_it(
@@ -294,7 +294,7 @@ def test_a_worker_that_does_not_see_the_run_halts_it(
     assert "cannot be read" in str(halt.error())
 
 
-def test_a_line_of_the_ledger_that_is_none_is_passed_over(tmp_path: Path) -> None:
+def test_an_invalid_line_of_the_ledger_is_skipped(tmp_path: Path) -> None:
     path = tmp_path / LEDGER
     path.write_text('{"output": 3}\n[1]\nnonsense\n{"output":"a","notes":5}\n')
     ledger = BatchLedger(path)
@@ -343,14 +343,14 @@ def test_a_scheduler_that_does_not_answer_is_refused(
     from gelpolight_core.batch import cluster
 
     monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
-    with pytest.raises(InputError, match="no Dask scheduler answers"):
+    with pytest.raises(InputError, match="no answer from a Dask scheduler"):
         cluster.ClusterRunner(settings, tmp_path, "tcp://127.0.0.1:9")
 
 
-def test_a_worker_that_lives_long_sees_that_a_recording_was_replaced(
+def test_a_long_running_worker_detects_a_replaced_recording(
     settings: BatchSettings, plan, go, day: Path, tmp_path: Path
 ) -> None:
-    """A cluster's workers outlive a run: a half copied recording is copied whole meanwhile."""
+    """Workers of a cluster outlive a run: a half-copied recording is completed meanwhile."""
     out, path = tmp_path / "out", day / "run.gplrec"
     whole = path.read_bytes()
     with Recording.open(path) as recording:
@@ -364,4 +364,4 @@ def test_a_worker_that_lives_long_sees_that_a_recording_was_replaced(
     (late,) = list(plan(path, out=out))[3:]
     frames_of_before = replace(late, stamp="2026-11-22T08:00:00+00:00 3")
     (row,) = frame_work.work(settings, out, [frames_of_before])
-    assert "another one than when the run was begun" in row.error
+    assert "has changed since the run was started" in row.error

@@ -1,4 +1,4 @@
-"""How sure the lengths of a calibration are."""
+"""The uncertainty of lengths of a calibration."""
 
 from __future__ import annotations
 
@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 import scene
 
-from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.calibration.depth_scale import (
     depth_scale_sd,
+    found_depth,
     lateral_scale_sd,
     synthetic_press,
 )
-from gelpolight_core.calibration.spread import jackknife_covariance
+from gelpolight_core.calibration.jackknife import jackknife_covariance
 from gelpolight_core.optics.refraction import LayerStack, build_stack
-from gelpolight_core.reconstruction.near_light import solve_near_light
-from gelpolight_core.reconstruction.weighted import integrate_weighted
 from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 
 def full_model(calibration: Calibration) -> FullModel:
@@ -36,11 +35,9 @@ def test_the_synthetic_press_is_what_the_sensor_would_find() -> None:
     calibration = scene.calibration()
     full = full_model(calibration)
     field, depth, plateau = synthetic_press(full, calibration.table)
-    slopes = solve_near_light(field, depth, full.led_positions_mm, full.membrane)
-    pitch = float(field.x_mm[1] - field.x_mm[0])
-    found = integrate_weighted(slopes.slope_x, slopes.slope_y, slopes.weight, pitch_mm=pitch)
-    # A kink at the plateau's rim falls between nodes of a fifth of a millimetre.
-    assert np.median(found.depth_mm[plateau]) == pytest.approx(np.median(depth[plateau]), rel=0.05)
+    found = found_depth(full, field, depth)
+    # An edge at the plateau's rim lies between nodes a fifth of a millimetre apart.
+    assert np.median(found[plateau]) == pytest.approx(np.median(depth[plateau]), rel=0.05)
 
 
 def test_wider_parameters_leave_depths_as_much_less_sure() -> None:
@@ -51,8 +48,8 @@ def test_wider_parameters_leave_depths_as_much_less_sure() -> None:
     twice = depth_scale_sd(full, calibration.table, 4.0 * covariance)
     assert twice == pytest.approx(2.0 * once, rel=0.05)
     assert depth_scale_sd(full, calibration.table, 0.0 * covariance) == 0.0
-    # LED errors of 0.1 mm cost 0.4 % of depth, so 0.02 mm cost about 0.1 %; gloss of 0.01 costs
-    # up to 1 %. What a depth does not use (the cap's bounce, the decay) costs nothing.
+    # LED errors of 0.1 mm cost 0.4 % of depth, so 0.02 mm cost about 0.1 %; gloss of 0.01 costs up
+    # to 1 %. Parameters that a depth does not use (cap interreflection, decay) cost nothing.
     assert 5e-4 < once < 2e-2
     unused = np.diag([0.0] * 12 + [1.0, 0.0, 1.0])
     assert depth_scale_sd(full, calibration.table, unused) < 1e-6
@@ -72,7 +69,8 @@ def test_focal_length_and_distance_err_together_and_leave_the_scale() -> None:
     focal_sd = 1e-3
     alone = 39.0 * focal_sd
     assert lateral_scale_sd(stack(False), alone, focal_sd) < 1e-9
-    # Refraction lifts 14 mm by 14 (1 - 1/1.41) = 4.07 mm, which does not follow the focal length.
+    # Refraction lifts 14 mm by 14 (1 - 1/1.41) = 4.07 mm, which does not scale with the focal
+    # length.
     assert lateral_scale_sd(stack(True), alone, focal_sd) == pytest.approx(
         focal_sd * 4.07 / (39.0 - 4.07), rel=1e-3
     )
@@ -81,7 +79,7 @@ def test_focal_length_and_distance_err_together_and_leave_the_scale() -> None:
 
 
 def test_leaving_presses_out_shows_errors_that_a_press_has_as_a_whole() -> None:
-    """A line through groups of points that err together: scatter of repeats beside the stated."""
+    """A line fit to groups of points with common errors: scatter of repeats and stated sd."""
     random = np.random.default_rng(3)
     groups, points = 12, 50
     found, stated, naive = [], [], []
@@ -111,7 +109,7 @@ def test_a_lone_press_is_known_no_better_than_its_own_pixels_say() -> None:
     weightless = np.zeros((5, 3))
     inverse = np.linalg.inv(rows[:, :2].T @ rows[:, :2])
     prior = np.zeros((1, 3))
-    # Larger residuals than the weights say widen it; smaller ones do not narrow it.
+    # Residuals larger than the weights predict widen it; smaller ones do not narrow it.
     for size, excess in ((3.0, 9.0 * float(left @ left) / 38), (0.1, 1.0)):
         residuals = size * np.concatenate([left, np.zeros(5)])
         covariance = jackknife_covariance(
@@ -133,6 +131,6 @@ def test_a_calibration_says_how_sure_its_heights_are(virtual_calibration: Calibr
     assert full.scale_sd is not None
     figure = virtual_calibration.quality["joint"]["depth_sd_percent"]
     assert figure.value == pytest.approx(100.0 * full.scale_sd.depth)
-    # 0.1 to 3 %: below, it would be better than any sensor of this kind has been shown to be.
+    # 0.1 to 3 %: below that it would be better than any known sensor of this kind.
     assert 0.1 < figure.value < 3.0
     assert full.scale_sd.lateral < 1e-3

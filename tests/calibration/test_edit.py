@@ -1,4 +1,4 @@
-"""A reflectance curve drawn by hand: what it changes, and what it must not."""
+"""A reflectance curve edited by hand: what it changes, and what it must not change."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.calibration import Calibration, FullModel
 from gelpolight_core.calibration.edit import edited, table_membrane
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import flat_cosines
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.table import ReflectanceTable
+from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 Array = NDArray[np.float64]
 NODES = np.linspace(0.0, 1.0, 9)
@@ -60,13 +60,13 @@ def test_the_papers_model_uses_the_curve_as_it_is_drawn() -> None:
 
 
 def test_the_bare_membrane_stays_flat() -> None:
-    """What the background shows still means the flat membrane's cosine."""
+    """The background value still means the cosine of the flat membrane."""
     before = full_calibration()
     after = drawn(before)
     flat = flat_cosines(before.table, before.led_positions_mm)[..., 1]
     lit = before.factors[..., 1] > 0.0
     shown = before.factors[lit, 1] * before.reflectance.response(1, flat[lit])
-    # G and R are splines of their own, inverse to each other at the nodes.
+    # G and R are separate splines, inverse to each other at the nodes.
     np.testing.assert_allclose(
         after.reflectance.cosine(1, shown / after.factors[lit, 1]), flat[lit], atol=1e-4
     )
@@ -80,7 +80,7 @@ def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
     old = before.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
     change = ReflectanceTable((NODES,) * 3, (BENT,) * 3, np.zeros((3, 2))).response(1, cosine)
     ratio = share[:, 1] / old[:, 1] / (change / cosine)
-    # But for its height, which the comparison with the bare membrane takes out.
+    # Except for its height, which cancels in the comparison with the bare membrane.
     assert np.ptp(ratio) / ratio.mean() < 2e-3
     for k in (0, 2):
         np.testing.assert_allclose(share[:, k], old[:, k], atol=2e-5)
@@ -101,7 +101,7 @@ def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
     assert read.identity == after.identity
 
 
-def test_who_edited_and_when_does_not_change_the_name_of_the_same_numbers() -> None:
+def test_operator_and_time_of_an_edit_do_not_change_the_identity() -> None:
     before = full_calibration()
     other = edited(before, {1: (NODES, BENT)}, operator="another", made="2027-01-01T00:00:00+00:00")
     assert other.identity == drawn(before).identity
@@ -114,7 +114,7 @@ def test_a_curve_that_is_not_changed_changes_nothing() -> None:
     assert edited(before, same, operator="x", made=WHEN) is before
 
 
-def test_an_edit_taken_back_is_nearly_the_old_membrane() -> None:
+def test_an_undone_edit_gives_nearly_the_old_membrane() -> None:
     before = full_calibration()
     table = before.reflectance
     back = edited(drawn(before), {1: (table.cosines[1], table.values[1])}, operator="x", made=WHEN)
@@ -169,7 +169,7 @@ def test_a_papers_calibration_without_full_model_can_be_edited() -> None:
 
 
 def test_the_papers_table_is_a_membrane_exactly() -> None:
-    """Without gloss and bounce, brightness is the table's, whatever the view."""
+    """Without gloss and interreflection, brightness equals the table, for any view."""
     random = np.random.default_rng(1)
     bins = np.sort(random.uniform(0.02, 0.98, 12))
     nodes = np.concatenate([[0.0], bins, [1.0]])

@@ -1,4 +1,4 @@
-"""The calibration file: nothing lost, nothing half-read, nothing believed unchecked."""
+"""The calibration file: nothing is lost, nothing is half-read, everything is checked."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gelpolight_core.errors import InputError
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a good calibration file."""
+    """Return a valid calibration file."""
     path = tmp_path_factory.mktemp("calibration") / "good.gplcal"
     write_calibration(scene.calibration(), path)
     return path
@@ -65,7 +65,7 @@ def test_a_truncated_or_altered_file_is_refused_or_the_same(
 
 
 def rewritten(whole: Path, target: Path, change: dict[str, object]) -> Path:
-    """Return a copy whose manifest was changed and whose checksum was made anew by the forger."""
+    """Return a forged copy with a changed manifest and a recomputed checksum."""
     import hashlib
 
     with zipfile.ZipFile(whole) as old, zipfile.ZipFile(target, "w") as new:
@@ -111,7 +111,7 @@ def test_a_forged_manifest_is_refused(
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "none.gplcal", tmp_path):
-        with pytest.raises(InputError, match="no such file"):
+        with pytest.raises(InputError, match="does not exist"):
             read_calibration(path)
 
 

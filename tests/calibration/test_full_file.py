@@ -1,4 +1,4 @@
-"""The full model's part of the calibration file: nothing lost, nothing believed unchecked."""
+"""The full model in the calibration file: nothing is lost, everything is checked."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 import scene
 
-from gelpolight_core.calibration.calibration import Calibration, FullModel, ScaleSd
 from gelpolight_core.calibration.file import MANIFEST, read_calibration, write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+from gelpolight_core.sensor_calibration import Calibration, FullModel, ScaleSd
 
 CURVES = tuple(tuple((np.linspace(0.0, 1.0, CURVE_NODES) ** n).tolist()) for n in (1.0, 1.1, 0.9))
 
 
 def full_calibration() -> Calibration:
-    """Return the small sensor's calibration with a full model of odd numbers."""
+    """Return the small sensor's calibration with a full model of unusual numbers."""
     plain = scene.calibration()
     full = FullModel(
         led_positions_mm=plain.led_positions_mm + np.array([0.1, -0.03, -0.2]),
@@ -45,7 +45,7 @@ def full_calibration() -> Calibration:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a good file of a full model."""
+    """Return a valid file of a full model."""
     path = tmp_path_factory.mktemp("full") / "good.gplcal"
     write_calibration(full_calibration(), path)
     return path
@@ -57,7 +57,7 @@ def forged(
     change: Callable[[dict[str, Any]], None] = lambda manifest: None,
     **arrays: np.ndarray,
 ) -> Path:
-    """Return a copy with other values whose checksums were all made anew by the forger."""
+    """Return a copy with other values and recomputed checksums, as a forger would make it."""
     with zipfile.ZipFile(whole) as old, zipfile.ZipFile(target, "w") as new:
         manifest = json.loads(old.read(MANIFEST))
         data = {name: old.read(name) for name in old.namelist()}
@@ -107,7 +107,7 @@ def test_the_same_full_calibration_is_the_same_file(whole: Path, tmp_path: Path)
 
 
 def test_a_full_model_of_version_1_is_read(whole: Path, tmp_path: Path) -> None:
-    """It had no curves, no deviations of the membrane and no choice between membranes."""
+    """Version 1 had no curves, no membrane deviations and no choice between membranes."""
 
     def older(manifest: dict[str, Any]) -> None:
         manifest["version"] = 1
@@ -140,7 +140,7 @@ def test_curves_that_no_membrane_has_are_refused(whole: Path, tmp_path: Path, sp
         read_calibration(forged(whole, tmp_path / "f.gplcal", full_membrane_diffuse=curves))
 
 
-def test_the_same_pictures_have_the_same_name_whoever_calibrates_and_when() -> None:
+def test_the_same_images_have_the_same_identity_for_any_operator_and_time() -> None:
     one = full_calibration()
     later = replace(one.provenance, created="2031-01-01T00:00:00+00:00", operator="another")
     assert replace(one, provenance=later).identity == one.identity
@@ -174,8 +174,8 @@ def test_a_file_without_full_model_reads_as_the_papers(tmp_path: Path) -> None:
     assert read_calibration(tmp_path / "paper.gplcal").full is None
 
 
-def test_a_forger_who_changes_nothing_is_believed(whole: Path, tmp_path: Path) -> None:
-    """What is refused below is refused for its values."""
+def test_an_unchanged_forgery_is_accepted(whole: Path, tmp_path: Path) -> None:
+    """The refusals below are caused by the values, not by the checksums."""
     read = read_calibration(forged(whole, tmp_path / "same.gplcal"))
     assert read.identity == full_calibration().identity
 
@@ -243,9 +243,7 @@ def test_a_full_model_that_lacks_an_array_is_refused(
         read_calibration(forged(whole, tmp_path / "f.gplcal", lambda m: m["arrays"].pop(name)))
 
 
-def test_a_calibration_said_to_be_full_must_hold_the_full_model(
-    whole: Path, tmp_path: Path
-) -> None:
+def test_a_full_calibration_must_contain_the_full_model(whole: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="full model is missing"):
         read_calibration(forged(whole, tmp_path / "f.gplcal", lambda m: m.pop("full")))
 

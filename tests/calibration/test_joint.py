@@ -1,7 +1,7 @@
-"""Joint refinement on ball pixels whose light, membrane and balls are known.
+"""Joint refinement on ball pixels with known light, membrane and balls.
 
-The pixels are shaded here, by other formulae than the program's: rays are marched onto the
-simulator's drape, and the membrane's lobe is the published one written by cosines.
+The pixels are shaded here with other formulae than in the program: rays are marched onto the
+simulator's drape, and the lobe of the membrane is the published one in terms of cosines.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ BALLS = (
     BallPose((4.2, 5.3), 4.0, 1.2),
 )
 PIXELS = 120  # on the cap, and as many on the drape
-# So many neighbouring pixels err together; the square of the program's own allowance.
+# This many neighbouring pixels have a common error; the square of the program's own factor.
 TOGETHER = 16
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What the pixels are shaded from."""
+    """The truth behind the pixels."""
 
     leds: Array
     exponent: float = 1.0
@@ -67,7 +67,7 @@ def drape(place: Array, pose: BallPose, decay_mm: float) -> Array:
 
 
 def shaded(truth: Truth, place: Array, normals: Array, view: Array) -> Array:
-    """Return the brightness of points (N, 3) under three LEDs that look along +z."""
+    """Return the brightness of points (N, 3) under three LEDs that face +z."""
     columns = []
     for led in truth.leds:
         light = led - place
@@ -102,7 +102,7 @@ def pixels_of(
     angle = np.concatenate([np.sort(random.uniform(0, 2 * np.pi, PIXELS)) for _ in range(2)])
     place = np.asarray(pose.centre_mm) + np.stack([r * np.cos(angle), r * np.sin(angle)], -1)
     depth = drape(place, pose, truth.decay_mm)
-    # The ray through a true place leans as its foot says: P0 = P - depth w(P0), w = -P0 / 38.
+    # The ray through a true point is tilted by its ray slope: P0 = P - depth w(P0), w = -P0 / 38.
     points = place / (1.0 - depth[:, None] / 38.0)
     drift = -points / 38.0
     step = 1e-5
@@ -130,7 +130,7 @@ def pixels_of(
 
 
 def found_press(pose: BallPose, random: np.random.Generator) -> BallPress:
-    """Return the ball as an earlier stage found it: a little beside, its depth 5 % wrong."""
+    """Return the ball as found by an earlier stage: slightly shifted, its depth 5 % wrong."""
     x, y = np.asarray(pose.centre_mm) + random.normal(scale=0.02, size=2)
     depth = pose.depth_mm * (1.0 + 0.05 * random.normal())
     start = BallPose((float(x), float(y)), pose.radius_mm, float(depth))
@@ -155,8 +155,8 @@ def refined(
 def glossy() -> tuple[Truth, JointResult]:
     """Return a glossy membrane under LEDs at other heights than stated, and its refinement."""
     known = truth(gloss=0.3, roughness=0.45, decay_mm=0.6)
-    # Little noise: with the usual 1 % the presses that are held out hardly tell LEDs that are
-    # 0.2 mm off from true ones, and which are kept is left to chance.
+    # Little noise: with the usual 1 %, held-out presses hardly distinguish LEDs that are 0.2 mm off
+    # from true ones, and the choice is random.
     return known, refined(known, noise=0.003)
 
 
@@ -167,7 +167,7 @@ def test_leds_that_are_not_at_the_housings_height_are_found(
     assert result.kept == "refined"
     left = np.linalg.norm(result.led_positions_mm - known.leds, axis=1)
     before = np.linalg.norm(MIRROR - known.leds, axis=1)
-    # 0.1 mm of LED position costs 0.4 % of depth (PHYSICS).
+    # 0.1 mm of LED position costs 0.4 % of depth.
     assert (left < 0.1).all()
     assert left.mean() < 0.5 * before.mean()
 
@@ -181,7 +181,7 @@ def test_gloss_and_decay_length_are_found(glossy: tuple[Truth, JointResult]) -> 
     assert result.membrane.bounce < 0.1
 
 
-def test_the_balls_come_to_their_places(glossy: tuple[Truth, JointResult]) -> None:
+def test_the_balls_are_refined_to_their_positions(glossy: tuple[Truth, JointResult]) -> None:
     _, result = glossy
     for found, pose in zip(result.balls, BALLS, strict=True):
         assert np.hypot(*np.subtract(found.centre_mm, pose.centre_mm)) < 0.03
@@ -200,7 +200,7 @@ def test_a_matt_membrane_gets_no_gloss_and_light_from_around_its_share() -> None
 
 
 def test_a_glossy_membrane_keeps_its_two_lobes(glossy: tuple[Truth, JointResult]) -> None:
-    """No one curve of the light's cosine explains brightness that depends on the view."""
+    """No single curve of the light's cosine explains brightness that depends on the view."""
     _, result = glossy
     assert result.membrane_kept == "two-lobe"
     assert not result.membrane.diffuse
@@ -215,7 +215,7 @@ def test_a_matt_membrane_that_is_not_lamberts_is_a_curve() -> None:
     two_lobe, one_dimensional = result.membrane_held_out
     assert one_dimensional < 0.9 * two_lobe
     assert result.membrane.gloss == 0.0
-    # Over the cosines that the balls show, but for its height, which nothing tells.
+    # Over the cosines covered by the balls, except for its height, which is not observable.
     cosine = np.linspace(0.4, 0.95, 30)
     expected = cosine * (1.0 + known.grazing * (1.0 - cosine))
     share = result.membrane.diffuse_share(np.repeat(cosine[:, None], 3, axis=1))
@@ -237,13 +237,13 @@ def test_the_misfit_is_the_noise_of_the_pixels(glossy: tuple[Truth, JointResult]
 
 
 def test_the_stated_deviations_are_those_that_repeats_show() -> None:
-    """The first two sessions that refine; pixels err in runs, as lens and ball make them."""
+    """The first two sessions that refine; pixel errors are correlated, as from lens and ball."""
     errors, stated = [], []
     known = truth(gloss=0.2)
     for seed in range(12, 20):
         result = refined(known, seed=seed, count=5)
         if result.kept == "mirror":
-            continue  # nothing is stated of LEDs that were not refined
+            continue  # no uncertainty is stated for LEDs that were not refined
         errors.append(
             [
                 *(result.led_positions_mm - known.leds).ravel(),
@@ -264,13 +264,13 @@ def test_the_stated_deviations_are_those_that_repeats_show() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors(seed: int) -> None:
-    """Also where the pictures are nonsense: what is kept is what did better."""
+    """Even for meaningless images, the better alternative is kept."""
     random = np.random.default_rng(seed)
     known = truth()
     presses = [found_press(pose, random) for pose in BALLS[:4]]
     pixels = []
     for pose in BALLS[:4]:
-        # Every press was taken with its own LEDs: no common answer exists.
+        # Every press was made with its own LEDs: no common solution exists.
         own = replace(known, leds=MIRROR + random.normal(scale=0.6, size=(3, 3)))
         pixels.append(pixels_of(pose, own, 0.03, random))
     result = refine_jointly(presses, pixels, MIRROR)
@@ -284,7 +284,7 @@ def test_refined_leds_never_explain_held_out_presses_worse_than_the_mirrors(seed
         assert after <= before
 
 
-def test_too_few_balls_to_hold_any_back_keep_the_mirrors_leds() -> None:
+def test_with_too_few_balls_to_hold_out_the_mirror_leds_are_kept() -> None:
     known = truth(gloss=0.2)
     result = refined(known, count=3)
     assert result.kept == "mirror"
@@ -328,7 +328,7 @@ def test_views_run_back_along_the_rays() -> None:
     drift = np.array([[[0.3, -0.1], [0.0, 0.0]]])
     view = view_directions(drift)
     np.testing.assert_allclose(view[0, 1], [0.0, 0.0, -1.0])
-    # A step of 1 mm of depth along the view moves sideways by the drift.
+    # A step of 1 mm of depth along the view shifts the point by the ray slope.
     np.testing.assert_allclose(view[0, 0, :2] / -view[0, 0, 2], drift[0, 0])
     assert np.linalg.norm(view[0, 0]) == pytest.approx(1.0)
 

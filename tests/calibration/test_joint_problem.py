@@ -1,4 +1,4 @@
-"""Slopes of the joint refinement's residuals."""
+"""Derivatives of the residuals of the joint refinement."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ STEP = 1e-4
 
 
 def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
-    """Return two presses of random pixels, and parameters to look at them with."""
+    """Return two presses of random pixels, and parameters."""
     random = np.random.default_rng(5)
     presses = []
     for centre in ((-2.0, 1.0), (3.0, -1.5)):
@@ -42,7 +42,7 @@ def test_slopes_are_those_of_moving_every_parameter_alone(curves: bool) -> None:
     alone = np.stack([(found.all(x + d) - found.all(x)) / STEP for d in STEP * np.eye(x.size)], 1)
     slopes = found.jacobian(x)
     size = np.abs(alone).max(axis=0)
-    # Curves' slopes are in closed form, the others by the same steps.
+    # The derivatives by the curves have a closed form, the others use the same steps.
     assert np.abs(slopes - alone)[:, : COMMON + 6].max() < 1e-9 * size.max()
     assert (np.abs(slopes - alone).max(axis=0) <= 2e-3 * size).all()
 

@@ -1,4 +1,4 @@
-"""The library of sensors reads manifests alone: quickly, and as strictly as the whole file."""
+"""The sensor library reads only manifests: fast, and as strictly as the whole file."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from gelpolight_core.errors import InputError
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a good calibration file."""
+    """Return a valid calibration file."""
     path = tmp_path_factory.mktemp("calibration") / "good.gplcal"
     write_calibration(scene.calibration(), path)
     return path
 
 
 def forged(whole: Path, target: Path, path: tuple[str, ...], value: Any) -> Path:
-    """Return a copy with one value of the manifest changed, its checksum made anew."""
+    """Return a copy with one changed value in the manifest and a recomputed checksum."""
     with zipfile.ZipFile(whole) as old, zipfile.ZipFile(target, "w") as new:
         manifest = json.loads(old.read(MANIFEST))
         place = manifest
@@ -64,7 +64,7 @@ def test_the_summary_says_what_the_calibration_says(whole: Path) -> None:
 
 
 def test_a_list_of_calibrations_loads_no_numerical_library() -> None:
-    """The window is up before they are."""
+    """The window opens before the libraries are loaded."""
     program = (
         "import sys, app.workspace.workspace;"
         "print([m for m in ('scipy', 'numba', 'cv2', 'numpy') if m in sys.modules])"
@@ -125,5 +125,5 @@ def test_a_damaged_array_is_found_before_it_is_copied(whole: Path, tmp_path: Pat
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="does not exist"):
         read_summary(tmp_path / "none.gplcal")

@@ -1,4 +1,4 @@
-"""What the tests of the commands share."""
+"""Shared parts of the command tests."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from app.command_line.main import main
 
 @pytest.fixture(scope="session")
 def session(virtual_session: Path) -> Path:
-    """Return a session folder of the virtual sensor, at half the picture's size."""
+    """Return a session folder of the virtual sensor, at half the image size."""
     return virtual_session
 
 
 @pytest.fixture(scope="session")
 def calibration(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the calibration that the command makes of it."""
+    """Return the calibration that the command makes from it."""
     path = tmp_path_factory.mktemp("made") / "c.gplcal"
     assert main(["calibrate", str(session), "-o", str(path), "--model", "paper"]) == 0
     return path
@@ -25,5 +25,5 @@ def calibration(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 @pytest.fixture
 def press(session: Path) -> Path:
-    """Return a picture of a pressed cylinder."""
+    """Return an image of a pressed cylinder."""
     return session / "presses" / "cylinder_s5_d100.png"

@@ -1,4 +1,4 @@
-"""Which cameras are there, in words and as JSON."""
+"""The list of cameras, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from app.command_line.cameras import report
 from app.command_line.main import main
 
 
-def test_without_a_camera_it_is_said_what_to_do(
+def test_without_a_camera_the_message_explains_what_to_do(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = ModuleType("cv2_enumerate_cameras")
     module.enumerate_cameras = lambda interface: []  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "cv2_enumerate_cameras", module)
     assert main(["cameras"]) == 0
-    assert "No camera is plugged in" in capsys.readouterr().out
+    assert "No camera was found" in capsys.readouterr().out
 
 
 def test_formats_and_settings_are_listed_and_the_best_format_is_marked(
@@ -32,8 +32,8 @@ def test_formats_and_settings_are_listed_and_the_best_format_is_marked(
     assert report(FakeDriver(fake, busy), tmp_path / "cameras.json") == 0
     said = capsys.readouterr().out
     assert f"{C310.name}  [046d:081b@SN1]  /dev/video0" in said
-    assert "* YUYV 128 x 96 at 7.5 pictures/s\n" in said
-    assert "  MJPG 64 x 48 at 30 pictures/s, compressed" in said
+    assert "* YUYV 128 x 96 at 7.5 images/s\n" in said
+    assert "  MJPG 64 x 48 at 30 images/s, compressed" in said
     assert "Not locked" in said
     assert "Other: the camera cannot be opened" in said
     first, second = json.loads((tmp_path / "cameras.json").read_text())["cameras"]

@@ -1,4 +1,4 @@
-"""The commands as a technician types them, and what they give."""
+"""The commands as a technician types them, and their results."""
 
 from __future__ import annotations
 
@@ -11,19 +11,18 @@ import numpy as np
 import pytest
 from one_line import refusal
 
+from app.command_line.calibrate import run_as_json
 from app.command_line.main import main
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.pipeline import CalibrationRun
+from gelpolight_core.sensor_calibration import Calibration
 
 
-def test_a_calibration_of_the_virtual_sensor_finds_its_truth(session: Path, tmp_path: Path) -> None:
-    """The bars are those for a whole picture, doubled for a picture of half the size."""
-    results = tmp_path / "c.json"
-    status = main(
-        ["calibrate", str(session), "-o", str(tmp_path / "c.gplcal"), "--json", str(results)]
-    )
-    assert status == 0
-    found, truth = json.loads(results.read_text()), json.loads((session / "truth.json").read_text())
+def test_a_calibration_of_the_virtual_sensor_finds_its_true_values(
+    session: Path, virtual_run: CalibrationRun
+) -> None:
+    """The limits are those for a full image, doubled for an image of half the size."""
+    found, truth = run_as_json(virtual_run), json.loads((session / "truth.json").read_text())
     assert found["camera"]["fx"] == pytest.approx(truth["camera"]["fx"], rel=0.002)
     plane = truth["top_plane"]
     assert found["top_plane"]["distance_mm"] == pytest.approx(plane["offset_mm"], rel=0.002)
@@ -40,12 +39,12 @@ def test_a_calibration_of_the_virtual_sensor_finds_its_truth(session: Path, tmp_
     assert max(errors) < 0.15
 
 
-def test_inspect_shows_who_made_it_and_how_good_it_is(
+def test_inspect_shows_provenance_and_quality(
     calibration: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["inspect", str(calibration)]) == 0
     shown = capsys.readouterr().out
-    for word in ("calibration", "verdict", "made", "focal length", "top_pose", "reflectance"):
+    for word in ("calibration", "verdict", "created", "focal length", "top_pose", "reflectance"):
         assert word in shown
 
 
@@ -81,14 +80,14 @@ def test_a_press_is_measured_against_its_truth(
     m = json.loads(result.read_text())
     assert {"shape", "diameter_mm", "height_mm", "centre_mm", "yaw_deg", "drape_decay_mm"} <= set(m)
     assert {"sd", "truth", "error_percent", "verdict", "reason"} <= set(m)
-    # The paper's model states neither.
+    # The paper's model gives neither.
     assert m["noise_sd"] is None
     assert m["calibration_sd"] is None
     assert m["diameter_mm"] == pytest.approx(5.0, rel=0.06)
     assert m["height_mm"] == pytest.approx(1.0, rel=0.06)
 
 
-def test_the_full_model_says_how_sure_it_is(
+def test_the_full_model_gives_its_uncertainty(
     virtual_session: Path,
     virtual_calibration: Calibration,
     tmp_path: Path,
@@ -130,7 +129,7 @@ def test_the_evaluation_measures_every_press_of_the_folder(
     assert cv2.imread(str(tmp_path / "e" / "evaluation.png")) is not None
 
 
-def test_an_evaluation_of_which_nothing_could_be_measured_is_refused(
+def test_an_evaluation_without_a_measurable_press_is_refused(
     session: Path, calibration: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     presses = tmp_path / "presses"
@@ -139,10 +138,10 @@ def test_an_evaluation_of_which_nothing_could_be_measured_is_refused(
     head = "file,shape,diameter_mm,side_mm,height_mm"
     (presses / "truth.csv").write_text(f"{head}\nbare.png,cylinder,5.0,,1.0\n")
     line = refusal(capsys, "evaluate", str(calibration), str(presses), "-o", str(tmp_path / "e"))
-    assert "none of the 1 presses" in line
+    assert "one of the 1 presses" in line
 
 
-def test_the_benchmark_says_where_the_time_goes(
+def test_the_benchmark_lists_the_time_of_each_step(
     calibration: Path, press: Path, tmp_path: Path
 ) -> None:
     result = tmp_path / "b.json"
@@ -151,10 +150,11 @@ def test_the_benchmark_says_where_the_time_goes(
     timing = json.loads(result.read_text())
     assert {"total_ms", "copy_floor_ms", "steps", "threads", "model", "plan"} <= set(timing)
     assert {"name", "median_ms", "p95_ms", "bytes"} <= set(timing["steps"][0])
-    assert all(step["done"] for step in timing["plan"][: len(timing["steps"])])
+    done = [step["step"] for step in timing["plan"] if step["done"]]
+    assert done == [step["name"] for step in timing["steps"]]
 
 
-def test_the_benchmark_of_a_planned_frame_says_what_was_left_out(
+def test_the_benchmark_of_a_planned_frame_lists_omitted_steps(
     calibration: Path, press: Path, tmp_path: Path
 ) -> None:
     result = tmp_path / "b.json"
@@ -193,6 +193,26 @@ def test_a_design_is_checked_from_its_file(
     assert cv2.imread(str(figure)) is not None
     (tmp_path / "bad.toml").write_text("nonsense = 1\n")
     assert "nonsense" in refusal(capsys, "design", str(tmp_path / "bad.toml"))
+
+
+def test_shadows_come_from_the_leds_of_the_design(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Lower LEDs throw longer shadows; directional light is the same for all designs."""
+    shadows = {}
+    for height in (7.0, 13.0):
+        file = tmp_path / f"{height}.toml"
+        places = ((0.0, 12.0), (-10.4, -6.0), (10.4, -6.0))
+        file.write_text(
+            "".join(f"[[leds]]\nx_mm = {x}\ny_mm = {y}\nheight_mm = {height}\n" for x, y in places)
+        )
+        assert main(["design", str(file), "--shadows", str(tmp_path / "shadows.png")]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        point = [line.split() for line in lines if line.startswith("point")]
+        assert {row[1] for row in point} == {f"{height:g}"}
+        shadows[height] = [float(row[-1]) for row in point]
+    assert sum(shadows[7.0]) > sum(shadows[13.0])
+    assert shadows[7.0][-1] > shadows[13.0][-1] > 0.0
 
 
 def test_help_lists_the_commands(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""The measuring tools by command: what is drawn on the screen, repeated without it."""
+"""The measuring tools on the command line: the same results as on the screen."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from one_line import refusal
 
-from app.command_line.main import main
+from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.tools import result_as_dict, tool_from_dict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture
+from gelpolight_core.session.images import read_picture
 
 
 def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
@@ -37,18 +37,73 @@ def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
     assert json.loads(again.read_text()) == content
 
 
-def test_the_shape_is_found_by_itself(
+def test_the_shape_is_detected_automatically(
     calibration: Path, press: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["measure", str(calibration), str(press), "--shape", "auto"]) == 0
     assert capsys.readouterr().out.splitlines()[0].split() == ["shape", "cylinder"]
 
 
+def test_several_images_are_measured_as_each_alone(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = press.with_name("cylinder_s5_d050.png")
+    arguments = ("measure", str(calibration), "--shape", "cylinder", "--json")
+    contents = []
+    for number, images in enumerate(([press], [other], [press, other])):
+        file = tmp_path / f"{number}.json"
+        assert main([*arguments, str(file), *map(str, images)]) == 0
+        contents.append(json.loads(file.read_text()))
+    assert contents[2] == [
+        {"image": image.name} | alone
+        for image, alone in zip((press, other), contents[:2], strict=True)
+    ]
+    lines = capsys.readouterr().out.splitlines()
+    assert [line for line in lines if line.endswith(":")] == [f"{press}:", f"{other}:"]
+
+
+def test_an_image_that_cannot_be_measured_does_not_stop_the_others(
+    calibration: Path,
+    session: Path,
+    press: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    bare = next((session / "background").iterdir())
+    file = tmp_path / "m.json"
+    images = (str(bare), str(tmp_path / "none.png"), str(press))
+    arguments = ["measure", str(calibration), *images, "--shape", "cylinder", "--json", str(file)]
+    assert main(arguments) == MENDABLE
+    empty, missing, measured = json.loads(file.read_text())
+    assert (empty["image"], missing["image"], measured["image"]) == (
+        bare.name,
+        "none.png",
+        press.name,
+    )
+    assert "pressed" in empty["error"]
+    assert "none.png: " in missing["error"]
+    assert measured["diameter_mm"] == pytest.approx(5.0, rel=0.05)
+    errors = capsys.readouterr().err.splitlines()
+    assert [line for line in errors if str(bare) in line or "none.png" in line] == errors
+
+
+def test_tools_are_applied_to_several_images(
+    calibration: Path, press: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "m.json"
+    arguments = ["measure", str(calibration), str(press), str(press), "--json", str(file)]
+    assert main([*arguments, "--tool", "distance", "--at", "-1", "2", "2", "2"]) == 0
+    first, second = json.loads(file.read_text())
+    assert first == second
+    assert first["image"] == press.name
+    assert [result["tool"] for result in first["results"]] == ["distance"]
+
+
 @pytest.mark.parametrize(
     ("seed", "place"),
     [(["9", "-9"], "(9, -9)"), (["-9,9"], "(-9, 9)")],
 )
-def test_the_object_is_named_by_a_place_in_either_manner(
+def test_the_object_is_selected_by_a_point_in_both_notations(
     calibration: Path,
     press: Path,
     capsys: pytest.CaptureFixture[str],
@@ -59,13 +114,13 @@ def test_the_object_is_named_by_a_place_in_either_manner(
     assert f"no object lies at the seed point {place} mm" in refusal(capsys, *arguments)
 
 
-def test_a_place_on_an_object_is_not_ignored_beside_stored_tools(
+def test_a_seed_point_is_not_ignored_with_stored_tools(
     press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stored = tmp_path / "tools.json"
     stored.write_text('[{"tool": "ball"}]')
     arguments = ("measure", "none.gplcal", str(press), "--tools", str(stored), "--seed", "1", "2")
-    assert "--seed: it does not go with" in refusal(capsys, *arguments)
+    assert "--seed: " in refusal(capsys, *arguments)
 
 
 def test_a_profile_is_written_as_a_table(calibration: Path, press: Path, tmp_path: Path) -> None:
@@ -78,7 +133,7 @@ def test_a_profile_is_written_as_a_table(calibration: Path, press: Path, tmp_pat
     assert np.allclose(ends_mm, [[-6.0, 0.5], [6.0, -0.5]], atol=1e-6)
 
 
-def test_drift_is_told_and_the_zeroed_calibration_is_usable(
+def test_drift_is_reported_and_the_zeroed_calibration_is_usable(
     calibration: Path, session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bare = str(next((session / "background").iterdir()))
@@ -95,15 +150,15 @@ def test_drift_is_told_and_the_zeroed_calibration_is_usable(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--tool", "distance", "--at", "1", "2"], "1 places are given"),
-        (["--tool", "distance", "--at", "1", "2", "3"], "3 numbers"),
+        (["--tool", "distance", "--at", "1", "2"], "points: 1"),
+        (["--tool", "distance", "--at", "1", "2", "3"], "Number of values: 3"),
         (["--tool", "rectangle", "--at", "1", "2"], "--size"),
         (["--tool", "circle", "--at", "1", "2", "3", "4", "5", "7", "--yaw", "3"], "--yaw"),
-        (["--tool", "profile-step", "--at", "1", "2", "3", "4", "--range", "1", "2"], "takes 4"),
+        (["--tool", "profile-step", "--at", "1", "2", "3", "4", "--range", "1", "2"], "needs 4"),
         (["--tools", "nowhere.json"], "cannot be read as JSON"),
-        (["--shape", "ball", "--at", "1", "2"], "does not go with --shape"),
+        (["--shape", "ball", "--at", "1", "2"], "cannot be used with --shape"),
         (["--tool", "ball", "--truth", "truth.csv"], "--truth"),
-        (["--tool", "ball", "--seed", "1", "2"], "--seed: it does not go with"),
+        (["--tool", "ball", "--seed", "1", "2"], "--seed: "),
     ],
 )
 def test_a_tool_that_is_not_described_is_refused_in_one_line(

@@ -14,7 +14,7 @@ from gelpolight_core.records.records import NAME, Records
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Path:
-    """Return a workspace in which two sensors were measured with."""
+    """Return a workspace with measurements of two sensors."""
     with Records.open(tmp_path / NAME) as records:
         for serial, value in (("A-1", 5.1), ("B-2", 4.9)):
             quantities = (Quantity("diameter_mm", value, 0.01, 5.0, 5.0),)
@@ -42,28 +42,28 @@ def test_one_sensor_is_chosen_and_written_as_csv(
     assert [line.split(",")[2] for line in table.read_text("utf-8-sig").splitlines()[1:]] == ["B-2"]
 
 
-def test_damaged_records_are_said_so_and_kept(
+def test_damaged_records_are_reported_and_kept(
     workspace: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (workspace / NAME).write_bytes(b"nonsense" * 1000)
     assert main(["records", "--workspace", str(workspace)]) == 0
-    assert "The records were damaged. They are kept as" in capsys.readouterr().err
+    assert "The records were damaged. They were saved as" in capsys.readouterr().err
     assert len(list(workspace.glob("records.damaged-*"))) == 1
 
 
 def test_a_folder_without_records_is_refused_and_stays_empty(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "there are no records" in refusal(capsys, "records", "--workspace", str(tmp_path))
+    assert "There are no records" in refusal(capsys, "records", "--workspace", str(tmp_path))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_table_does_not_take_the_place_of_the_records(
+def test_the_table_does_not_overwrite_the_records(
     workspace: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     chosen = ("records", "--workspace", str(workspace), "--csv")
     kept = (workspace / NAME).read_bytes()
-    assert "take the place" in refusal(capsys, *chosen, str(workspace / NAME))
+    assert "overwrite" in refusal(capsys, *chosen, str(workspace / NAME))
     assert (workspace / NAME).read_bytes() == kept
 
 
@@ -75,4 +75,4 @@ def test_a_table_that_cannot_be_written_is_refused_before_the_records_are_read(
 
     monkeypatch.setattr(Records, "measurements", fail)
     chosen = ("records", "--workspace", str(workspace), "--csv")
-    assert "a folder stands" in refusal(capsys, *chosen, str(workspace))
+    assert "A folder has the name" in refusal(capsys, *chosen, str(workspace))

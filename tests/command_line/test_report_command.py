@@ -1,4 +1,4 @@
-"""The report by command, validated with presses of known size."""
+"""The report on the command line, validated with presses of known size."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def run_folder(session: Path, tmp_path: Path) -> Path:
     return presses.parent
 
 
-@pytest.mark.parametrize("named", [".", "presses"])
 def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
-    calibration: Path, run_folder: Path, tmp_path: Path, named: str
+    calibration: Path, run_folder: Path, tmp_path: Path
 ) -> None:
-    presses, page = str(run_folder / named), tmp_path / "r.html"
-    assert main(["evaluate", str(calibration), presses, "-o", str(tmp_path / "e")]) == 0
+    """Both commands accept the folder of a run, or that of its presses."""
+    page, presses = tmp_path / "r.html", str(run_folder / "presses")
+    assert main(["evaluate", str(calibration), str(run_folder), "-o", str(tmp_path / "e")]) == 0
     overall = json.loads((tmp_path / "e" / "evaluation.json").read_text())["overall"]
     assert {overall[direction]["count"] for direction in ("planar", "depth")} == {1}
     assert main(["report", str(calibration), "-o", str(page), "--presses", presses]) == 0
@@ -44,9 +44,9 @@ def test_a_calibration_is_validated_with_the_numbers_of_the_evaluation(
 
 
 @pytest.mark.parametrize("named", ["presses/truth.csv", "none"])
-def test_presses_that_are_no_folder_are_refused_before_any_work(
+def test_presses_without_a_folder_are_refused_before_any_work(
     run_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], named: str
 ) -> None:
     presses, page = str(run_folder / named), str(tmp_path / "r.html")
     line = refusal(capsys, "report", "none.gplcal", "-o", page, "--presses", presses)
-    assert "it is not a folder" in line
+    assert "not a folder" in line

@@ -1,4 +1,4 @@
-"""What files say does not steer the terminal."""
+"""Text in files does not control the terminal."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ EVIL = "\x1b[2Jcalm\x1b]0;owned\x07\x9b31m\u202egnp\nverdict: pass\udc80"
 
 
 @given(st.text(st.characters(exclude_categories=())))
-def test_no_text_steers_the_terminal(text: str) -> None:
+def test_no_text_controls_the_terminal(text: str) -> None:
     shown = harmless(text)
     assert not set(shown) & set(map(chr, [*range(32), 127, *range(128, 160), 0x202E, 0x2028]))
     shown.encode("utf-8")
 
 
 @given(st.text(st.characters(categories=("L", "M", "N", "P", "S", "Zs"))))
-def test_what_people_write_stays_as_it_is(text: str) -> None:
+def test_normal_text_is_unchanged(text: str) -> None:
     assert harmless(text) == text
 
 
@@ -41,10 +41,10 @@ def test_a_line_of_the_programs_own_stays_one(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out == "a\tb\n\\x1b[31mc!\n"
 
 
-def test_a_recording_says_what_others_wrote_into_it_in_harmless_words(
+def test_text_of_a_recording_is_printed_safely(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Its serial, source, settings and note may be anybody's."""
+    """Its serial, source, settings and note may come from anybody."""
     evil = EVIL.removesuffix("\udc80")
     path = tmp_path / "theirs.gplrec"
     header = RecordingHeader(serial=evil, source=evil, settings={evil: evil}, note=evil)
@@ -56,7 +56,7 @@ def test_a_recording_says_what_others_wrote_into_it_in_harmless_words(
     assert len(said.splitlines()) == 12
 
 
-def test_records_list_what_others_wrote_into_them_in_harmless_words(
+def test_text_of_records_is_printed_safely(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     evil = EVIL.removesuffix("\udc80")
@@ -70,13 +70,13 @@ def test_records_list_what_others_wrote_into_them_in_harmless_words(
     assert all(line.isprintable() for line in said.splitlines())
 
 
-def test_figures_of_a_strangers_calibration_are_told_in_harmless_words() -> None:
+def test_text_of_a_calibration_is_printed_safely() -> None:
     figure = Figure("k", EVIL, 1.0, EVIL, 0.5, 2.0, Verdict.WARN, EVIL)
     lines = quality_lines({EVIL: QualityTable((figure,))})
     assert all(line.isprintable() for line in lines)
 
 
-def test_a_refusal_that_names_a_strangers_file_is_harmless(
+def test_a_file_name_in_an_error_is_printed_safely(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["inspect", str(tmp_path / "a\x1b[2Jb.gplcal")]) == 2
@@ -84,7 +84,7 @@ def test_a_refusal_that_names_a_strangers_file_is_harmless(
 
 
 def test_commands_print_through_it() -> None:
-    """Whoever adds a command cannot forget it."""
+    """Every command in the program is checked."""
     for file in Path(app.command_line.__file__).parent.glob("*.py"):
         names = [
             node.func.id

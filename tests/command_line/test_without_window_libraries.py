@@ -1,7 +1,8 @@
-"""The commands on a machine that has no Qt, no pyqtgraph and no VTK."""
+"""The commands on a machine without Qt, pyqtgraph and VTK."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -9,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from gelpolight_core.calibration.file import read_calibration
+
 ROOT = Path(__file__).resolve().parents[2]
 
-# Python imports a module of this name by itself, in every process that is started from here on.
+# Python imports a module of this name automatically in every process that is started from here.
 BLOCK = """
 import sys
 
@@ -47,7 +50,7 @@ def blocked(tmp_path: Path) -> dict[str, str]:
 def test_only_window_libraries_are_blocked_in_a_process_and_its_children(
     blocked: dict[str, str], module: str
 ) -> None:
-    """The test below can fail."""
+    """Shows that the test below can fail."""
     call = f"[sys.executable, '-c', 'import {module}']"
     child = f"import subprocess, sys; sys.exit(subprocess.call({call}))"
     done = subprocess.run(
@@ -62,7 +65,7 @@ def test_a_sensor_is_calibrated_and_its_presses_measured(
 ) -> None:
     press = small_session / "presses" / "cylinder_s5_d100.png"
     (tmp_path / "commands.py").write_text(COMMANDS)
-    lines = f"""calibrate {small_session} -o c.gplcal
+    lines = f"""calibrate {small_session} -o c.gplcal --json results.json
 reconstruct c.gplcal {press} -o depth --format npz,vtp,tif --pictures
 measure c.gplcal {press} --shape cylinder --json measured.json
 batch c.gplcal {press} {press.parent / "object_coin.png"} -o batch --workers 2
@@ -77,5 +80,7 @@ benchmark c.gplcal {press} --json times.json --model paper
         text=True,
     )
     assert done.returncode == 0, done.stderr
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert results["id"] == read_calibration(tmp_path / "c.gplcal").identity
     for name in ("measured.json", "times.json", "batch/batch.csv", f"depth/{press.stem}.vtp"):
         assert (tmp_path / name).stat().st_size > 0, name

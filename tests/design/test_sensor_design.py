@@ -1,4 +1,4 @@
-"""A design file is read whole, checked, and never guessed."""
+"""A design file is read completely, checked, and never guessed."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_the_default_design_holds_together() -> None:
+def test_the_default_design_is_valid() -> None:
     assert validate_design(SensorDesign()).leds[0].power == 1.0
 
 
-def test_what_a_file_states_is_taken_and_the_rest_stays(tmp_path: Path) -> None:
+def test_values_from_a_file_replace_defaults(tmp_path: Path) -> None:
     design = read_design(write(tmp_path, TEXT))
     assert design.serial == "bench-7"
     assert design.camera.width_px == 640
@@ -90,14 +90,14 @@ def test_a_fault_is_named(tmp_path: Path, change: str, named: str) -> None:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="does not exist"):
         read_design(tmp_path / "nothing.toml")
 
 
 def test_half_the_pixels_see_the_same_scene() -> None:
     small = SensorDesign().scaled(0.5).camera
     assert (small.width_px, small.height_px) == (640, 480)
-    # The picture's left edge (-0.5) stays at the same angle.
+    # The left edge of the image (-0.5) stays at the same angle.
     full = SensorDesign().camera
     assert (-0.5 - small.cx) / small.fx == pytest.approx((-0.5 - full.cx) / full.fx)
 

@@ -14,7 +14,7 @@ DOCS = ROOT / "docs"
 PAGES = tuple(sorted(DOCS.rglob("*.md")))
 GUIDE = (*sorted((DOCS / "guide").glob("*.md")), DOCS / "troubleshooting.md")
 PICTURES = DOCS / "pictures"
-SCENES = tuple(sorted((ROOT / "packaging").glob("screenshot_*.py")))
+SCENES = tuple(sorted((DOCS / "scripts").glob("screenshot_*.py")))
 LARGEST_KB, ALL_KB = 100, 2000
 
 named = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))

@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 from chapter import DOCS
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.quality import Figure
-from gelpolight_core.reconstruction.heightmap import FLAG_NAMES
+from gelpolight_core.reconstruction.height_map import FLAG_NAMES
+from gelpolight_core.sensor_calibration import Calibration
 
 ROOT = DOCS.parent
 NOTHING = "\N{EN DASH}"
@@ -33,6 +33,7 @@ IN_WORDS = {
     "edge_limit_px(view.picture_size[0])": "width / 200, at least 3 px",
     "LED_OFF_OF_WIDTH * rgb.shape[1]": "{LED_OFF_OF_WIDTH:g} widths",
     "worst_residual": "{100_LARGEST_RESIDUAL:g} %, or {_ALLOWED_RESIDUAL_PX:g} px",
+    "largest_sd": "1 px, or {100_LARGEST_SD:g} % of the radius",
     "lowest": "{100_LEAST_COVERAGE:g} %",
     "0.9 * radius_mm": "0.9 ball radii",
     "0.15 * contact_mm": "0.15 contact radii",
@@ -40,15 +41,13 @@ IN_WORDS = {
     "limits[direction]": (
         "{PAPER_PERCENT[planar]:g} % in the plane, {PAPER_PERCENT[depth]:g} % in depth"
     ),
-    "warn": "0.1 %, of the background 1 %",
-    "fail": "10 %, of the background 20 %",
 }
 NOTES = {
-    "MOST_DRIFT": "gelpolight_core/reconstruction/acceptance.py",
-    "LEAST_FITTING": "gelpolight_core/reconstruction/acceptance.py",
-    "RIM_CHANGE": "gelpolight_core/reconstruction/acceptance.py",
-    "UNSOLVED_SHARE": "gelpolight_core/reconstruction/acceptance.py",
-    "LONGEST_STEP": "gelpolight_core/reconstruction/full.py",
+    "UNSOLVED_SHARE": "gelpolight_core/reconstruction/checks.py",
+    "HELD_DOWN_SHARE": "gelpolight_core/reconstruction/checks.py",
+    "MOST_PITCH": "gelpolight_core/reconstruction/checks.py",
+    "LEAST_HELD": "gelpolight_core/reconstruction/near_light/boundary.py",
+    "LONGEST_STEP": "gelpolight_core/reconstruction/near_light/rounds.py",
     "BETTER_SHAPE": "gelpolight_core/measurement/doubt.py",
     "GOOD_RESIDUAL": "gelpolight_core/measurement/doubt.py",
     "POOR_RESIDUAL": "gelpolight_core/measurement/doubt.py",
@@ -57,9 +56,9 @@ NOTES = {
     "FLAGGED_SHARE": "gelpolight_core/measurement/tool.py",
     "PRESSED_SHARE": "gelpolight_core/measurement/steadiness.py",
     "CONTACT_CHANGE": "gelpolight_core/measurement/steadiness.py",
-    "SATURATED_WARN": "app/live/picture_checks.py",
-    "SATURATED_FAIL": "app/live/picture_checks.py",
-    "DARK_SHARE_OF_SCALE": "app/live/picture_checks.py",
+    "SATURATED_WARN": "app/live/image_checks.py",
+    "SATURATED_FAIL": "app/live/image_checks.py",
+    "DARK_SHARE_OF_SCALE": "app/live/image_checks.py",
 }
 
 
@@ -242,7 +241,7 @@ def test_notes_and_doubts_are_stated_with_the_limits_of_the_source(name: str) ->
 def test_the_limits_of_a_validation_are_those_of_a_new_installation() -> None:
     """The chapter says when a calibration counts as validated, and when as old."""
     # By its text: the module needs a window library, which this folder does without.
-    source = (ROOT / "app/shell/settings.py").read_text("utf-8")
+    source = (ROOT / "app/services/settings.py").read_text("utf-8")
     limit = {k: float(v) for k, v in re.findall(r"^    (\w+): float = ([\d.]+)$", source, re.M)}
     text = " ".join(CHAPTER.split())
     assert f"height is right to {limit['height_percent']:g} % and its size to" in text

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from app.command_line.main import MENDABLE, main
-from gelpolight_core.calibration.pipeline import assemble, stages_of
+from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.refinement import bare_calibration, refine_with
 from gelpolight_core.calibration.results import StageResults
-from gelpolight_core.calibration.stages import run_stage
 from gelpolight_core.calibration.terms import CalibrationTerms
 from gelpolight_core.experiments.ablation import VARIANTS
 from gelpolight_core.session.session import read_session
@@ -74,12 +73,11 @@ def test_the_table_says_what_each_term_is_worth(
     assert f"{whole['rms_um']:.1f}" in text
 
 
-def test_a_calibration_with_all_terms_is_the_sessions_own(small: Path) -> None:
-    session = read_session(small)
-    results = StageResults()
-    for stage in stages_of("full"):
-        results = run_stage(stage, session, results)
-    whole = assemble(session, results).calibration
+def test_a_calibration_with_all_terms_is_the_sessions_own(
+    virtual_session: Path, virtual_run: CalibrationRun, virtual_results: StageResults
+) -> None:
+    session, results = read_session(virtual_session), virtual_results
+    whole = virtual_run.calibration
     again = bare_calibration(session, refine_with(results))
     assert again.identity == whole.identity
     mixed = bare_calibration(session, refine_with(results, terms=CalibrationTerms(crosstalk=False)))

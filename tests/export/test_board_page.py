@@ -1,4 +1,4 @@
-"""A printed board has the size that it says, and our own detector finds it."""
+"""A printed board has the stated size, and our own detector finds it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.board_page import A4_MM, RULER_MM, draw_board, write_board
-from gelpolight_core.optics.checkerboard import BoardSpec, find_board
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.optics.checkerboard import find_board
+from gelpolight_core.session.board import BoardSpec
 
 DPI = 400
 PX_PER_MM = DPI / 25.4
@@ -21,7 +22,7 @@ BOARDS = Path(__file__).resolve().parents[2] / "resources" / "checkerboards"
 
 
 def printed(board: BoardSpec) -> np.ndarray:
-    """Return the page (rows, columns, 3) as a printer of 400 dpi would make it."""
+    """Return the page (rows, columns, 3) as printed at 400 dpi."""
     figure = draw_board(board)
     canvas = FigureCanvasAgg(figure)
     figure.set_dpi(DPI)
@@ -69,8 +70,8 @@ def test_the_page_is_a4(tmp_path: Path) -> None:
 
 
 def outlines(path: Path) -> list[bytes]:
-    """Return what is drawn on a page, stroke by stroke, without its letters."""
-    (page, *_) = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", path.read_bytes(), re.DOTALL)
+    """Return the drawn strokes of a page, without text."""
+    (page, *_) = re.findall(rb"stream\r?\n(.*?)\nendstream", path.read_bytes(), re.DOTALL)
     return re.findall(rb"(?:[\d.-]+ ){2,4}(?:m|l|re)\b", zlib.decompress(page))
 
 
@@ -78,13 +79,13 @@ def test_the_boards_that_come_with_the_program_are_those_of_the_command(tmp_path
     for square in (2, 3):
         kept = BOARDS / f"checkerboard-9x6-{square}mm.pdf"
         write_board(BoardSpec((9, 6), float(square)), tmp_path / kept.name)
-        # Another matplotlib writes the letters differently, but not the squares.
+        # Other matplotlib versions draw text differently, but not the squares.
         assert len(outlines(kept)) > 54
         assert outlines(kept) == outlines(tmp_path / kept.name)
 
 
 def test_a_board_that_does_not_fit_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="does not fit an A4 page"):
+    with pytest.raises(InputError, match="does not fit on an A4 page"):
         write_board(BoardSpec((20, 20), 15.0), tmp_path / "board.pdf")
     assert not list(tmp_path.iterdir())
 

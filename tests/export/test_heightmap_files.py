@@ -1,4 +1,4 @@
-"""What a user relies on when a height map goes to another program."""
+"""Height maps in the formats of other programs."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from hypothesis.extra import numpy as arrays
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import FORMATS, ending, write_heightmap
 from gelpolight_core.export.mesh import mesh_of, write_vtp
-from gelpolight_core.reconstruction.heightmap import FLAG_NAMES, SD_MAPS, Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import FLAG_NAMES, SD_MAPS, Flag, HeightMap
 
 ROWS, COLUMNS, PITCH_MM = 17, 23, 0.125
 
 
 @pytest.fixture
 def heightmap() -> HeightMap:
-    """Return an uneven dent, off the middle, in a working area that is not the whole grid."""
+    """Return an uneven dent, off-centre, in a working area that is not the whole grid."""
     x_mm = -1.25 + PITCH_MM * np.arange(COLUMNS)
     y_mm = -0.75 + PITCH_MM * np.arange(ROWS)
     x, y = np.meshgrid(x_mm, y_mm)
@@ -59,7 +59,7 @@ def write_one(heightmap: HeightMap, folder: Path, name: str, **options: int) -> 
     return path
 
 
-def test_one_file_per_format_named_after_the_picture(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_one_file_per_format_named_after_the_image(tmp_path: Path, heightmap: HeightMap) -> None:
     folder = tmp_path / "new" / "folder"
     paths = write_heightmap(heightmap, folder, formats=["tif", "npz"])
     assert paths == [folder / "press_03.tif", folder / "press_03.npz"]
@@ -67,7 +67,7 @@ def test_one_file_per_format_named_after_the_picture(tmp_path: Path, heightmap: 
     assert sorted(os.listdir(folder)) == sorted(f"press_03.{ending(name)}" for name in FORMATS)
 
 
-def test_npz_holds_standard_deviations_where_there_are_any(
+def test_npz_contains_standard_deviations_if_there_are_any(
     tmp_path: Path, heightmap: HeightMap
 ) -> None:
     with np.load(write_one(heightmap, tmp_path, "npz")) as found:
@@ -82,7 +82,7 @@ def test_npz_holds_standard_deviations_where_there_are_any(
         replace(heightmap, depth_sd_mm=heightmap.depth_mm[1:])
 
 
-def test_npz_holds_everything_without_pickles(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_npz_contains_everything_without_pickles(tmp_path: Path, heightmap: HeightMap) -> None:
     with np.load(write_one(heightmap, tmp_path, "npz"), allow_pickle=False) as found:
         assert found["depth_mm"].dtype == np.float32
         assert found["flags"].dtype == np.uint8
@@ -137,7 +137,7 @@ def test_gsf_follows_the_published_format(tmp_path: Path, heightmap: HeightMap, 
     depth_m = np.frombuffer(data[begin:], dtype="<f4").reshape(rows, columns)
     assert depth_m == pytest.approx(heightmap.depth_mm / 1000, rel=1e-6)
     assert (header["XYUnits"], header["ZUnits"]) == ("m", "m")
-    # Gwyddion's lengths reach from outline to outline: the first pixel centre is half a pixel in.
+    # Gwyddion's lengths go from outline to outline: the first pixel centre is half a pixel inside.
     step_m = float(header["XReal"]) / columns
     assert step_m == pytest.approx(PITCH_MM / 1000)
     assert float(header["YReal"]) / rows == pytest.approx(PITCH_MM / 1000)
@@ -160,7 +160,7 @@ def png_chunks(path: Path) -> list[tuple[bytes, bytes]]:
 
 
 def png_values(chunks: list[tuple[bytes, bytes]]) -> np.ndarray:
-    """Return the grey values of 16 bits: deflate, then the five filters taken back."""
+    """Return the 16-bit grey values: deflate, then the five filters undone."""
     columns, rows, bits, colour, *rest = struct.unpack(">IIBBBBB", dict(chunks)[b"IHDR"])
     assert (bits, colour, rest) == (16, 0, [0, 0, 0])
     packed = zlib.decompress(b"".join(body for kind, body in chunks if kind == b"IDAT"))
@@ -316,7 +316,7 @@ def test_vtp_says_where_it_comes_from(tmp_path: Path, heightmap: HeightMap) -> N
     assert "dark=4" in data.GetAbstractArray("flag_names").GetValue(0)
 
 
-def test_vtp_names_a_picture_whose_name_is_not_text(heightmap: HeightMap) -> None:
+def test_vtp_names_an_image_whose_name_is_not_text(heightmap: HeightMap) -> None:
     file = io.BytesIO()
     write_vtp(mesh_of(heightmap), file, pitch_mm=PITCH_MM, about={"source": "caf\udce9.png"})
     assert b"caf\\udce9.png\0" in file.getvalue()
@@ -379,21 +379,25 @@ def test_a_pixel_without_finite_depth_makes_a_hole_not_a_broken_mesh(
 def test_an_unknown_format_is_refused_before_anything_is_written(
     tmp_path: Path, heightmap: HeightMap
 ) -> None:
-    with pytest.raises(InputError, match=r"'xyz'.*npz"):
-        write_heightmap(heightmap, tmp_path / "out", formats=["npz", "xyz"])
+    with pytest.raises(InputError, match=r"'docx'.*npz"):
+        write_heightmap(heightmap, tmp_path / "out", formats=["npz", "docx"])
     assert os.listdir(tmp_path) == []
 
 
-def test_a_file_in_place_of_the_folder_is_told(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_a_file_with_the_name_of_the_folder_is_reported(
+    tmp_path: Path, heightmap: HeightMap
+) -> None:
     (tmp_path / "out").write_bytes(b"")
     with pytest.raises(InputError, match="folder"):
         write_heightmap(heightmap, tmp_path / "out", formats=["npz"])
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
-def test_a_folder_that_may_not_be_written_is_told(tmp_path: Path, heightmap: HeightMap) -> None:
+def test_a_folder_without_write_permission_is_reported(
+    tmp_path: Path, heightmap: HeightMap
+) -> None:
     tmp_path.chmod(0o500)
-    with ordinary_user(), pytest.raises(InputError, match="no permission"):
+    with ordinary_user(), pytest.raises(InputError, match="not have permission"):
         write_heightmap(heightmap, tmp_path, formats=["npz"])
     tmp_path.chmod(0o700)
     assert os.listdir(tmp_path) == []
@@ -401,7 +405,7 @@ def test_a_folder_that_may_not_be_written_is_told(tmp_path: Path, heightmap: Hei
 
 @contextmanager
 def ordinary_user() -> Iterator[None]:
-    """Give up the rights of root for a while: root may write anywhere."""
+    """Drop root rights for a while: root may write anywhere."""
     user = os.geteuid()
     if user == 0:
         os.seteuid(65534)
@@ -416,3 +420,23 @@ def test_shapes_that_do_not_fit_are_refused(heightmap: HeightMap) -> None:
         replace(heightmap, x_mm=heightmap.x_mm[1:])
     with pytest.raises(ValueError, match="normals"):
         replace(heightmap, normals=np.zeros((2, 2, 3), dtype=np.float32))
+
+
+def test_csv_is_a_table_with_its_places_and_gaps(tmp_path: Path, heightmap: HeightMap) -> None:
+    rows = [line.split(",") for line in write_one(heightmap, tmp_path, "csv").read_text().split()]
+    assert rows[0][0] == "depth_mm"
+    np.testing.assert_allclose([float(x) for x in rows[0][1:]], heightmap.x_mm, atol=1e-6)
+    np.testing.assert_allclose([float(row[0]) for row in rows[1:]], heightmap.y_mm, atol=1e-6)
+    read = np.array([[float(cell or "nan") for cell in row[1:]] for row in rows[1:]])
+    outside = (heightmap.flags & Flag.OUTSIDE.value) != 0
+    np.testing.assert_array_equal(np.isnan(read), outside)
+    np.testing.assert_allclose(read[~outside], heightmap.depth_mm[~outside], rtol=1e-5, atol=1e-9)
+
+
+def test_xyz_has_every_known_point_with_its_height(tmp_path: Path, heightmap: HeightMap) -> None:
+    points = np.loadtxt(write_one(heightmap, tmp_path, "xyz"))
+    there = (heightmap.flags & Flag.OUTSIDE.value) == 0
+    assert points.shape == (there.sum(), 3)
+    x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
+    wanted = np.column_stack([x[there], y[there], -heightmap.depth_mm[there]])
+    np.testing.assert_allclose(points, wanted, rtol=1e-5, atol=1e-6)

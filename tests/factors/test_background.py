@@ -1,4 +1,4 @@
-"""Reflectance factors: an uneven membrane is read off the background."""
+"""Reflectance factors: an uneven membrane is measured from the background."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.table import cosine_table
 
 
-def test_specks_and_slow_changes_are_factors_and_dead_places_are_not_used() -> None:
+def test_specks_and_slow_changes_are_factors_and_dead_areas_are_not_used() -> None:
     table = scene.table()
     points = table.grid.points_mm()
     cosines, radiance = scene.flat_light(points)

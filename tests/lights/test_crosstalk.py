@@ -1,4 +1,4 @@
-"""Crosstalk from pictures with one LED lit: the camera's own mixture, or a reasoned refusal."""
+"""Crosstalk from single-LED images: the mixing matrix of the camera, or a reasoned refusal."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.lights.crosstalk import find_crosstalk
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.quality import QualityTable, Verdict
-from gelpolight_core.session.picture import Picture
 
 TRUTH = np.array([[1.0, 0.04, 0.02], [0.05, 1.0, 0.05], [0.02, 0.04, 1.0]])
 NAMES = ("red.png", "green.png", "blue.png")
@@ -31,7 +31,7 @@ def spots(matrix: np.ndarray) -> MirrorSpots:
 def single_led(
     matrix: np.ndarray, *, offset: float = 0.0, peak: float = 0.8, even: bool = False, seed: int = 1
 ) -> list[Picture]:
-    """Return the whiteboard under one LED after the other, 8 bit, with dust and a 50 dB noise."""
+    """Return the whiteboard under each LED in turn, 8 bit, with dust and 50 dB noise."""
     rng = np.random.default_rng(seed)
     v, u = np.mgrid[:240, :320]
     pictures = []
@@ -76,7 +76,7 @@ def test_a_camera_without_crosstalk_has_none() -> None:
     assert np.abs(found.matrix - np.eye(3)).max() < 0.002
 
 
-def test_it_is_said_which_pictures_were_used_and_how_far_the_others_are_off() -> None:
+def test_the_result_names_the_images_used_and_the_difference_of_the_others() -> None:
     from_spots = find_crosstalk(spots(TRUTH))
     assert from_spots.source == "mirror"
     np.testing.assert_allclose(from_spots.matrix, TRUTH)
@@ -89,6 +89,26 @@ def test_it_is_said_which_pictures_were_used_and_how_far_the_others_are_off() ->
     assert figure.value == pytest.approx(5.0, abs=0.5)
     assert figure.verdict is Verdict.WARN
     assert differ.matrix[0, 1] == pytest.approx(TRUTH[0, 1], abs=0.005)
+
+
+def test_crosstalk_that_no_spot_shows_is_a_warning_and_not_zero() -> None:
+    hidden = TRUTH.copy()
+    hidden[:, 1:] = np.nan
+    figures = find_crosstalk(spots(hidden)).quality
+    assert figures["crosstalk_unmeasured"].value == 2.0
+    assert figures.verdict is Verdict.WARN
+    assert "single_led" in figures.advice[0]
+    assert figures["crosstalk_percent"].value == pytest.approx(5.0)
+    hidden[:, 0] = np.nan
+    none = find_crosstalk(spots(hidden)).quality
+    assert [(f.key, f.value) for f in none.figures] == [("crosstalk_unmeasured", 3.0)]
+    mended = find_crosstalk(spots(hidden), single_led(TRUTH))
+    assert mended.quality.verdict is Verdict.PASS
+    assert np.abs(mended.matrix - TRUTH).max() < 0.005
+
+
+def test_a_whole_set_of_spots_measures_every_leds_crosstalk() -> None:
+    assert find_crosstalk(spots(TRUTH)).quality["crosstalk_unmeasured"].verdict is Verdict.PASS
 
 
 def swap(pictures: list[Picture]) -> list[Picture]:
@@ -109,13 +129,13 @@ def times(factor: float) -> Callable[[list[Picture]], list[Picture]]:
 @pytest.mark.parametrize(
     ("change", "what"),
     [
-        (swap, "single_led/green.png: the green channel has .* of the red channel"),
-        (all_lit, "of the red channel's light.*Light the red LED alone"),
+        (swap, "single_led/green.png: The green channel has .* of the red channel"),
+        (all_lit, "of the red channel's light.*Switch on only the red LED"),
         (times(0.05), "is dark"),
         (times(60.0), "saturated"),
     ],
 )
-def test_pictures_that_show_something_else_are_refused(
+def test_images_of_something_else_are_refused(
     change: Callable[[list[Picture]], list[Picture]], what: str
 ) -> None:
     with pytest.raises(InputError, match=what):

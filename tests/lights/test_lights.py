@@ -1,4 +1,4 @@
-"""Mirror spots and LED positions, on synthetic mirror pictures and on the rendered sessions."""
+"""Mirror spots and LED positions, on synthetic mirror images and on the rendered sessions."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import direction_condition, light_directions, locate_leds
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.quality import Verdict
 from gelpolight_core.session.session import read_session
 
 CENTRES = np.array([[320.4, 401.7], [180.2, 160.9], [470.6, 150.3]])
@@ -28,7 +29,7 @@ def mirror_picture(
     crosstalk: np.ndarray | None = None,
     noise: float = 0.002,
 ) -> np.ndarray:
-    """Return a dark picture (480, 640, 3) with one blurred disc per LED."""
+    """Return a dark image (480, 640, 3) with one blurred disc per LED."""
     v, u = np.mgrid[:480, :640]
     light = np.zeros((480, 640, 3))
     for k, (cu, cv) in enumerate(centres):
@@ -39,7 +40,7 @@ def mirror_picture(
 
 
 def add_spot(rgb: np.ndarray, centre: tuple[float, float], colour: tuple[float, ...]) -> np.ndarray:
-    """Return the picture with one more disc of a colour."""
+    """Return the image with an additional disc of one colour."""
     v, u = np.mgrid[: rgb.shape[0], : rgb.shape[1]]
     disc = np.clip(3.5 - np.hypot(u - centre[0], v - centre[1]), 0.0, 1.0)
     return np.clip(rgb + disc[..., None] * np.array(colour), 0, 1).astype(np.float32)
@@ -54,7 +55,7 @@ def test_crosstalk_moves_no_spot_and_is_measured() -> None:
     matrix = np.array([[1.0, 0.05, 0.02], [0.04, 1.0, 0.05], [0.03, 0.06, 1.0]])
     spots = find_mirror_spots(Picture("m", mirror_picture(crosstalk=matrix, noise=0.0)))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.05)
-    found = crosstalk_from_spots(spots)
+    found, _ = crosstalk_from_spots(spots)
     np.testing.assert_allclose(found, matrix, atol=0.005)
     light = np.array([[0.3, 0.5, 0.2]], np.float32)
     np.testing.assert_allclose(unmix((light @ matrix.T).astype(np.float32), matrix), light, 1e-5)
@@ -79,16 +80,14 @@ def test_a_faint_reflection_of_a_reflection_is_set_aside_with_its_reason() -> No
         (mirror_picture(np.array([[320.0, 400.0], [180.0, 160.0], [638.0, 150.0]])), "border"),
     ],
 )
-def test_a_mirror_picture_that_cannot_be_used_says_what_is_wrong(
-    rgb: np.ndarray, what: str
-) -> None:
+def test_an_unusable_mirror_image_is_refused_with_the_reason(rgb: np.ndarray, what: str) -> None:
     with pytest.raises(InputError, match=what) as refusal:
         find_mirror_spots(Picture("mirror_0.png", rgb))
     assert refusal.value.where == "mirror/mirror_0.png"
     assert refusal.value.advice
 
 
-def test_a_grey_mirror_picture_is_refused() -> None:
+def test_a_grey_mirror_image_is_refused() -> None:
     grey = np.repeat(mirror_picture().max(axis=2, keepdims=True), 3, axis=2)
     with pytest.raises(InputError, match="grey"):
         find_mirror_spots(Picture("m", grey))
@@ -98,11 +97,11 @@ def test_saturated_spots_are_found_and_warned_of() -> None:
     spots = find_mirror_spots(Picture("m", mirror_picture(peak=3.0)))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.1)
     assert spots.quality["spot_peak"].verdict == "warn"
-    np.testing.assert_allclose(crosstalk_from_spots(spots), np.eye(3), atol=0.01)
+    np.testing.assert_allclose(crosstalk_from_spots(spots)[0], np.eye(3), atol=0.01)
 
 
 def test_leds_are_found_from_the_images_of_their_mirror_twins() -> None:
-    """The twin of each LED is projected straight; the reflection is never computed here."""
+    """The mirror image of each LED is projected directly; the reflection is never computed here."""
     camera = Camera(640, 480, 690.0, 690.0, 320.0, 240.0)
     normal = np.array([0.02, -0.015, 1.0]) / np.linalg.norm([0.02, -0.015, 1.0])
     plane = TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), 39.0)
@@ -151,7 +150,7 @@ def test_the_rendered_mirror_is_read_to_a_tenth_of_a_pixel(shared_data: Path, se
     assert np.hypot(error[:, 0], error[:, 1]).max() < 0.15
     assert np.linalg.norm(error, axis=1).max() < 0.35
     truth_matrix = np.array(truth["crosstalk_camera_from_led"])
-    np.testing.assert_allclose(crosstalk_from_spots(spots), truth_matrix, atol=0.005)
+    np.testing.assert_allclose(crosstalk_from_spots(spots)[0], truth_matrix, atol=0.005)
 
 
 def test_averaged_frames_keep_the_spots() -> None:
@@ -163,4 +162,16 @@ def test_crosstalk_is_read_off_the_flanks_of_saturated_spots() -> None:
     matrix = np.array([[1.0, 0.05, 0.02], [0.04, 1.0, 0.05], [0.03, 0.06, 1.0]])
     spots = find_mirror_spots(Picture("m", mirror_picture(peak=1.6, crosstalk=matrix, noise=0.0)))
     assert spots.quality["spot_peak"].verdict == "warn"
-    np.testing.assert_allclose(crosstalk_from_spots(spots), matrix, atol=0.02)
+    np.testing.assert_allclose(crosstalk_from_spots(spots)[0], matrix, atol=0.02)
+
+
+@pytest.mark.parametrize("where", ["darkness", "another spot"])
+def test_a_spot_dragged_where_its_led_does_not_shine_fails(where: str) -> None:
+    picture = Picture("m", mirror_picture())
+    found = find_mirror_spots(picture)
+    assert found.quality["spot_light"].verdict is Verdict.PASS
+    place = (20.0, 20.0) if where == "darkness" else found.spots[1].centre_px
+    figure = find_mirror_spots(picture, placed={0: place}).quality["spot_light"]
+    assert figure.verdict is Verdict.FAIL
+    kept = find_mirror_spots(picture, placed={0: found.spots[0].centre_px}).quality
+    assert kept["spot_light"] == found.quality["spot_light"]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import zoom
 
-from gelpolight_core.reconstruction.heightmap import Flag, HeightMap
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 Array = NDArray[np.float64]
 PITCH = 0.05

@@ -6,13 +6,11 @@ import csv
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scene
-from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.drape import cylinder_depth
@@ -31,9 +29,11 @@ from gelpolight_core.measurement.evaluation_report import (
     write_evaluation,
 )
 from gelpolight_core.measurement.gauge import gauge_rows
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.measurement.truth import PressTruth, read_truth
 from gelpolight_core.quality import Verdict
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.report.evaluation_document import evaluation_document
 from gelpolight_core.report.evaluation_files import write_evaluation_files
 
@@ -174,24 +174,26 @@ def test_the_figure_shows_both_directions_the_series_and_the_papers_lines() -> N
     assert [label.get_text() for label in figure.axes[0].get_xticklabels()] == list("34567")
 
 
-@dataclass(frozen=True)
-class Heights:
-    """A height map of an evaluation."""
-
-    depth_mm: NDArray[np.float32]
-    x_mm: NDArray[np.float64] = field(default_factory=lambda: np.arange(-8.0, 8.0, 0.08))
-    y_mm: NDArray[np.float64] = field(default_factory=lambda: np.arange(-8.0, 8.0, 0.08))
-    flags: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((200, 200), dtype=np.uint8))
-
-
-def heights(radius: float) -> Heights:
+def heights(radius: float) -> HeightMap:
     place = np.arange(-8.0, 8.0, 0.08)
     distance = np.hypot(place[:, None], place[None, :])
     depth = cylinder_depth(
         distance, cylinder_radius_mm=radius, height_mm=1.0, decay_mm=0.7, edge_radius_mm=0.08
     )
     noise = 0.003 * np.random.default_rng(0).standard_normal(depth.shape)
-    return Heights((depth + noise).astype(np.float32))
+    return HeightMap(
+        depth_mm=(depth + noise).astype(np.float32),
+        x_mm=place,
+        y_mm=place,
+        pitch_mm=0.08,
+        normals=None,
+        flags=np.zeros(depth.shape, np.uint8),
+        calibration_id="T-1",
+        model="full",
+        source="",
+        depth_scale_sd=0.004,
+        lateral_scale_sd=1e-4,
+    )
 
 
 def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> None:
@@ -202,20 +204,27 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
     for name in ("a.png", "b.png", "c.png"):
         (tmp_path / name).touch()
 
-    def reconstruct(path: Path) -> Heights:
+    def measure(path: Path, shape: str) -> Measurement:
         if path.name == "c.png":
             raise InputError("the picture is all black", where=path.name, advice="Open the shutter")
-        return heights({"a.png": 2.0, "b.png": 3.0}[path.name])
+        return measure_heightmap(heights({"a.png": 2.0, "b.png": 3.0}[path.name]), shape=shape)
 
     told: list[tuple[str, float]] = []
     evaluation = evaluate_presses(
-        tmp_path, reconstruct, progress=lambda name, share: told.append((name, share))
+        tmp_path, measure, progress=lambda name, share: told.append((name, share))
     )
     assert evaluation.overall("planar").mean_absolute_percent < 0.5
     assert [result.failure for result in evaluation.failed] == [
         "c.png: the picture is all black. Open the shutter."
     ]
     assert evaluation.skipped == ("coin.png",)
+    # What the map knows of its calibration reaches the measurement.
+    first = next(result.measurement for result in evaluation.results if result.measurement)
+    assert first.calibration_sd is not None
+    # The walls are steeper than what ball presses have shown the calibration.
+    steeper = first.height_mm / first.drape_decay_mm / 0.85
+    stated = 0.004 * steeper * first.height_mm
+    assert first.calibration_sd["height_mm"] == pytest.approx(stated, rel=1e-2)
     assert "coin.png" in evaluation_table(evaluation)
     assert told[0] == ("a.png", 0.0)
     assert told[-1][1] == 1.0
@@ -246,14 +255,14 @@ def test_a_truth_file_that_cannot_be_used_says_where_and_why(
 
 
 def test_a_missing_truth_file_or_picture_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="does not exist"):
         read_truth(tmp_path)
     (tmp_path / "truth.csv").write_bytes(b"file,\xff\xfe")
     with pytest.raises(InputError, match="not text"):
         read_truth(tmp_path)
     (tmp_path / "truth.csv").write_text(HEADER + "a.png,ball,6,,1\n")
     with pytest.raises(InputError, match=r"1 of 1 pictures are missing, first a\.png"):
-        evaluate_presses(tmp_path, lambda path: heights(2.0))
+        evaluate_presses(tmp_path, lambda path, shape: measurement(shape, 2.0, 1.0))
 
 
 def test_each_direction_counts_its_own_series_of_a_protocol() -> None:

@@ -107,8 +107,10 @@ def test_the_stated_sd_is_the_scatter_of_repeats(shape: str) -> None:
             "height": np.mean([m.sd["height_mm"] for m in repeats]),
             "centre": np.mean([m.sd["centre_mm"][0] for m in repeats]),
         }[stated]
-        # A factor 1.5, and 12 repeats know their own scatter to 21 %, doubled for 95 %.
-        assert sd / np.std(values, ddof=1) == pytest.approx(1.0, rel=0.0, abs=0.85), stated
+        # A factor 1.5, and 12 repeats know their own scatter to 21 %, doubled for 95 %. A size also
+        # follows from the object's edge, which is the same in all repeats and not known.
+        most = 3.0 if stated == "size_sd_mm" and shape != "ball" else 1.85
+        assert 0.15 < sd / np.std(values, ddof=1) < most, stated
         assert sd / np.std(values, ddof=1) > 0.5, stated
 
 
@@ -152,6 +154,11 @@ def test_a_map_of_uncertainties_weights_the_pixels() -> None:
     sd[half] = 0.5
     measured = measure_object(depth, X, Y, shape="cylinder", depth_sd_mm=sd)
     assert measured.diameter_mm == pytest.approx(5.0, abs=0.03)
+
+
+def test_one_number_for_all_pixels_is_refused_and_not_ignored() -> None:
+    with pytest.raises(InputError, match="arrays of one grid"):
+        measure_object(pressed("cylinder"), X, Y, shape="cylinder", depth_sd_mm=0.005)  # type: ignore[arg-type]
 
 
 def test_the_object_under_the_seed_is_measured() -> None:

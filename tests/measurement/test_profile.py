@@ -23,7 +23,7 @@ from gelpolight_core.measurement.profile import (
     width_at,
     width_ends,
 )
-from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.height_map import Flag
 
 
 @given(

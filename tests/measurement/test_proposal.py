@@ -11,7 +11,7 @@ import pytest
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.proposal import propose
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.simulation.indenters import Ball, Cuboid, Cylinder, nut, press
 from gelpolight_core.simulation.surface import PressedSurface
 

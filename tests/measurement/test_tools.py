@@ -33,7 +33,7 @@ from gelpolight_core.measurement.tools import (
     tool_from_dict,
     tools_from_json,
 )
-from gelpolight_core.reconstruction.heightmap import Flag
+from gelpolight_core.reconstruction.height_map import Flag
 
 ALL: tuple[Tool, ...] = (
     Distance((0.0, 0.0), (1.0, 2.0)),

@@ -1,4 +1,4 @@
-"""A checkerboard is found to a few hundredths of a pixel, and nothing else passes for it."""
+"""A checkerboard is located to a few hundredths of a pixel, and nothing else is accepted as one."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.optics.checkerboard import BoardSpec, find_board
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.optics.checkerboard import find_board
+from gelpolight_core.session.board import BoardSpec
 
 Array = NDArray[np.float64]
 
 
 def distance_to_nearest(corners: Array, truth: Array) -> Array:
-    """Return each corner's distance to the nearest true one (either end may be first)."""
+    """Return each corner's distance to the nearest true corner (the order may be reversed)."""
     return np.asarray(np.linalg.norm(corners[:, None] - truth[None], axis=2).min(axis=1))
 
 
@@ -40,20 +41,20 @@ def tilted_board() -> Picture:
 def test_corners_are_found_in_any_pose(
     tilt_deg: float, towards_deg: float, roll_deg: float, distance_mm: float
 ) -> None:
-    """The technician may hold the board as it comes: tilted, turned, near or far."""
+    """The technician may hold the board in any pose: tilted, rotated, near or far."""
     pose = board_pose(
         tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=distance_mm
     )
     view = find_board(render_board(CAMERA, pose), BOARD)
     off = distance_to_nearest(view.corners_px, true_corners(CAMERA, pose))
-    # 0.1 px on squares of 20 to 35 px is what a focal length to 0.1 % asks for; it is met twice.
+    # A focal length to 0.1 % needs 0.1 px on squares of 20 to 35 px; this is twice as good.
     assert np.sqrt(np.mean(off**2)) < 0.05
     assert off.max() < 0.2
     assert view.tilt_deg == pytest.approx(tilt_deg, abs=12.0)
 
 
 def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: Picture) -> None:
-    """An overlay draws the grid along its rows; no row is swapped or mirrored."""
+    """An overlay draws the grid along its rows; no row may be swapped or mirrored."""
     view = find_board(tilted_board, BOARD)
     grid = view.corners_px.reshape(6, 9, 2)
     along, down = grid[:, 1:] - grid[:, :-1], grid[1:] - grid[:-1]
@@ -64,13 +65,13 @@ def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: Pic
 
 
 def test_the_result_tells_how_good_the_view_is(tilted_board: Picture) -> None:
-    """Sharpness, contrast, saturation and misfit are shown beside the picture."""
+    """Sharpness, contrast, saturation and misfit are shown next to the image."""
     view = find_board(tilted_board, BOARD)
     assert view.contrast == pytest.approx(0.75, abs=0.02)
-    # Blur 0.6 px with the pixel's own 0.29: 2.56 * 0.67.
+    # Blur of 0.6 px with the pixel's own 0.29: 2.56 * 0.67.
     assert view.edge_width_px == pytest.approx(1.7, abs=0.2)
     assert view.saturated_share == 0.0
-    # k1 of -0.12 bends the grid; two radial coefficients take most of it away again.
+    # A k1 of -0.12 bends the grid; two radial coefficients remove most of it.
     assert view.grid_rms_px < 0.5 * view.homography_rms_px
     u_min, v_min, u_max, v_max = view.bounding_box_px
     assert 0 < u_min < u_max < 480
@@ -81,7 +82,7 @@ def test_the_result_tells_how_good_the_view_is(tilted_board: Picture) -> None:
 def test_another_board_size_is_refused_and_the_real_one_named(
     tilted_board: Picture, stated: tuple[int, int]
 ) -> None:
-    """A board of another size would give a wrong camera; the mistake is named."""
+    """A board of another size would give a wrong camera; the message names the mistake."""
     with pytest.raises(InputError, match=r"9 x 6 inner corners, not") as refusal:
         find_board(tilted_board, BoardSpec(stated, 3.0))
     assert refusal.value.where == "view.png"
@@ -89,14 +90,14 @@ def test_another_board_size_is_refused_and_the_real_one_named(
 
 
 def test_a_board_may_be_stated_lengthwise_or_crosswise(tilted_board: Picture) -> None:
-    """9 x 6 and 6 x 9 are one board."""
+    """9 x 6 and 6 x 9 are the same board."""
     lengthwise = find_board(tilted_board, BOARD).corners_px
     crosswise = find_board(tilted_board, BoardSpec((6, 9), 3.0)).corners_px
     assert distance_to_nearest(crosswise, lengthwise).max() < 0.01
 
 
 def test_uneven_light_does_not_move_the_corners(tilted_board: Picture) -> None:
-    """A lamp at one side is no fault of the lens."""
+    """A lamp at one side is not an error of the lens."""
     straight = find_board(tilted_board, BOARD).corners_px
     falloff = np.linspace(0.25, 1.2, 480, dtype=np.float32)[None, :, None]
     shaded = Picture("shaded.png", np.clip(tilted_board.rgb * falloff, 0.0, 0.99))
@@ -104,7 +105,7 @@ def test_uneven_light_does_not_move_the_corners(tilted_board: Picture) -> None:
 
 
 def flat(value: float) -> Picture:
-    """Return a picture of one value."""
+    """Return an image with a single value."""
     return Picture("flat.png", np.full((360, 480, 3), value, dtype=np.float32))
 
 
@@ -114,39 +115,39 @@ def flat(value: float) -> Picture:
         (flat(0.0), "black"),
         (flat(0.01), "black"),
         (flat(1.0), "saturated"),
-        (flat(0.5), "one brightness"),
-        (flat(float("nan")), "hold no number"),
+        (flat(0.5), "same brightness"),
+        (flat(float("nan")), "no valid value"),
     ],
 )
-def test_a_picture_of_nothing_is_refused_by_its_reason(picture: Picture, says: str) -> None:
-    """What is wrong with the exposure decides what to do about it."""
+def test_an_empty_image_is_refused_with_the_reason(picture: Picture, says: str) -> None:
+    """The advice depends on the kind of exposure error."""
     with pytest.raises(InputError, match=says):
         find_board(picture, BOARD)
 
 
 def test_noise_alone_is_no_board() -> None:
-    """A detector that says yes to everything is not believed."""
+    """A detector that always reports a board is not trusted."""
     noise = np.random.default_rng(3).random((360, 480, 3)).astype(np.float32)
-    with pytest.raises(InputError, match="no checkerboard with 9 x 6"):
+    with pytest.raises(InputError, match="No checkerboard with 9 x 6"):
         find_board(Picture("noise.png", noise), BOARD)
 
 
 @pytest.mark.parametrize("blur_px", [2.5, 5.0, 12.0])
 def test_a_blurred_board_is_refused_as_blurred(tilted_board: Picture, blur_px: float) -> None:
-    """Out of focus or moved: said so, not called missing."""
+    """A defocused or moved image is reported as blurred, not as a missing board."""
     blurred = np.asarray(cv2.GaussianBlur(tilted_board.rgb, (0, 0), blur_px))
     with pytest.raises(InputError, match="blurred: edges are"):
         find_board(Picture("blurred.png", blurred), BOARD)
 
 
 def test_light_squares_at_the_end_of_the_scale_are_refused(tilted_board: Picture) -> None:
-    """Cut-off light squares have no level to measure an edge from."""
+    """Clipped light squares have no level from which an edge can be measured."""
     with pytest.raises(InputError, match="light squares are saturated"):
         find_board(Picture("bright.png", np.clip(tilted_board.rgb * 1.6, 0.0, 1.0)), BOARD)
 
 
 def test_a_board_that_is_half_covered_is_not_accepted(tilted_board: Picture) -> None:
-    """Half a board is not taken for a whole one."""
+    """Half a board is not accepted as a whole one."""
     covered = tilted_board.rgb.copy()
     covered[:, :200] = 0.3
     with pytest.raises(InputError):
@@ -157,14 +158,14 @@ def test_a_board_that_is_half_covered_is_not_accepted(tilted_board: Picture) -> 
     ("corners", "square_mm"), [((2, 6), 3.0), ((9, 6), 0.0), ((9, 6), float("nan"))]
 )
 def test_an_impossible_board_is_refused(corners: tuple[int, int], square_mm: float) -> None:
-    """A typing error in the session is found before any picture is read."""
+    """A typing error in the session is found before any image is read."""
     with pytest.raises(InputError):
         BoardSpec(corners, square_mm)
 
 
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
 def test_wrong_sizes_never_pass_on_rendered_sessions(shared_data: Path, sensor: str) -> None:
-    """The independent renderer's board is found, and only at its own size."""
+    """The board of the independent renderer is found, and only with its own size."""
     path = shared_data / sensor / "top_pose" / "top_pose.png"
     rgb = cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)
     picture = Picture(path.name, rgb)

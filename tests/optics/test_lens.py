@@ -1,9 +1,10 @@
-"""The lens calibration finds the camera, says how sure it is, and refuses what gives no camera."""
+"""The lens calibration finds the camera and its uncertainty, and refuses unusable views."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -11,12 +12,14 @@ import pytest
 from boards import BOARD, CAMERA, board_pose, render_board
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.lens import LensResult, calibrate_lens, find_nonsense
+from gelpolight_core.optics.lens_quality import refuse_unobservable
+from gelpolight_core.optics.lens_views import LensRefusal
 from gelpolight_core.quality import Verdict
-from gelpolight_core.session.picture import Picture
 
-# Tilt, its direction, distance, and where the board's middle is: as a technician holds it.
+# Tilt, its direction, distance, and position of the board centre: as held by a technician.
 HELD = [
     (5.0, 0.0, 45.0, (0.0, 0.0)),
     (28.0, 20.0, 50.0, (-5.0, -3.0)),
@@ -51,30 +54,30 @@ def views() -> list[Picture]:
 
 @pytest.fixture(scope="module")
 def lens(views: list[Picture]) -> LensResult:
-    """Return the lens that the nine views give."""
+    """Return the lens calibrated from the nine views."""
     return calibrate_lens(views, BOARD)
 
 
 def test_the_camera_is_found_within_its_stated_uncertainty(lens: LensResult) -> None:
-    """The uncertainty that is shown is the one that the figures have."""
+    """The stated uncertainty matches the actual errors."""
     camera = lens.camera
     assert camera.fx == pytest.approx(CAMERA.fx, rel=1e-3)
     values = np.array([camera.fx, camera.fy, camera.cx, camera.cy, *camera.distortion[:4]])
     truth = np.array([CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy, *CAMERA.distortion[:4]])
     sd = np.array([*lens.focal_sd_px, *lens.centre_sd_px, *lens.distortion_sd[:4]])
-    # Four standard deviations in eight figures: by chance alone once in two thousand.
+    # Four standard deviations in eight figures: by chance only once in two thousand.
     assert (np.abs(values - truth) < 4.0 * sd).all()
     assert lens.focal_sd_px[0] < 1e-3 * CAMERA.fx
 
 
-def test_square_pixels_are_kept_where_nothing_speaks_against_them(lens: LensResult) -> None:
-    """One focal length is known better than two."""
+def test_square_pixels_are_kept_without_evidence_against_them(lens: LensResult) -> None:
+    """A common focal length is known better than two separate ones."""
     assert lens.square_pixels
     assert lens.camera.fx == lens.camera.fy
 
 
 def test_pixels_that_are_not_square_are_noticed() -> None:
-    """A camera that squeezes its picture is not forced into square pixels."""
+    """A camera with non-square pixels is not forced to square pixels."""
     squeezed = Camera(480, 360, 520.0, 510.0, 243.2, 176.4)
     lens = calibrate_lens([held_view(number, squeezed) for number in range(6)], BOARD)
     assert not lens.square_pixels
@@ -82,14 +85,14 @@ def test_pixels_that_are_not_square_are_noticed() -> None:
 
 
 def test_views_held_out_are_explained_as_well_as_those_used(lens: LensResult) -> None:
-    """The error that is shown is not one of learning by heart."""
+    """The held-out error does not come from views used in the fit."""
     assert lens.rms_px < 0.06
     assert lens.rms_px < lens.held_out_rms_px < 1.5 * lens.rms_px
     assert all(view.held_out_rms_px >= 0.9 * view.rms_px for view in lens.views)
 
 
 def test_the_result_shows_where_corners_were_seen(lens: LensResult) -> None:
-    """An overlay can show the bare parts of the picture and each view's residuals."""
+    """An overlay can show the uncovered parts of the image and the residuals of each view."""
     assert lens.coverage_map.sum() == 9 * 54
     assert lens.coverage == np.mean(lens.coverage_map > 0)
     for view in lens.views:
@@ -101,7 +104,7 @@ def test_the_result_shows_where_corners_were_seen(lens: LensResult) -> None:
 
 
 def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[Picture]) -> None:
-    """One slip of the hand costs one view, not the session."""
+    """One mistake costs one view, not the session."""
     moved = Picture("moved.png", np.asarray(cv2.GaussianBlur(views[2].rgb, (0, 0), 4.0)))
     dark = Picture("dark.png", np.zeros_like(views[0].rgb))
     again = Picture("again.png", views[4].rgb)
@@ -117,7 +120,7 @@ def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[Picture]) 
 
 
 def test_a_bent_board_is_left_out_by_its_error(views: list[Picture]) -> None:
-    """A view that fits no camera pulls at all figures; it is named with its error."""
+    """A view that fits no camera affects all figures; it is named with its error."""
     rows, columns = np.mgrid[0:360, 0:480].astype(np.float32)
     wavy = (columns + 0.6 * np.sin(rows / 40.0)).astype(np.float32)
     bent = Picture("bent.png", np.asarray(cv2.remap(views[3].rgb, wavy, rows, cv2.INTER_LINEAR)))
@@ -128,20 +131,20 @@ def test_a_bent_board_is_left_out_by_its_error(views: list[Picture]) -> None:
 
 
 def test_three_views_are_not_enough(views: list[Picture]) -> None:
-    """Three views explain any camera; nothing would check it."""
-    with pytest.raises(InputError, match="3 pictures, at least 4"):
+    """Any camera fits three views; nothing would check it."""
+    with pytest.raises(InputError, match="3 images, but at least 4"):
         calibrate_lens(views[:3], BOARD)
 
 
 def test_one_view_many_times_is_one_view(views: list[Picture]) -> None:
-    """Pressing the shutter again adds no view."""
+    """Capturing the same view again adds no information."""
     copies = [Picture(f"copy_{k}.png", views[1].rgb) for k in range(6)]
-    with pytest.raises(InputError, match=r"1 of 6 views.*just as copy_0\.png"):
+    with pytest.raises(InputError, match=r"1 of 6 views.*same pose as in copy_0\.png"):
         calibrate_lens(copies, BOARD)
 
 
 def test_a_session_of_another_board_says_which(views: list[Picture]) -> None:
-    """The refusal names the size once, not once per file."""
+    """The message names the size once, not once per file."""
     smaller = type(BOARD)((8, 6), 3.0)
     with pytest.raises(InputError, match="9 x 6 inner corners, not 8 x 6") as refusal:
         calibrate_lens(views[:4], smaller)
@@ -150,17 +153,28 @@ def test_a_session_of_another_board_says_which(views: list[Picture]) -> None:
 
 
 def test_parallel_views_are_refused_for_want_of_a_focal_length() -> None:
-    """Moving the board without tilting it shows the same at any focal length."""
+    """Views of an untilted board look the same for any focal length."""
     pictures = [
         render_board(CAMERA, board_pose(tilt_deg=1.0, towards_deg=90.0 * k, distance_mm=44.0 + k))
         for k in range(4)
     ]
-    with pytest.raises(InputError, match="too nearly parallel"):
-        calibrate_lens(pictures, BOARD)
+    blank = Picture("blank.png", np.full((*pictures[0].rgb.shape[:2], 3), 0.5, np.float32))
+    with pytest.raises(LensRefusal, match="nearly parallel") as refusal:
+        calibrate_lens([*pictures, blank], BOARD)
+    assert "blank.png" in refusal.value.found, "left-out views are named with their reason"
+    assert [view.used for view in refusal.value.views] == [True] * 4 + [False]
 
 
-def test_pictures_of_two_sizes_are_refused(views: list[Picture]) -> None:
-    """Two sizes are two cameras."""
+def test_tilted_views_of_a_bent_board_are_not_called_parallel() -> None:
+    """Enough tilt and still no focal length: the board is to blame, not the views."""
+    fit = SimpleNamespace(values=np.full(9, 400.0), rms_px=1.7)
+    with pytest.raises(InputError, match="flat grid") as refusal:
+        refuse_unobservable(np.full(9, 8.0), fit, 30.0)
+    assert "Print" in refusal.value.advice
+
+
+def test_images_of_two_sizes_are_refused(views: list[Picture]) -> None:
+    """Two image sizes mean two cameras."""
     cropped = Picture("cropped.png", views[3].rgb[:300])
     with pytest.raises(InputError, match="480 x 300") as refusal:
         calibrate_lens([*views[:3], cropped], BOARD)
@@ -173,19 +187,19 @@ def test_pictures_of_two_sizes_are_refused(views: list[Picture]) -> None:
         (Camera(640, 480, 5115.0, 6346.0, 320.0, 240.0, (0.0, -50494.0, 0.0, 0.0, 0.0)), "10 %"),
         (Camera(640, 480, 5115.0, 5115.0, 320.0, 240.0, (0.0, -50494.0, 0.0, 0.0, 0.0)), "folds"),
         (Camera(640, 480, 700.0, 700.0, 900.0, 240.0), "principal point"),
-        (Camera(640, 480, 20.0, 20.0, 320.0, 240.0), "do not suit"),
+        (Camera(640, 480, 20.0, 20.0, 320.0, 240.0), "implausible"),
         (Camera(640, 480, float("nan"), 700.0, 320.0, 240.0), "not numbers"),
     ],
 )
 def test_intrinsics_that_no_camera_has_are_recognised(camera: Camera, says: str) -> None:
-    """The first is a shipped calibration of another project."""
+    """The first one is a calibration published by another project."""
     nonsense = find_nonsense(camera)
     assert nonsense is not None
     assert says in nonsense
 
 
 def test_cameras_of_sensors_are_not_nonsense() -> None:
-    """Neither a plain lens nor a wide one with barrel distortion is turned away."""
+    """Neither a normal lens nor a wide one with barrel distortion is refused."""
     assert find_nonsense(CAMERA) is None
     wide = Camera(1280, 960, 700.0, 700.0, 650.0, 470.0, (-0.25, 0.06, 0.0, 0.0, 0.0))
     assert find_nonsense(wide) is None
@@ -195,7 +209,7 @@ def test_cameras_of_sensors_are_not_nonsense() -> None:
 def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
     shared_data: Path, sensor: str
 ) -> None:
-    """Every length of the sensor rests on this one."""
+    """Every length of the sensor depends on this one."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["camera"]
     pictures = [
         Picture(path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255))
@@ -204,7 +218,7 @@ def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
     lens = calibrate_lens(pictures, BOARD)
     assert lens.camera.fx == pytest.approx(truth["fx"], rel=1e-3)
     assert lens.camera.fy == pytest.approx(truth["fy"], rel=1e-3)
-    # 1 px of the principal point is 0.03 mm on the membrane, and the pose takes most of it up.
+    # 1 px of the principal point is 0.03 mm on the membrane, and the pose compensates most of it.
     assert np.hypot(lens.camera.cx - truth["cx"], lens.camera.cy - truth["cy"]) < 1.0
     assert lens.held_out_rms_px < 0.1
     assert lens.quality.verdict is Verdict.PASS

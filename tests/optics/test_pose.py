@@ -1,4 +1,4 @@
-"""The top surface is found from a board that lies on it, and its mirrored twin is turned down."""
+"""The top surface is found from a board that lies on it, and the mirrored pose is rejected."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import BoardSpec
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.lens import calibrate_lens
 from gelpolight_core.optics.pose import Decision, estimate_top_pose
 from gelpolight_core.quality import Verdict
-from gelpolight_core.session.picture import Picture
+from gelpolight_core.session.board import BoardSpec
 
 BOARD = BoardSpec((9, 6), 2.0)
 
@@ -36,7 +36,7 @@ def lying_board(
     noise: float = 0.004,
     blur_px: float = 0.6,
 ) -> tuple[Picture, TopPlane]:
-    """Return the picture of a board and the plane in which it lies."""
+    """Return the image of a board and the plane in which it lies."""
     rotation, shift = board_pose(
         tilt_deg=tilt_deg,
         towards_deg=towards_deg,
@@ -58,7 +58,7 @@ def angle_deg(plane: TopPlane, other: TopPlane) -> float:
     return float(np.degrees(np.arcsin(np.linalg.norm(across))))
 
 
-# Squares in line with the pixels: the corners' errors are then alike, and do not average out.
+# Squares parallel to the pixel rows: the corner errors are equal and do not average out.
 @example(tilt_deg=2.93, towards_deg=0.0, roll_deg=0.0, distance_mm=35.759)
 @settings(max_examples=6, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(
@@ -70,16 +70,16 @@ def angle_deg(plane: TopPlane, other: TopPlane) -> float:
 def test_the_surface_is_found_however_it_is_mounted(
     tilt_deg: float, towards_deg: float, roll_deg: float, distance_mm: float
 ) -> None:
-    """Distance to 0.1 %, normal to 0.1 degrees, and both within what the result says of itself."""
+    """Distance to 0.1 %, normal to 0.1 degrees, and both within the stated uncertainty."""
     picture, truth = lying_board(
         tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=distance_mm
     )
     result = estimate_top_pose([picture], BOARD, CAMERA)
     assert result.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
-    # Squares of 19 px at 55 mm carry a third of what the rendered sessions' do.
+    # Squares of 19 px at 55 mm give a third of the accuracy of the rendered sessions.
     assert angle_deg(result.plane, truth) < 0.2
     assert angle_deg(result.plane, truth) < 5.0 * result.normal_sd_deg
-    # A fiftieth of a pixel that all corners share on a board of 200 px is no scatter: no sd tells.
+    # An error of 1/50 pixel common to all corners of a board of 200 px does not appear as scatter.
     common_mm = 1e-4 * truth.distance_mm
     away_mm = abs(result.plane.distance_mm - truth.distance_mm)
     assert away_mm < 5.0 * result.distance_sd_mm + common_mm
@@ -87,7 +87,7 @@ def test_the_surface_is_found_however_it_is_mounted(
 
 
 def test_the_mirrored_pose_is_rejected_and_shown() -> None:
-    """Both poses of a flat board are on the table, with what speaks against the wrong one."""
+    """Both poses of a flat board are reported, with the evidence against the wrong one."""
     picture, truth = lying_board(tilt_deg=6.0)
     result = estimate_top_pose([picture], BOARD, CAMERA)
     assert result.decision is Decision.EVIDENCE
@@ -100,12 +100,12 @@ def test_the_mirrored_pose_is_rejected_and_shown() -> None:
 
 
 def far_camera() -> Camera:
-    """Return a long lens: from far away a board has hardly any perspective."""
+    """Return a long lens: at a large distance a board has hardly any perspective."""
     return Camera(320, 240, 120000.0, 120000.0, 160.0, 120.0)
 
 
-def test_two_poses_that_fit_equally_well_are_told_of() -> None:
-    """Seen from afar in noise nothing tells the two apart; the result does not pretend."""
+def test_two_poses_that_fit_equally_well_are_reported() -> None:
+    """At a large distance and with noise, nothing separates the poses; the result says so."""
     picture, truth = lying_board(
         tilt_deg=6.0, distance_mm=10000.0, camera=far_camera(), noise=0.03, blur_px=1.0
     )
@@ -119,7 +119,7 @@ def test_two_poses_that_fit_equally_well_are_told_of() -> None:
 
 
 def test_several_views_are_averaged() -> None:
-    """Turning the board on the surface and capturing again makes the answer surer."""
+    """Rotating the board on the surface and capturing again makes the result more certain."""
     laid = [
         lying_board(roll_deg=roll, centre_mm=(0.0, 0.0), name=f"top_{roll:.0f}.png")
         for roll in (-60.0, 5.0, 95.0)
@@ -134,7 +134,7 @@ def test_several_views_are_averaged() -> None:
 
 
 def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
-    """A crumb under one of three boards does not tilt the sensor."""
+    """A particle under one of three boards does not tilt the result."""
     flat = [lying_board(roll_deg=roll, name=f"flat_{roll:.0f}.png") for roll in (-40.0, 10.0, 70.0)]
     propped, _ = lying_board(tilt_deg=4.0, towards_deg=200.0, name="propped.png")
     result = estimate_top_pose([*(picture for picture, _ in flat), propped], BOARD, CAMERA)
@@ -145,22 +145,22 @@ def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
 
 @pytest.mark.parametrize("tilts_deg", [(0.0, 12.0, 24.0), (-24.0, -8.0, 9.0, 25.0)])
 def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg: tuple[float, ...]) -> None:
-    """The lens's pictures of a board held freely, copied here, say nothing of the surface.
+    """Images of a hand-held board, copied here, give no information about the surface.
 
-    Of three such boards one may happen to be the middle one; nothing speaks for it either.
+    One of three such boards may happen to be in the middle; even then there is no evidence for it.
     """
     pictures = [
         lying_board(tilt_deg=tilt, distance_mm=38.0 + 2.0 * k, name=f"held_{k}.png")[0]
         for k, tilt in enumerate(tilts_deg)
     ]
-    with pytest.raises(InputError, match=f"the {len(tilts_deg)} boards .* plane") as refusal:
+    with pytest.raises(InputError, match=f"The {len(tilts_deg)} boards .* plane") as refusal:
         estimate_top_pose(pictures, BOARD, CAMERA)
     assert refusal.value.where == "top_pose"
     assert "held_0.png" in refusal.value.found
 
 
-def test_a_failed_picture_among_good_ones_is_left_out_and_named() -> None:
-    """A black frame among the views is named, not fatal."""
+def test_a_failed_image_among_good_ones_is_left_out_and_named() -> None:
+    """A black frame among the views is named, but not fatal."""
     picture, truth = lying_board()
     black = Picture("black.png", np.zeros_like(picture.rgb))
     result = estimate_top_pose([black, picture], BOARD, CAMERA)
@@ -170,17 +170,17 @@ def test_a_failed_picture_among_good_ones_is_left_out_and_named() -> None:
 
 
 def test_the_focal_length_s_uncertainty_reaches_the_distance() -> None:
-    """A distance is not known better than the focal length it is measured with."""
+    """The distance cannot be known better than the focal length."""
     picture, _ = lying_board()
     result = estimate_top_pose([picture], BOARD, CAMERA, focal_sd_px=0.01 * CAMERA.fx)
     assert result.distance_sd_mm >= 0.01 * result.plane.distance_mm
     assert result.quality["distance_sd"].verdict is not Verdict.PASS
 
 
-def test_without_a_usable_picture_the_reason_is_given() -> None:
-    """The one picture's fault is the stage's fault."""
+def test_without_a_usable_image_the_reason_is_given() -> None:
+    """If there is only one image, its error is the error of the stage."""
     picture, _ = lying_board()
-    with pytest.raises(InputError, match="no picture"):
+    with pytest.raises(InputError, match="no image"):
         estimate_top_pose([], BOARD, CAMERA)
     black = Picture("top_pose.png", np.zeros_like(picture.rgb))
     with pytest.raises(InputError, match="black") as refusal:
@@ -191,7 +191,7 @@ def test_without_a_usable_picture_the_reason_is_given() -> None:
 
 
 def read(path: Path) -> Picture:
-    """Return an 8-bit picture file."""
+    """Return the pixels of an 8-bit image file."""
     return Picture(
         path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)
     )

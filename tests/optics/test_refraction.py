@@ -81,7 +81,7 @@ def test_the_ray_takes_the_quickest_path() -> None:
 
 
 def test_the_drift_is_where_the_ray_meets_a_higher_surface() -> None:
-    """Counting a millimetre of gel as thinner moves the seen point by the drift."""
+    """Moving a millimetre from elastomer to air shifts the visible point by the ray slope."""
     plane = tilted_plane(0.01, -0.02)
     stack = build_stack(39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41)
     thinner = build_stack(38.0, elastomer_thickness_mm=13.0, elastomer_index=1.41)

@@ -1,4 +1,4 @@
-"""The resampling table: an asymmetric mark must land at its own place in millimetres."""
+"""The resampling table: an asymmetric mark must be at its true position in millimetres."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ STACK = build_stack(
 )
 
 
-def test_every_raw_pixel_is_found_at_its_place_on_the_membrane() -> None:
-    """Pictures of u and of v, resampled, give back the pixel of each node, and its ray the node."""
+def test_every_raw_pixel_is_found_at_its_membrane_position() -> None:
+    """Images of u and of v, resampled, give the pixel of each node, and its ray gives the node."""
     table = build_resampling_table(CAMERA, PLANE, STACK, working_diameter_mm=26.0)
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width].astype(np.float32)
     found = table.apply(np.stack([u, v, u], axis=-1))
@@ -59,7 +59,7 @@ def test_a_working_circle_out_of_view_is_refused() -> None:
 def test_a_working_circle_of_a_few_pixels_is_refused_where_it_is_stated() -> None:
     with pytest.raises(InputError, match="working circle") as refusal:
         build_resampling_table(CAMERA, PLANE, STACK, working_diameter_mm=1.0)
-    assert "stated" in refusal.value.where
+    assert "sensor" in refusal.value.where
     assert "working diameter" in refusal.value.advice
 
 

@@ -1,4 +1,4 @@
-"""Light intensity from the whiteboard: right, and not led astray by dust or saturation."""
+"""Light intensity from the whiteboard: correct despite dust and saturation."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import pytest
 import scene
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.picture import Picture
 from gelpolight_core.optics.refraction import camera_to_membrane
 from gelpolight_core.radiance.whiteboard import calibrate_radiance
-from gelpolight_core.session.picture import Picture
 
 
 def whiteboard(vignetting: float = 0.1) -> np.ndarray:
-    """Return a whiteboard picture: intensity times cosine, with a fall-off towards the rim."""
+    """Return a whiteboard image: intensity times cosine, with a fall-off towards the rim."""
     v, u = np.mgrid[: scene.CAMERA.height, : scene.CAMERA.width].astype(float)
     stack = scene.sensor_stack(scene.SENSOR, scene.PLANE)
     points, _ = camera_to_membrane(
@@ -34,7 +34,7 @@ def relative_error(rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return result.radiance / (radiance * fall_off) - 1.0, result.usable
 
 
-def test_the_intensity_is_the_picture_over_the_cosine() -> None:
+def test_the_intensity_is_the_image_over_the_cosine() -> None:
     error, usable = relative_error(whiteboard())
     assert usable[scene.table().valid].mean() > 0.85
     assert np.abs(error[usable]).max() < 0.005
@@ -54,7 +54,7 @@ def test_dust_and_scratches_do_not_darken_the_light() -> None:
     assert np.abs(error[usable]).max() < 0.02
 
 
-def test_saturated_places_are_filled_by_the_law_of_light() -> None:
+def test_saturated_areas_are_filled_by_the_law_of_light() -> None:
     scale = np.float32(1.0 / (0.8 * whiteboard().max()))
     table = scene.table()
     result = calibrate_radiance(
@@ -66,7 +66,7 @@ def test_saturated_places_are_filled_by_the_law_of_light() -> None:
     _, radiance = scene.flat_light(points)
     fall_off = 1.0 - 0.1 * (points**2).sum(-1, keepdims=True) / 144.0
     error = result.radiance / (scale * radiance * fall_off) - 1.0
-    # What was lost reaches to the rim, where the fall-off is led by its trend alone.
+    # The lost area extends to the rim, where only the trend determines the fall-off.
     assert np.abs(error[lost]).max() < 0.03
 
 
@@ -93,7 +93,26 @@ def test_a_whiteboard_that_cannot_be_used_is_refused(rgb: np.ndarray, what: str)
 
 
 @pytest.mark.parametrize("order", [[1, 0, 2], [2, 1, 0], [1, 2, 0]])
-def test_leds_that_the_mirror_shows_in_each_others_places_are_refused(order: list[int]) -> None:
+def test_leds_swapped_between_mirror_and_whiteboard_are_refused(order: list[int]) -> None:
     picture = Picture("whiteboard.png", whiteboard())
-    with pytest.raises(InputError, match="is lit from where the mirror shows the"):
+    with pytest.raises(InputError, match="is lit from the position of the"):
         calibrate_radiance(picture, scene.table(), scene.LEDS[order])
+
+
+@pytest.mark.parametrize("decibel", [40.0, 35.0, 30.0])
+def test_noise_is_not_called_dust_and_a_speck_is(decibel: float) -> None:
+    """Read noise is equal everywhere, so it is relatively largest where there is least light."""
+    noise = 10.0 ** (-decibel / 20.0) * np.random.default_rng(4).standard_normal((240, 320, 3))
+    clean, dirty = whiteboard(), whiteboard()
+    dirty[60:66, 200:206] *= 0.3
+    dirty[170:174, 80:100] *= 0.5
+    shares = []
+    for rgb in (clean, dirty):
+        shown = np.clip(np.round(255.0 * (rgb + noise)) / 255.0, 0.0, 1.0)
+        result = calibrate_radiance(
+            Picture("w", shown.astype(np.float32)), scene.table(), scene.LEDS
+        )
+        shares.append(result.quality["whiteboard_dust_percent"].value)
+    assert shares[0] < 0.5
+    assert shares[1] > shares[0] + 0.15
+    assert result.dust.any()

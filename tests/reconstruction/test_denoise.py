@@ -5,8 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from compiled import quiet
+from reference.denoise import quiet_even_parts
 
-from gelpolight_core.reconstruction.denoise import noise_left, quiet_even_parts
+from gelpolight_core.reconstruction.near_light.uncertainty import noise_left
 
 
 def picture(noise: float) -> tuple[np.ndarray, np.ndarray]:
@@ -24,7 +26,7 @@ ONE = np.ones((160, 200, 3), np.float32)
 
 def quieted(light: np.ndarray, sigma: float = 0.005) -> np.ndarray:
     """Return the averaged ratio over an even background."""
-    ratio, _ = quiet_even_parts(light, ONE, np.float32(sigma) * ONE, USABLE)
+    ratio, _, _ = quiet(light, ONE, np.float32(sigma) * ONE, USABLE)
     return ratio
 
 
@@ -37,12 +39,10 @@ def test_noise_goes_and_the_step_stays() -> None:
     np.testing.assert_allclose(quiet[20:140, 118:122], noisy[20:140, 118:122], atol=1e-3)
 
 
-def test_a_picture_without_noise_or_without_membrane_is_left_alone() -> None:
+def test_an_image_without_noise_is_left_alone() -> None:
     clean, noisy = picture(0.0)
-    quiet = quieted(noisy)
-    assert np.abs(quiet - clean).max() < 2e-3
-    untouched, _ = quiet_even_parts(noisy, ONE, ONE, np.zeros((160, 200), bool))
-    np.testing.assert_array_equal(untouched, noisy)
+    assert np.abs(quieted(noisy) - clean).max() < 2e-3
+    assert quiet(noisy, ONE, np.float32(0.005) * ONE, USABLE)[2] is None
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.3, 0.5])
@@ -53,8 +53,8 @@ def test_the_noise_that_is_left_is_known(shift: float) -> None:
     raw = clean + random.normal(0, 0.01, clean.shape).astype(np.float32)
     move = np.float32([[1, 0, shift], [0, 1, shift]])
     seen = cv2.warpAffine(raw, move, (200, 160), borderMode=cv2.BORDER_REPLICATE)
-    usable = np.ones((160, 200), bool)
-    stated = noise_left(seen, ONE, usable, np.ones((160, 200), np.float32))
+    _, _, edge = quiet(seen, ONE, np.float32(0.005) * ONE, USABLE)
+    stated = noise_left(edge, np.ones((160, 200), np.float32), resampled=1)
     left = (quieted(seen) - 0.5)[10:-10, 10:-10].std() / 0.01
     # Stated is the average over where nodes fall between the pixels, not each place's own.
     assert np.median(stated) == pytest.approx(left, rel=0.15)
@@ -67,7 +67,7 @@ def test_little_light_is_averaged_wider_and_the_light_it_has_is_known() -> None:
     background[:, :100] = 0.8
     press = background + random.normal(0.0, 0.004, background.shape).astype(np.float32)
     sigma = np.float32(0.004) / background
-    ratio, left = quiet_even_parts(press, background, sigma, USABLE)
+    ratio, left, _ = quiet(press, background, sigma, USABLE)
     dim, bright = np.s_[20:-20, 140:180], np.s_[20:-20, 20:60]
     assert (ratio - 1.0)[dim].std() < 0.25 * 0.2 * 0.25
     assert abs(float(ratio[dim].mean()) - 1.0) < 0.01
@@ -80,5 +80,22 @@ def test_what_lies_outside_of_the_membrane_does_not_darken_its_rim() -> None:
     usable[40:120, 50:150] = True
     background = np.where(usable[..., None], 0.02, 0.01).astype(np.float32) * ONE
     press = np.where(usable[..., None], background, 0.0).astype(np.float32)
-    ratio, _ = quiet_even_parts(press, background, 0.2 * ONE, usable)
+    ratio, _, _ = quiet(press, background, 0.2 * ONE, usable)
     np.testing.assert_allclose(ratio[usable], 1.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("noise", [0.004, 0.02, 0.06])
+def test_the_compiled_denoising_is_the_plain_one(noise: float) -> None:
+    """Also where little light needs wider averages, and where some of the membrane is unknown."""
+    _, noisy = picture(noise)
+    background = np.linspace(0.2, 0.9, 160, dtype=np.float32)[:, None, None] * ONE
+    usable = USABLE.copy()
+    usable[:, :20] = usable[60:70, 90:100] = False
+    light = noisy * background
+    sigma = np.float32(0.5 * noise) / background
+    plain, plain_left = quiet_even_parts(light, background, sigma, usable)
+    found, left, _ = quiet(light, background, sigma, usable)
+    # Both estimate the noise, and so where edges begin, from other samples of the image.
+    assert np.median(np.abs(found - plain)[usable]) < 0.02 * noise
+    assert np.percentile(np.abs(found - plain)[usable], 99) < 0.3 * noise
+    np.testing.assert_allclose(np.median(left[usable]), np.median(plain_left[usable]), rtol=0.05)

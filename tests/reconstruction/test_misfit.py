@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import read_picture
 
 
 @pytest.fixture(scope="module")

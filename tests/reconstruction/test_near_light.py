@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from compiled import solve
 from numpy.typing import NDArray
+from reference.near_light import RaySlopes, ShadedField
 
-from gelpolight_core.reconstruction.heightmap import Flag
-from gelpolight_core.reconstruction.near_light import RaySlopes, ShadedField, solve_near_light
-from gelpolight_core.reconstruction.uncertainty import slope_noise
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.near_light.structures import Slopes
+from gelpolight_core.reconstruction.near_light.uncertainty import slope_noise
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 
 Array = NDArray[np.float64]
+Map = NDArray[np.float32]
 PITCH = 0.08
 X = -6.0 + PITCH * np.arange(150)
 Y = -4.0 + PITCH * np.arange(110)
@@ -98,7 +101,12 @@ def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
 
 
 def solved(field: ShadedField, depth: Array, membrane: Membrane, *, workers: int = 1) -> RaySlopes:
-    return solve_near_light(field, depth.astype(np.float32), LEDS, membrane, workers=workers)
+    return solve(field, depth.astype(np.float32), LEDS, membrane, workers=workers)
+
+
+def slopes_of(found: RaySlopes) -> Slopes:
+    x, y, _ = (np.ascontiguousarray(n) for n in np.moveaxis(found.normals, -1, 0))
+    return Slopes(found.slope_x, found.slope_y, found.weight, found.flags, x, y)
 
 
 def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
@@ -160,8 +168,15 @@ def test_slopes_follow_the_rays_from_node_to_node() -> None:
 def test_the_stated_deviation_is_what_noise_does(membrane: Membrane) -> None:
     field, depth, _ = scene_of(membrane)
     noise = 0.01
-    ratio_sd = np.full_like(field.ratio, noise)
-    stated = np.sqrt((slope_noise(field, depth, ratio_sd, LEDS, membrane).moved ** 2).sum(axis=0))
+    ratio = np.ascontiguousarray(np.moveaxis(field.ratio, -1, 0))
+
+    def again(moved: Map, start: tuple[Map, Map]) -> Slopes:
+        shaken = replace(field, ratio=np.moveaxis(moved, 0, -1))
+        return slopes_of(solve(shaken, depth.astype(np.float32), LEDS, membrane, start=start))
+
+    answer = slopes_of(solved(field, depth, membrane))
+    moves = slope_noise(ratio, np.full_like(ratio, noise), answer, again)
+    stated = np.sqrt((moves.moved**2).sum(axis=0))
     random = np.random.default_rng(4)
     slopes = []
     for _ in range(20):
@@ -235,7 +250,8 @@ def test_a_pixel_that_is_no_number_spoils_nothing(bad: float) -> None:
     touched[20, 30] = touched[40, 50] = True
     assert angle_deg(found.normals, normals)[~touched].max() < 0.1
     assert (found.weight[touched] < 1.0).all()
-    assert found.flags[touched].all()
+    assert ((found.flags[touched] & int(Flag.INVALID)) != 0).all()
+    assert not found.flags[~touched].any()
 
 
 def test_an_all_black_picture_is_flat_flagged_and_hardly_counts() -> None:
@@ -253,8 +269,8 @@ def test_outside_is_firm_flat_ground_and_a_hole_inside_is_led_by_what_is_around(
     inside = (POINTS[..., 0] - 1.0) ** 2 + POINTS[..., 1] ** 2 < 9.0
     hole = (POINTS[..., 0] - 1.5) ** 2 + (POINTS[..., 1] - 0.5) ** 2 < 0.2
     found = solved(replace(field, usable=inside & ~hole, inside=inside), depth, MATT)
-    for lost in (~inside, hole):
-        assert (found.flags[lost] == int(Flag.OUTSIDE)).all()
+    for lost, flag in ((~inside, Flag.OUTSIDE), (hole, Flag.OUTSIDE | Flag.INVALID)):
+        assert (found.flags[lost] == int(flag)).all()
         assert not found.slope_x[lost].any()
     assert (found.weight[~inside] == 1.0).all()
     assert (found.weight[hole] < 0.05).all()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
+from compiled import solve
 from numpy.typing import NDArray
+from reference.full import coarsen
+from reference.near_light import ShadedField
 
-from gelpolight_core.calibration.calibration import FullModel
-from gelpolight_core.reconstruction import full as rounds
-from gelpolight_core.reconstruction.near_light import ShadedField
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.near_light import rounds
 from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.sensor_calibration import FullModel
 
 Array = NDArray[np.float64]
 PITCH = 0.16
@@ -59,8 +63,25 @@ def dent(
 
 
 def solved(field: ShadedField, full: FullModel) -> tuple[Array, tuple[float, ...], str]:
-    depth, (changes, stopped) = rounds.coarse_depth(field, full, PITCH, 1)
-    return depth.astype(float), changes, stopped
+    """Run the rounds at quarter scale."""
+    coarse = coarsen(field, 4)
+
+    def one(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        slopes = solve(coarse, depth, full.led_positions_mm, full.membrane)
+        return integrate_weighted(
+            slopes.slope_x,
+            slopes.slope_y,
+            slopes.weight,
+            pitch_mm=4.0 * PITCH,
+            start_mm=depth if depth.any() else None,
+        ).depth_mm
+
+    found = rounds.near_light_rounds(
+        one, coarse.usable.shape, longest_mm=rounds.longest_step_mm(full), wanted=2
+    )
+    rows, columns = field.usable.shape
+    depth = cv2.resize(found.depth_mm, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    return depth.astype(float), found.changes_mm, found.stopped
 
 
 def rms(found: Array, expected: Array) -> float:

@@ -9,9 +9,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.heightmap import Flag
-from gelpolight_core.reconstruction.normals import ShadingMaps, SlopeField, SlopeSolver
-from gelpolight_core.reconstruction.poisson import PoissonSolver
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
+from gelpolight_core.reconstruction.paper.model import ShadingMaps, SlopeField, SlopeSolver
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Array = NDArray[np.float64]

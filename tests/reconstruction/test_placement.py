@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from compiled import place_on_grid
 from numpy.typing import NDArray
-
-from gelpolight_core.reconstruction.placement import place_on_grid, resample
+from reference.placement import resample
 
 Array = NDArray[np.float64]
 PITCH = 0.05

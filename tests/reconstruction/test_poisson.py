@@ -12,7 +12,7 @@ import scipy.sparse.linalg as sparse_linalg
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gelpolight_core.reconstruction.poisson import (
+from gelpolight_core.reconstruction.integration.poisson import (
     SLOPE_LIMIT,
     PoissonSolver,
     good_length,

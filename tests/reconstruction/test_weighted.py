@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.poisson import PoissonSolver
-from gelpolight_core.reconstruction.weighted import integrate_weighted
+from gelpolight_core.reconstruction.integration.poisson import PoissonSolver
+from gelpolight_core.reconstruction.integration.weighted import SHARED_SUMS, integrate_weighted
+from gelpolight_core.reconstruction.threads import RowWorkers
 
 Array = NDArray[np.float64]
 PITCH = 0.05
@@ -176,11 +177,30 @@ def test_the_least_squares_balance_is_the_dense_one() -> None:
 
 
 def test_threads_do_not_change_the_answer() -> None:
+    """On a grid that is large enough for threads to share it."""
     _, slope_x, slope_y, r = plateau()
-    maps = single(slope_x, slope_y, np.where(r > 2.0, 0.5, 1.0))
-    one = integrate_weighted(*maps, pitch_mm=PITCH, workers=1)
-    two = integrate_weighted(*maps, pitch_mm=PITCH, workers=2)
-    np.testing.assert_array_equal(one.depth_mm, two.depth_mm)
+    weight = np.where(r > 2.0, 0.5, 1.0)
+    maps = [np.tile(m, (3, 3)) for m in single(slope_x, slope_y, weight)]
+    assert maps[0].size > SHARED_SUMS
+    one, *more = (
+        integrate_weighted(*maps, pitch_mm=PITCH, workers=RowWorkers(n)) for n in (1, 2, 3)
+    )
+    for other in more:
+        np.testing.assert_array_equal(one.depth_mm, other.depth_mm)
+
+
+def test_slopes_without_weight_do_not_leak_into_their_neighbours() -> None:
+    """The outer two of an edge's four slopes must not be read where they have no weight."""
+    depth, slope_x, slope_y = lopsided()
+    spoilt = (np.abs(XX - 2.0) < 0.6) & (np.abs(YY + 1.0) < 0.5)
+    weight = np.where(spoilt, 0.0, 1.0)
+    errors = []
+    for wrong in (0.0, 10.0):
+        x, y = (np.where(spoilt, wrong, s) for s in (slope_x, slope_y))
+        found = integrate_weighted(*single(x, y, weight), pitch_mm=PITCH, tolerance=1e-5)
+        errors.append(float(np.abs(found.depth_mm - depth)[~spoilt].max()))
+    assert errors[1] == pytest.approx(errors[0], abs=1e-7)
+    assert errors[0] < 2e-3
 
 
 def test_no_slopes_are_no_depth() -> None:

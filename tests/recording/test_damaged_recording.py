@@ -1,4 +1,4 @@
-"""A damaged recording gives the right frames or says no; a killed program loses one at most."""
+"""A damaged recording gives correct frames or an error; a killed program loses at most one."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def right_frames(path: Path) -> set[int]:
-    """Return which frames can be read; what is read must be right."""
+    """Return the readable frames; each of them must be correct."""
     found = set()
     with Recording.open(path) as recording:
         assert recording.header.serial == "A"
@@ -75,7 +75,7 @@ def test_a_changed_byte_spoils_one_frame_at_most_or_is_refused(
 
 
 @pytest.mark.parametrize("search_bytes", [8, 9, 100, 10_000])
-def test_behind_a_damaged_place_the_next_frame_is_found(
+def test_after_damage_the_next_frame_is_found(
     whole: bytes, place: Path, monkeypatch: pytest.MonkeyPatch, search_bytes: int
 ) -> None:
     """Wherever the file is cut into the parts that are searched."""
@@ -108,12 +108,12 @@ def test_a_file_cut_short_keeps_the_frames_before_the_cut(
 def test_any_other_file_is_refused(place: Path, content: bytes) -> None:
     place.write_bytes(content)
     assert not is_recording(place)
-    with pytest.raises(InputError, match="this is not a recording"):
+    with pytest.raises(InputError, match="not a recording"):
         Recording.open(place)
 
 
-def test_a_missing_file_is_said_so(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"gone\.gplrec: there is no such file"):
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"gone\.gplrec: The file does not exist"):
         Recording.open(tmp_path / "gone.gplrec")
 
 
@@ -121,7 +121,7 @@ def test_a_newer_version_is_refused_in_one_line(whole: bytes, place: Path) -> No
     newer = bytearray(whole)
     newer[layout.HEAD_AT + 8 : layout.HEAD_AT + 12] = struct.pack("<I", VERSION + 1)
     place.write_bytes(newer)
-    with pytest.raises(InputError, match=f"has version {VERSION + 1} and this program knows"):
+    with pytest.raises(InputError, match=f"has version {VERSION + 1}, but this program"):
         Recording.open(place)
 
 
@@ -133,7 +133,7 @@ def test_a_newer_version_is_refused_in_one_line(whole: bytes, place: Path) -> No
 def test_sizes_that_cannot_be_are_not_believed(
     whole: bytes, place: Path, rows: int, columns: int, strips: int, bits: int
 ) -> None:
-    """Their checksum is right: somebody has made such a file."""
+    """The checksum is correct: somebody forged this file."""
     begin = whole.index(layout.FRAME_MAGIC)
     mark = bytearray(whole[begin : begin + 132])
     struct.pack_into("<4I", mark, 32, rows, columns, bits, strips)
@@ -157,7 +157,7 @@ def test_a_strip_that_unpacks_to_more_than_a_frame_is_refused(whole: bytes, plac
     struct.pack_into("<I", content, begin + 48 + 64, crc)
     struct.pack_into("<I", content, begin + 128, zlib.crc32(content[begin : begin + 128]))
     place.write_bytes(content)
-    with Recording.open(place) as recording, pytest.raises(InputError, match="frame 0 is damaged"):
+    with Recording.open(place) as recording, pytest.raises(InputError, match="Frame 0 is damaged"):
         recording.frame(0)
 
 
@@ -175,7 +175,7 @@ for number in range(10**6):
 """
 
 
-def test_a_killed_program_loses_no_frame_that_it_said_was_written(tmp_path: Path) -> None:
+def test_a_killed_program_loses_no_confirmed_frame(tmp_path: Path) -> None:
     path = tmp_path / "a.gplrec"
     program = subprocess.Popen(
         [sys.executable, "-c", textwrap.dedent(WRITE_FOR_EVER), str(path)],
@@ -208,7 +208,7 @@ def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path: Path) -> N
     writer.append(noisy(0), 0, 100.0)
     resource.setrlimit(resource.RLIMIT_FSIZE, (writer.size_bytes + 500, before[1]))
     try:
-        with pytest.raises(InputError, match=r"a\.gplrec: the file is too large for this disk"):
+        with pytest.raises(InputError, match=r"a\.gplrec: The file is too large for this disk"):
             writer.append(noisy(1), 1, 100.02)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -220,10 +220,10 @@ def test_a_full_disk_ends_a_recording_with_what_came_before(tmp_path: Path) -> N
         assert np.array_equal(recording.frame(0).rgb, noisy(0))
 
 
-def test_a_disk_that_fails_altogether_is_one_sentence_and_what_came_before_is_kept(
+def test_a_failing_disk_gives_one_message_and_earlier_frames_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Not even the part of a frame can be taken back."""
+    """Not even the incomplete frame can be removed."""
     path = tmp_path / "a.gplrec"
 
     def fail(*_: object) -> int:
@@ -234,7 +234,7 @@ def test_a_disk_that_fails_altogether_is_one_sentence_and_what_came_before_is_ke
         with monkeypatch.context() as patch:
             patch.setattr(os, "pwrite", fail)
             patch.setattr(os, "ftruncate", fail)
-            with pytest.raises(InputError, match=r"a\.gplrec: the file cannot be written"):
+            with pytest.raises(InputError, match=r"a\.gplrec: The file cannot be written"):
                 writer.append(noisy(1), 1, 100.02)
     with Recording.open(path) as recording:
         assert recording.numbers.tolist() == [0]

@@ -1,4 +1,4 @@
-"""A recording goes with the calibrations of its own sensor only."""
+"""A recording matches only calibrations of its own sensor."""
 
 from __future__ import annotations
 
@@ -29,9 +29,11 @@ def test_another_sensor_or_size_is_refused_by_name(tmp_path: Path) -> None:
     calibration = scene.calibration()
     write_recording(tmp_path / "a.gplrec", header=RecordingHeader(serial="other"))
     with Recording.open(tmp_path / "a.gplrec") as recording:
-        with pytest.raises(InputError, match="is of sensor other and the calibration of sensor"):
+        with pytest.raises(
+            InputError, match="is of sensor other, but the calibration is of sensor"
+        ):
             require_match(recording, calibration)
     write_recording(tmp_path / "b.gplrec", shape=(5, 7))
     with Recording.open(tmp_path / "b.gplrec") as recording:
-        with pytest.raises(InputError, match="the frames are 7x5 pixels"):
+        with pytest.raises(InputError, match="The frames have 7x5 pixels"):
             require_match(recording, calibration)

@@ -1,4 +1,4 @@
-"""A recording gives back what was written: every value, number and time, to anybody."""
+"""A recording returns exactly what was written: every value, number and time, in any program."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gelpolight_core.recording.writer import RecordingWriter
 
 @st.composite
 def frame_series(draw: st.DrawFn) -> list[tuple[Rgb, int, float]]:
-    """Return frames of one size and kind, with gaps in their numbers."""
+    """Return frames of one size and type, with gaps in their numbers."""
     shape = (draw(st.integers(1, 11)), draw(st.integers(1, 9)), 3)
     kind = draw(st.sampled_from([np.uint8, np.uint16]))
     steps = draw(st.lists(st.integers(1, 2**33), max_size=5))
@@ -75,7 +75,7 @@ def test_what_it_says_of_itself_comes_back(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_other_programs_open_its_frames(tmp_path: Path, kind: type) -> None:
-    """Through tifffile, and through libtiff in OpenCV: neither knows anything of ours."""
+    """Through tifffile, and through libtiff in OpenCV: neither knows our own data."""
     pictures = write_recording(tmp_path / "a.gplrec", kind=kind, shape=(50, 41))
     with tifffile.TiffFile(tmp_path / "a.gplrec") as file:
         assert len(file.pages) == len(pictures)
@@ -104,15 +104,15 @@ def test_a_recording_is_read_while_it_is_still_written(tmp_path: Path) -> None:
             assert np.array_equal(recording.frame(0).rgb, noisy(0))
 
 
-def test_a_recording_never_takes_the_place_of_a_file(tmp_path: Path) -> None:
+def test_a_recording_never_replaces_a_file(tmp_path: Path) -> None:
     (tmp_path / "a.gplrec").write_text("precious")
-    with pytest.raises(InputError, match=r"a\.gplrec: there is a file of this name"):
+    with pytest.raises(InputError, match=r"a\.gplrec: A file with this name already exists"):
         RecordingWriter(tmp_path / "a.gplrec", RecordingHeader())
     assert (tmp_path / "a.gplrec").read_text() == "precious"
 
 
-def test_a_folder_that_is_not_there_is_said_so(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the folder does not exist"):
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="The folder does not exist"):
         RecordingWriter(tmp_path / "gone" / "a.gplrec", RecordingHeader())
 
 
@@ -128,7 +128,7 @@ def test_a_folder_that_is_not_there_is_said_so(tmp_path: Path) -> None:
     ],
     ids=["size", "depth", "channels", "kind", "number", "time"],
 )
-def test_a_frame_that_does_not_go_with_the_others_is_not_taken(
+def test_a_frame_that_does_not_match_the_others_is_refused(
     tmp_path: Path, rgb: Rgb, number: int, time_s: float
 ) -> None:
     with RecordingWriter(tmp_path / "a.gplrec", RecordingHeader()) as writer:

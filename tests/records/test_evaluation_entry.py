@@ -14,7 +14,7 @@ from gelpolight_core.records.records import NAME, Records
 
 
 class _Measured:
-    """Stands for a measurement; only its being there counts."""
+    """Replaces a measurement; only its existence matters."""
 
 
 def evaluation(*errors: tuple[float, float], failed: int = 0) -> Evaluation:
@@ -37,7 +37,7 @@ def record(found: Evaluation, **more: object) -> object:
     )
 
 
-def test_the_mean_errors_are_kept_and_judged_by_the_limits() -> None:
+def test_the_mean_errors_are_stored_and_judged_by_the_limits() -> None:
     kept = record(evaluation((2.0, -4.0), (-4.0, 6.0)))
     assert kept.quantity("planar_error_percent").value == pytest.approx(3.0)
     assert kept.quantity("depth_error_percent").value == pytest.approx(5.0)
@@ -47,7 +47,7 @@ def test_the_mean_errors_are_kept_and_judged_by_the_limits() -> None:
     assert record(evaluation(failed=2)) is None
 
 
-def test_the_same_evaluation_is_kept_once(tmp_path: Path) -> None:
+def test_the_same_evaluation_is_stored_once(tmp_path: Path) -> None:
     records = Records.open(tmp_path / NAME)
     try:
         first = add_once(records, record(evaluation((2.0, 2.0))))

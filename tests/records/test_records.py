@@ -1,4 +1,4 @@
-"""The lab's records keep what was measured, for every program that asks."""
+"""The lab's records store measurements for every program that reads them."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ made_records = st.builds(
 
 @settings(deadline=None, max_examples=25)
 @given(made_records)
-def test_whatever_was_kept_comes_back(
+def test_stored_measurements_are_read_back(
     tmp_path_factory: pytest.TempPathFactory, record: MeasurementRecord
 ) -> None:
     path = tmp_path_factory.mktemp("kept") / NAME
@@ -118,7 +118,7 @@ def test_a_note_can_be_written_later(records: Records) -> None:
     number = records.add(cylinder(1.0))
     records.update_note(number, "the gel was warm")
     assert records.measurements()[0].note == "the gel was warm"
-    with pytest.raises(InputError, match="there is no measurement 99"):
+    with pytest.raises(InputError, match="Measurement 99 does not exist"):
         records.update_note(99, "?")
 
 
@@ -193,7 +193,7 @@ def test_several_threads_may_keep_measurements(records: Records) -> None:
     assert len(records.measurements()) == 20
 
 
-def test_what_is_known_of_a_calibration_is_kept(records: Records) -> None:
+def test_the_data_of_a_calibration_are_stored(records: Records) -> None:
     records.add(cylinder(1.0))
     records.know_calibration("c1", "A-1", model="full", made="2026-01-01", verdict="pass")
     assert records.measurements()[0].calibration_id == "c1"
@@ -216,7 +216,7 @@ def test_what_no_measurement_is_is_refused() -> None:
     for wrong in (math.nan, math.inf):
         with pytest.raises(ValueError, match="not finite"):
             Quantity("height_mm", wrong)
-    with pytest.raises(ValueError, match="truth of 0"):
+    with pytest.raises(ValueError, match="true value of 0"):
         Quantity("height_mm", 1.0, truth=0.0)
     twice = (Quantity("height_mm", 1.0), Quantity("height_mm", 2.0))
     for quantities in ((), twice):
@@ -228,7 +228,7 @@ def test_what_no_measurement_is_is_refused() -> None:
         MeasurementRecord("A", "", "ball", twice[:1], time=datetime(2026, 1, 1))
 
 
-def test_a_fitted_cuboid_is_kept_with_its_errors_and_all_that_it_says() -> None:
+def test_a_fitted_cuboid_is_stored_with_its_errors_and_details() -> None:
     measurement = Measurement(
         shape="cuboid", diameter_mm=None, side_mm=(4.0, 4.2), height_mm=1.1, centre_mm=(0.0, 1.0),
         yaw_deg=3.0, drape_decay_mm=0.5, sd={"side_mm": (0.02, 0.04), "height_mm": 0.01},

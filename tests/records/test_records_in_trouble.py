@@ -1,4 +1,4 @@
-"""Nothing that was kept is lost: by a crash, a second program, damage, or a full disk."""
+"""No stored measurement is lost: by a crash, a second program, damage, or a full disk."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ while True:
 
 
 def adding(path: Path) -> subprocess.Popen[str]:
-    """Start a program that keeps measurements and says the number of each."""
+    """Start a program that stores measurements and prints the number of each."""
     return subprocess.Popen(
         [sys.executable, "-c", ADD_FOR_EVER, str(path)],
         stdout=subprocess.PIPE,
@@ -56,8 +56,8 @@ def adding(path: Path) -> subprocess.Popen[str]:
     )
 
 
-def test_a_killed_program_loses_no_measurement_and_halves_none(tmp_path: Path) -> None:
-    """Two at once, both killed while they write."""
+def test_a_killed_program_loses_or_splits_no_measurement(tmp_path: Path) -> None:
+    """Two at the same time, both killed while writing."""
     path = tmp_path / NAME
     programs = [adding(path), adding(path)]
     said: set[int] = set()
@@ -88,16 +88,16 @@ def test_two_programs_use_the_records_at_once(tmp_path: Path) -> None:
         assert [r.id for r in theirs.measurements()] == [first, second]
 
 
-def test_a_program_that_holds_the_records_too_long_is_told_of(tmp_path: Path) -> None:
+def test_a_program_that_locks_the_records_too_long_is_reported(tmp_path: Path) -> None:
     path = tmp_path / NAME
     with Records.open(path, busy_s=0.05) as records:
         records.add(RECORD)
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN EXCLUSIVE")
         for use in (lambda: records.add(RECORD), records.measurements):
-            with pytest.raises(InputError, match="another program is holding the records"):
+            with pytest.raises(InputError, match="Another program is using the records"):
                 use()
-        with pytest.raises(InputError, match="another program is holding the records"):
+        with pytest.raises(InputError, match="Another program is using the records"):
             Records.open(path, busy_s=0.05)
         other.execute("ROLLBACK")
         other.close()
@@ -117,7 +117,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.parametrize("kind", ["text", "half", "holes"])
-def test_damaged_records_are_kept_aside_and_new_ones_begun(
+def test_damaged_records_are_set_aside_and_new_ones_created(
     whole: bytes, tmp_path: Path, kind: str
 ) -> None:
     path = tmp_path / NAME
@@ -164,7 +164,7 @@ def test_the_database_of_another_program_is_left_alone(tmp_path: Path) -> None:
     other.commit()
     other.close()
     before = path.read_bytes()
-    with pytest.raises(InputError, match="the database of another program"):
+    with pytest.raises(InputError, match="a database of another program"):
         Records.open(path)
     assert path.read_bytes() == before
 
@@ -178,12 +178,12 @@ def test_newer_records_are_refused_and_left_as_they_are(tmp_path: Path) -> None:
     newer.commit()
     newer.close()
     before = path.read_bytes()
-    with pytest.raises(InputError, match="have version 9 and this program knows"):
+    with pytest.raises(InputError, match="have version 9, but this program"):
         Records.open(path)
     assert path.read_bytes() == before
 
 
-def test_older_records_are_brought_up_to_date_with_all_that_they_hold(
+def test_older_records_are_migrated_completely(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Records.open(tmp_path / NAME) as records:
@@ -206,25 +206,25 @@ def test_a_change_of_the_tables_that_fails_changes_nothing(
     before = path.read_bytes()
     wrong = ("ALTER TABLE sensors ADD COLUMN colour TEXT", "ALTER TABLE nothing ADD COLUMN x")
     monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, wrong))
-    with pytest.raises(InputError, match="the records cannot be used"):
+    with pytest.raises(InputError, match="The records cannot be used"):
         Records.open(path)
     assert path.read_bytes() == before
 
 
-def test_a_folder_that_is_not_there_is_said_so(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the records cannot be opened or made here"):
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="The records cannot be opened or created here"):
         Records.open(tmp_path / "gone" / NAME)
 
 
 def test_records_that_can_only_be_read_are_read(tmp_path: Path) -> None:
-    """As on a disk that is mounted so; permissions would not keep an administrator out."""
+    """As on a disk mounted read-only; permissions would not stop an administrator."""
     path = tmp_path / NAME
     with Records.open(path) as records:
         records.add(RECORD)
     with Records.open(path) as records:
         records._connection.execute("PRAGMA query_only = ON")
         assert len(records.measurements()) == 1
-        with pytest.raises(InputError, match="the records can only be read here"):
+        with pytest.raises(InputError, match="The records are read-only"):
             records.add(RECORD)
 
 
@@ -234,7 +234,7 @@ def test_a_full_disk_loses_the_new_measurement_only(tmp_path: Path) -> None:
         number = records.add(RECORD)
         (pages,) = records._connection.execute("PRAGMA page_count").fetchone()
         records._connection.execute(f"PRAGMA max_page_count = {pages}")
-        with pytest.raises(InputError, match="the disk is full"):
+        with pytest.raises(InputError, match="The disk is full"):
             records.add(replace(RECORD, note="x" * 100_000))
         records.add(RECORD)
         assert records.measurements()[0].id == number

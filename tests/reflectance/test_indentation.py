@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.image.noise import match_gain, pixel_noise
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import (
@@ -24,7 +25,6 @@ from gelpolight_core.optics.refraction import (
 )
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reflectance.indentation import Indentation, find_indentation
-from gelpolight_core.reflectance.noise import match_gain, pixel_noise
 
 Pictures = tuple[NDArray[np.float32], NDArray[np.float32]]
 Array = NDArray[np.float64]

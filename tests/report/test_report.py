@@ -1,4 +1,4 @@
-"""The report a lab keeps: everything is in it, nothing outside is asked for, and it prints."""
+"""The report is complete, self-contained, and printable."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.command_line.main import MENDABLE, main
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.calibration.pipeline import CalibrationRun
@@ -31,13 +30,14 @@ from gelpolight_core.report.html import report_html
 from gelpolight_core.report.pdf import line_width_mm, report_pdf, wrap
 from gelpolight_core.report.stage_facts import stage_facts
 from gelpolight_core.report.typeface import printable
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
 
 NASTY = '<script src="http://evil.example/x.js">&"\'$\\frac{1}$ \u4e2d\u6587'
 
 
 class Page(HTMLParser):
-    """Gathers the tags and what a reader sees."""
+    """Collects the tags and the visible text."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -72,13 +72,14 @@ def whole(virtual_run: CalibrationRun, virtual_session: Path) -> Report:
     return run_report(virtual_run, read_session(virtual_session))
 
 
-def test_every_stage_stands_in_the_report_with_its_figures_and_a_picture(
+def test_the_report_shows_every_stage_with_figures_and_a_drawing(
     virtual_run: CalibrationRun, whole: Report
 ) -> None:
     assert [s.key for s in whole.sections] == list(virtual_run.calibration.quality)
     shown = " ".join(parsed(whole).seen)
     for section in whole.sections:
-        assert section.drawings, section.key
+        # The drawings of background and balls are in the sections on factors and reflectance.
+        assert section.drawings or section.key in ("background", "balls"), section.key
         for figure in virtual_run.calibration.quality[section.key].figures:
             assert figure.label in shown
 
@@ -89,7 +90,7 @@ def test_every_source_is_listed_with_its_hash(virtual_run: CalibrationRun, whole
         assert {name, digest} <= shown
 
 
-def test_the_html_asks_nothing_of_any_other_place(whole: Report) -> None:
+def test_the_html_needs_no_other_file(whole: Report) -> None:
     """It is mailed, archived, and opened on machines without a network."""
     text = report_html(whole)
     assert "<script" not in text
@@ -101,7 +102,7 @@ def test_the_html_asks_nothing_of_any_other_place(whole: Report) -> None:
             assert target is None or target.startswith(("data:image/png;base64,", "#")), target
 
 
-def test_the_pictures_are_whole(whole: Report) -> None:
+def test_the_drawings_are_complete(whole: Report) -> None:
     pictures = [a["src"] for tag, a in parsed(whole).tags if tag == "img"]
     assert len(pictures) == sum(len(s.drawings) for s in whole.sections)
     for source in pictures:
@@ -111,20 +112,20 @@ def test_the_pictures_are_whole(whole: Report) -> None:
         assert picture.std() > 5.0  # something is drawn on it
 
 
-def test_a_calibration_without_known_objects_is_said_to_be_not_validated(whole: Report) -> None:
+def test_a_calibration_without_known_objects_is_reported_as_not_validated(whole: Report) -> None:
     assert any("Not validated" in text for text in parsed(whole).seen)
 
 
-def test_presses_too_few_to_hold_any_out_are_said_to_be_too_few(
+def test_too_few_presses_to_hold_any_out_are_reported(
     virtual_calibration: Calibration,
 ) -> None:
-    """Nothing was compared: neither a loss nor a verdict on the refinement can be stated."""
+    """Nothing was compared: there is neither a loss nor a verdict on the refinement."""
     full = virtual_calibration.full
     assert full is not None
     assert "Loss on held-out presses" in dict(stage_facts(virtual_calibration, "joint"))
     few = replace(virtual_calibration, full=replace(full, held_out=(0.0, 1.0), kept="mirror"))
     facts = dict(stage_facts(few, "joint"))
-    assert "too few presses" in facts["LEDs that are used"]
+    assert "too few presses" in facts["LEDs used"]
     assert "Loss on held-out presses" not in facts
 
 
@@ -143,15 +144,15 @@ def test_names_from_files_are_shown_and_never_obeyed() -> None:
     assert report_pdf(report).startswith(b"%PDF")
 
 
-def test_what_was_changed_by_hand_is_said() -> None:
-    """A curve that a person drew is no measurement."""
+def test_edits_by_hand_are_reported() -> None:
+    """A curve drawn by hand is not a measurement."""
     c = small()
     curve = (np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 11) ** 1.2)
     changed = edited(c, {1: curve}, operator="A. Person", made="2026-03-04T05:06:07+00:00")
     shown = " ".join(parsed(calibration_report(changed)).seen)
-    assert "Changed by hand" in shown
+    assert "Edited by hand" in shown
     assert "green" in shown and "A. Person" in shown and "2026-03-04" in shown
-    assert "Changed by hand" not in " ".join(parsed(calibration_report(c)).seen)
+    assert "Edited by hand" not in " ".join(parsed(calibration_report(c)).seen)
 
 
 def test_a_figure_that_did_not_pass_comes_with_its_advice() -> None:
@@ -177,7 +178,7 @@ def test_a_limit_is_shown_on_the_side_where_it_is_judged(
     fail = (warn - gap if higher else warn + gap) if with_fail else None
     figure = judge("k", "l", value, warn=warn, fail=fail, higher_is_better=higher)
     if not with_fail and value == warn:
-        return  # at its only limit nothing tells the sides apart
+        return  # at its only limit the direction of the figure is unknown
     sign = "\N{GREATER-THAN OR EQUAL TO}" if higher else "\N{LESS-THAN OR EQUAL TO}"
     assert limit_text(figure).startswith(sign)
 
@@ -226,7 +227,8 @@ def test_the_scatter_is_what_the_curves_were_fitted_to(
         off = (
             scatter.values[k] / virtual_run.reflectance.table.response(k, scatter.cosines[k]) - 1.0
         )
-        # The spread is the robust standard deviation of just that; the factors were fed back once.
+        # The spread is the robust standard deviation of exactly that; the factors were fed back
+        # once.
         assert 1.4826 * np.median(np.abs(off)) == pytest.approx(fit.spread, rel=0.1)
         assert set(np.unique(scatter.presses[k])) == set(range(len(scatter.names)))
 

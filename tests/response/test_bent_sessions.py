@@ -1,4 +1,4 @@
-"""A camera that bends light gives the same depth as one that does not, however that is known."""
+"""A non-linear camera gives the same depth as a linear one, if its response is known."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_sessi
 from gelpolight_core.design.parts import Press, SessionDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 
 SCALE = 0.3
@@ -40,30 +41,30 @@ def calibrated(folder: Path, response: str, session: SessionDesign) -> Run:
 
 @pytest.fixture(scope="module")
 def linear(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Return a linear camera's, with a series that says so and single-LED pictures."""
+    """Return the session of a linear camera, with an exposure series and single-LED images."""
     asked = SessionDesign(response_pictures=6, single_led=True)
     return calibrated(tmp_path_factory.mktemp("bent"), "linear", asked)
 
 
 @pytest.fixture(scope="module")
 def gamma(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Return that of a camera whose gamma of 2.2 is declared."""
+    """Return the session of a camera with a declared gamma of 2.2."""
     return calibrated(tmp_path_factory.mktemp("bent"), "gamma", SessionDesign())
 
 
 @pytest.fixture(scope="module")
 def srgb(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """Return that of an sRGB camera that only a series of exposures tells of."""
+    """Return the session of an sRGB camera whose response is only measured."""
     asked = SessionDesign(declares_response=False, response_pictures=6)
     return calibrated(tmp_path_factory.mktemp("bent"), "srgb", asked)
 
 
 def raw(run: Run) -> np.ndarray:
-    """Return the press as the camera delivers it, RGB."""
+    """Return the press as delivered by the camera, RGB."""
     return np.ascontiguousarray(cv2.imread(str(run[0] / PRESS))[..., ::-1])
 
 
-def test_what_is_known_of_the_camera_is_said(linear: Run, gamma: Run, srgb: Run) -> None:
+def test_known_camera_settings_are_reported(linear: Run, gamma: Run, srgb: Run) -> None:
     for (folder, run), source, left_out, declared in (
         (linear, "measured", True, False),
         (gamma, "declared", False, True),
@@ -79,7 +80,7 @@ def test_what_is_known_of_the_camera_is_said(linear: Run, gamma: Run, srgb: Run)
 def test_bent_and_straight_cameras_see_the_same_depth(
     linear: Run, gamma: Run, srgb: Run, model: str
 ) -> None:
-    """5 um are half a percent of the press, what the full model leaves on matt sensors."""
+    """5 um are half a percent of the press, the error of the full model on matt sensors."""
     straight = Reconstructor(linear[1].calibration, model=model).depth(raw(linear)).depth_mm
     for run in (gamma, srgb):
         bent = Reconstructor(run[1].calibration, model=model).depth(raw(run)).depth_mm
@@ -97,7 +98,7 @@ def test_an_unmodelled_gamma_would_be_noticed(gamma: Run) -> None:
     assert np.sqrt(np.mean((wrong - right) ** 2)) > 0.05
 
 
-def test_camera_numbers_and_read_pictures_are_the_same_light(gamma: Run) -> None:
+def test_pixel_values_and_read_images_give_the_same_light(gamma: Run) -> None:
     folder, run = gamma
     read = read_picture(folder / PRESS, response=run.calibration.response).rgb
     for model in ("paper", "full"):
@@ -109,7 +110,7 @@ def test_camera_numbers_and_read_pictures_are_the_same_light(gamma: Run) -> None
 
 
 def test_what_is_saturated_stays_saturated(gamma: Run) -> None:
-    from gelpolight_core.reconstruction.heightmap import Flag
+    from gelpolight_core.reconstruction.height_map import Flag
 
     bright = raw(gamma).copy()
     middle = bright.shape[0] // 2, bright.shape[1] // 2
@@ -120,7 +121,7 @@ def test_what_is_saturated_stays_saturated(gamma: Run) -> None:
 
 
 def test_noise_is_judged_alike(linear: Run, gamma: Run, srgb: Run) -> None:
-    """Steps of a bent scale are wider in the light and finer in the dark, twice at the most."""
+    """Steps of a non-linear scale are up to twice as wide where bright, and finer where dark."""
     straight = linear[1].calibration.noise
     for _, run in (gamma, srgb):
         assert (
@@ -136,18 +137,16 @@ def test_the_curve_is_the_camera_s_to_a_third_of_a_percent(srgb: Run) -> None:
     assert np.abs(found.curves - truth).max() < 0.0033
 
 
-def test_crosstalk_comes_from_single_led_pictures_where_there_are_any(
-    linear: Run, gamma: Run
-) -> None:
+def test_crosstalk_comes_from_single_led_images_if_there_are_any(linear: Run, gamma: Run) -> None:
     truth = np.array(DEFAULT.photometry.crosstalk)
     assert linear[1].crosstalk.source == "single_led"
     assert gamma[1].crosstalk.source == "mirror"
-    # A grey level in 250 of the brightest pixels.
+    # One grey level in 250 of the brightest pixels.
     assert np.abs(linear[1].calibration.crosstalk - truth).max() < 0.002
     assert linear[1].crosstalk.quality["crosstalk_difference_percent"].value < 1.0
 
 
-def test_the_response_is_kept_in_the_file_and_changes_the_identity(
+def test_the_response_is_stored_in_the_file_and_changes_the_identity(
     gamma: Run, tmp_path: Path
 ) -> None:
     before = gamma[1].calibration
@@ -174,6 +173,6 @@ def test_commands_undo_the_response(
         times = ["benchmark", str(path), str(folder / PRESS), "--repeats", "1", "--model", "paper"]
         assert main(times) == 0
         shown = capsys.readouterr().out
-        assert ("departs from linear" in shown) is (number == 1)
+        assert ("full scale from linear" in shown) is (number == 1)
         assert ("linear light" in shown) is (number == 1)
     assert heights[1] == pytest.approx(heights[0], rel=0.005)

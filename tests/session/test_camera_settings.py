@@ -1,4 +1,4 @@
-"""How a camera was set is kept with its session and its calibration."""
+"""Camera settings are stored with the session and the calibration."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.optics.checkerboard import BoardSpec
+from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
 from gelpolight_core.session.description import create_session, write_description
 from gelpolight_core.session.session import SensorData, Session, read_session

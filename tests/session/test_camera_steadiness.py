@@ -1,4 +1,4 @@
-"""A camera that still moves after it was locked is found out by its own pictures."""
+"""A camera that changes although it is locked is detected from its own images."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SCENE = np.array([0.35, 0.30, 0.25])
 
 
 def judged(gain: NDArray[np.float64], **options: float) -> QualityTable:
-    """Judge pictures of one scene whose light is multiplied, per frame, band and channel."""
+    """Judge images of one scene whose light is multiplied, per frame, band and channel."""
     rng = np.random.default_rng(1)
     levels = SCENE * np.broadcast_to(gain, (len(TIMES), BANDS, 3))
     return judge_steadiness(levels + rng.normal(0.0, 5e-5, levels.shape), TIMES, **options)
@@ -26,7 +26,7 @@ def failing(table: QualityTable) -> set[str]:
     return {figure.key for figure in table.figures if figure.verdict is not Verdict.PASS}
 
 
-def test_a_camera_that_stands_still_passes() -> None:
+def test_a_steady_camera_passes() -> None:
     table = judged(np.ones((1, 1, 1)), rate_hz=20.0)
     assert failing(table) == set()
     assert table["camera_rate_percent"].value == pytest.approx(100.0)
@@ -47,20 +47,20 @@ def test_white_balance_that_the_camera_still_sets_is_a_drift_of_colour() -> None
     assert table["camera_colour_drift_percent"].value == pytest.approx(1.2, rel=0.05)
 
 
-def test_lamps_flicker_in_stripes_that_the_whole_picture_hides() -> None:
+def test_flicker_is_found_in_stripes_that_the_image_mean_hides() -> None:
     phase = 2.0 * np.pi * (np.arange(BANDS)[None, :] / BANDS + 0.37 * np.arange(60)[:, None])
     table = judged(1.0 + 0.03 * np.sin(phase)[..., None])
     assert failing(table) == {"camera_flicker_percent"}
     assert table["camera_flicker_percent"].value == pytest.approx(3.0 / np.sqrt(2.0), rel=0.05)
 
 
-def test_a_picture_that_is_repeated_or_late_is_found() -> None:
+def test_a_repeated_or_late_image_is_found() -> None:
     table = judged(np.ones((1, 1, 1)), rate_hz=40.0, repeated=40)
     assert failing(table) == {"camera_repeated", "camera_rate_percent"}
     assert table["camera_repeated"].verdict is Verdict.FAIL
 
 
-def test_in_the_dark_nothing_can_be_said() -> None:
+def test_a_dark_image_cannot_be_judged() -> None:
     table = judged(np.full((1, 1, 1), 0.005))
     assert table["camera_level"].verdict is Verdict.FAIL
     assert "LEDs" in table["camera_level"].advice
@@ -84,7 +84,7 @@ def test_a_steady_camera_passes_at_any_brightness(gain: float, brightness: float
     assert failing(judge_steadiness(levels, np.arange(30) / 30.0)) <= {"camera_level"}
 
 
-def test_too_few_pictures_are_refused() -> None:
+def test_too_few_images_are_refused() -> None:
     with pytest.raises(ValueError, match="levels"):
         judge_steadiness(np.ones((2, BANDS, 3)), np.arange(2.0))
     with pytest.raises(ValueError, match="times"):

@@ -1,4 +1,4 @@
-"""What a person decides is kept beside the pictures, read back as it was, and checked."""
+"""The user's decisions are stored beside the images, read back unchanged, and checked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a session may hold beside its usual stages, read and checked."""
+"""Optional stages of a session are read and checked."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.session import Session, read_picture, read_session
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import Session, read_session
 
 TEXT = """format = "gelpolight-session"
 version = 1
@@ -28,7 +29,7 @@ default = 3.0
 
 
 def session_of(folder: Path, more: str = "", *pictures: str) -> Session:
-    """Return a session with more in its description, and with small pictures."""
+    """Return a session with additions to its description, and with small images."""
     (folder / "session.toml").write_text(TEXT + more)
     for number, name in enumerate(pictures):
         path = folder / name
@@ -61,14 +62,14 @@ def test_a_declared_response_is_undone_in_every_stage(
     session = session_of(tmp_path, f"[camera]\n{camera}\n", "mirror/m.png")
     assert session.declared_response == declared
     assert session.averaged("mirror").rgb == pytest.approx(light, abs=1e-6)
-    # The file itself is read as it is.
+    # The file itself is read unchanged.
     assert read_picture(tmp_path / "mirror" / "m.png").rgb == pytest.approx(20 / 255)
 
 
 @pytest.mark.parametrize(
     ("more", "what"),
     [
-        ('[camera]\nresponse = "srgb"\ngamma = 2.2\n', "stands beside a gamma"),
+        ('[camera]\nresponse = "srgb"\ngamma = 2.2\n', "cannot be combined with a gamma"),
         ('[camera]\nresponse = "log"\n', "neither"),
         ("[camera]\nresponse = 2.2\n", "response is not a text"),
         ("[camera]\ngamma = 0\n", "gamma is 0"),
@@ -101,8 +102,8 @@ def test_a_series_is_read_as_the_camera_encoded_it_with_its_times(tmp_path: Path
     [
         ("", ("a.png",), "no exposure time for a.png"),
         ('[response]\n"a.png" = 1.0\n', ("a.png", "b.png"), "no exposure time for b.png"),
-        ('[response]\n"a.png" = 1.0\n"c.png" = 2.0\n', ("a.png",), "c.png, which is not there"),
-        ('[response]\n"a.png" = 1.0\n', (), "no pictures"),
+        ('[response]\n"a.png" = 1.0\n"c.png" = 2.0\n', ("a.png",), "lists c.png"),
+        ('[response]\n"a.png" = 1.0\n', (), "no images"),
     ],
 )
 def test_a_series_whose_times_do_not_fit_is_refused(
@@ -122,7 +123,7 @@ def test_an_empty_folder_is_no_stage(tmp_path: Path) -> None:
     assert session.optional_stages == ()
 
 
-def test_single_led_pictures_come_as_red_green_blue(tmp_path: Path) -> None:
+def test_single_led_images_are_ordered_red_green_blue(tmp_path: Path) -> None:
     names = ("single_led/blue.png", "single_led/green.tif", "single_led/red.png")
     session = session_of(tmp_path, "", *names)
     assert session.optional_stages == ("single_led",)
@@ -138,7 +139,7 @@ def test_single_led_pictures_come_as_red_green_blue(tmp_path: Path) -> None:
         ("1.png", "2.png", "3.png"),
     ],
 )
-def test_other_single_led_pictures_are_refused(tmp_path: Path, names: tuple[str, ...]) -> None:
+def test_other_single_led_images_are_refused(tmp_path: Path, names: tuple[str, ...]) -> None:
     session = session_of(tmp_path, "", *(f"single_led/{name}" for name in names))
-    with pytest.raises(InputError, match="not red, green and blue"):
+    with pytest.raises(InputError, match="instead of red, green and blue"):
         session.single_led()

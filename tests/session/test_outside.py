@@ -1,4 +1,4 @@
-"""What somebody else writes into an open session's files is noticed before it is lost."""
+"""Changes by other programs to the files of an open session are detected before they are lost."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from pathlib import Path
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.outside import KnownFiles
+from gelpolight_core.session.known_files import KnownFiles
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """Return a file that holds something."""
+    """Return a file with content."""
     path = tmp_path / "session.toml"
     path.write_text("a = 1")
     return path
 
 
-def test_a_file_that_was_changed_or_removed_is_told_and_not_written_over(path: Path) -> None:
+def test_a_changed_or_removed_file_is_reported_and_not_overwritten(path: Path) -> None:
     files = KnownFiles([path])
     assert files.changed() == ()
     for change in (lambda: path.write_text("a = 22"), path.unlink):
@@ -29,21 +29,21 @@ def test_a_file_that_was_changed_or_removed_is_told_and_not_written_over(path: P
             files.refuse_changed(path)
 
 
-def test_a_file_that_is_written_where_there_was_none_is_told(tmp_path: Path) -> None:
+def test_a_new_file_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "decisions.toml"
     files = KnownFiles([path])
     path.write_text("a = 1")
     assert files.changed() == (path,)
 
 
-def test_a_change_of_the_same_length_is_told(path: Path) -> None:
+def test_a_change_of_the_same_length_is_reported(path: Path) -> None:
     files = KnownFiles([path])
     path.write_text("a = 2")
     os.utime(path, ns=(1, 1))
     assert files.changed() == (path,)
 
 
-def test_a_file_that_was_only_saved_again_is_none_that_was_changed(path: Path) -> None:
+def test_a_file_saved_again_without_changes_is_unchanged(path: Path) -> None:
     files = KnownFiles([path])
     path.write_text("a = 1")
     os.utime(path, ns=(1, 1))

@@ -1,4 +1,4 @@
-"""Session folders: read right, and every mistake named with its place."""
+"""Session folders are read correctly, and every mistake is reported with its file and key."""
 
 from __future__ import annotations
 
@@ -11,14 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.copies import refuse_copies
-from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import (
-    average,
-    read_picture,
-    read_session,
-    require_colour,
-)
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.session.file_hashes import refuse_copies
+from gelpolight_core.session.images import average, read_picture, require_colour
+from gelpolight_core.session.session import read_session
 
 GOOD = """format = "gelpolight-session"
 version = 1
@@ -66,7 +62,7 @@ def test_the_top_pose_uses_the_same_board_when_none_is_named(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("old", "new", "what"),
     [
-        ("version = 1", "version = 2", "knows version 1"),
+        ("version = 1", "version = 2", "reads up to version 1"),
         ("version = 1", 'version = "1"', "version"),
         ("gelpolight-session", "other", "format"),
         ("led_height_mm = 13.8", "", r"led_height_mm is missing"),
@@ -104,11 +100,11 @@ def test_no_file_of_bytes_is_more_than_refused(
         read_session(folder)
 
 
-def test_a_folder_without_a_session_and_a_stage_without_pictures_are_named(tmp_path: Path) -> None:
+def test_a_folder_without_a_session_and_a_stage_without_images_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"session\.toml"):
         read_session(tmp_path)
     session = read_session(session_folder(tmp_path))
-    with pytest.raises(InputError, match="no pictures") as refusal:
+    with pytest.raises(InputError, match="no images") as refusal:
         session.files("mirror")
     assert refusal.value.where.endswith("mirror")
 
@@ -125,7 +121,9 @@ def test_a_misspelt_ball_is_not_given_the_default_radius(tmp_path: Path) -> None
     session = read_session(session_folder(tmp_path, text))
     (tmp_path / "balls").mkdir()
     (tmp_path / "balls" / "ball_03.png").touch()
-    with pytest.raises(InputError, match=r"ball_3\.png, which is not there, and not ball_03\.png"):
+    with pytest.raises(
+        InputError, match=r"ball_3\.png, which does not exist, but not ball_03\.png"
+    ):
         session.ball_radius_mm("ball_03.png")
 
 
@@ -135,8 +133,8 @@ def test_a_description_from_an_editor_that_marks_utf8_is_read(tmp_path: Path) ->
     assert read_session(folder).sensor.serial == "A-001"
 
 
-def test_a_copied_picture_is_refused_and_both_places_named(tmp_path: Path) -> None:
-    """A background in the place of the whiteboard gives a calibration that looks good."""
+def test_a_copied_image_is_refused_and_both_files_named(tmp_path: Path) -> None:
+    """A background copied to the whiteboard gives a calibration that looks good."""
     files = [tmp_path / stage / "p.png" for stage in ("mirror", "whiteboard", "background")]
     for number, path in enumerate(files):
         path.parent.mkdir()
@@ -148,7 +146,7 @@ def test_a_copied_picture_is_refused_and_both_places_named(tmp_path: Path) -> No
     assert refusal.value.where == str(files[2])
 
 
-def test_hidden_files_beside_the_pictures_are_no_pictures(tmp_path: Path) -> None:
+def test_hidden_files_are_not_images(tmp_path: Path) -> None:
     """Some systems leave such files on every disk that they copy to."""
     session = read_session(session_folder(tmp_path))
     (tmp_path / "mirror").mkdir()
@@ -158,14 +156,12 @@ def test_hidden_files_beside_the_pictures_are_no_pictures(tmp_path: Path) -> Non
 
 
 def write_rgb(path: Path, rgb: np.ndarray) -> None:
-    """Write an RGB picture with another library's idea of colour order taken into account."""
+    """Write an RGB image, converted to the colour order of OpenCV."""
     assert cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1]))
 
 
 @pytest.mark.parametrize(("kind", "top", "ending"), [("u1", 255, "png"), ("u2", 65535, "tif")])
-def test_pictures_are_red_first_and_linear(
-    tmp_path: Path, kind: str, top: int, ending: str
-) -> None:
+def test_images_are_red_first_and_linear(tmp_path: Path, kind: str, top: int, ending: str) -> None:
     rgb = np.zeros((4, 5, 3), kind)
     rgb[0, 0] = [top, top // 3, 0]
     write_rgb(tmp_path / f"p.{ending}", rgb)
@@ -194,18 +190,18 @@ def test_a_lone_frame_is_passed_on() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"not a picture", b"\x89PNG\r\n\x1a\n" + b"\0" * 40])
-def test_a_file_that_is_no_picture_is_refused(tmp_path: Path, data: bytes) -> None:
+def test_a_file_that_is_not_an_image_is_refused(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "p.png").write_bytes(data)
-    with pytest.raises(InputError, match="not a whole"):
+    with pytest.raises(InputError, match="not a complete"):
         read_picture(tmp_path / "p.png")
 
 
 def test_a_jpeg_under_another_name_is_refused(tmp_path: Path) -> None:
-    """Its losses and its gamma would go into the calibration unseen."""
+    """Its compression losses and its gamma would enter the calibration unnoticed."""
     done, data = cv2.imencode(".jpg", np.full((8, 8, 3), 90, np.uint8))
     assert done
     (tmp_path / "p.png").write_bytes(data.tobytes())
-    with pytest.raises(InputError, match="not a whole PNG or TIFF"):
+    with pytest.raises(InputError, match="not a complete PNG or TIFF"):
         read_picture(tmp_path / "p.png")
 
 
@@ -227,14 +223,14 @@ def test_a_damaged_png_is_refused_wherever_the_damage_is(
         read_picture(path)
 
 
-def test_a_picture_that_declares_a_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
+def test_an_image_that_declares_a_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
     head = b"\x89PNG\r\n\x1a\n" + b"\0\0\0\rIHDR" + (2**20).to_bytes(4, "big") * 2
     (tmp_path / "p.png").write_bytes(head + b"\0" * 20)
     with pytest.raises(InputError, match="declares"):
         read_picture(tmp_path / "p.png")
 
 
-def test_a_grey_picture_is_refused_where_colour_is_needed() -> None:
+def test_a_grey_image_is_refused_where_colour_is_needed() -> None:
     with pytest.raises(InputError, match="grey"):
         require_colour(Picture("g", np.full((2, 2, 3), 0.5, np.float32)), where="g")
     with pytest.raises(InputError, match="saturated"):

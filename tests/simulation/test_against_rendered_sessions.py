@@ -92,12 +92,12 @@ def design_of(folder: Path) -> SensorDesign:
 
 
 def picture_of(path: Path) -> np.ndarray:
-    """Return a rendered picture as linear RGB, 0..1."""
+    """Return a rendered image as linear RGB, 0..1."""
     return cv2.imread(str(path), cv2.IMREAD_COLOR)[..., ::-1] / 255.0
 
 
 def surface_of(path: Path) -> PressedSurface:
-    """Return the depth map that a press was rendered from."""
+    """Return the depth map of a rendered press."""
     with np.load(path) as truth:
         return PressedSurface(
             truth["depth_mm"].astype(float),
@@ -117,7 +117,7 @@ def test_whiteboard_matches_the_path_tracer_but_for_one_exposure(
     simulated = VirtualSensor(design_of(folder)).brightness(Whiteboard())
     clear = (rendered > 0.1) & (simulated > 0.05)
     ratio = rendered[clear] / simulated[clear]
-    # At 0.1 one 8-bit step is 2 % either way; B has inter-reflection, which is not simulated.
+    # At 0.1 one 8-bit step is 2 %; B has interreflection, which is not simulated.
     assert np.percentile(np.abs(ratio / np.median(ratio) - 1.0), 98) < spread
     channels = [
         np.median(rendered[..., k][clear[..., k]] / simulated[..., k][clear[..., k]])
@@ -143,7 +143,7 @@ def test_press_on_a_plain_sensor_matches_the_path_tracer(
     touched = np.abs(pressed - bare).max(axis=2) > 0.004
     error = (rendered - pressed)[touched]
     assert touched.sum() > 50_000
-    # The camera's noise is 0.6 steps of 255; the rest is edges a fraction of a pixel wide.
+    # The camera noise is 0.6 steps of 255; the rest are edges a fraction of a pixel wide.
     assert np.abs(error.mean(axis=0)).max() < 0.2 / 255.0
     assert np.sqrt((error**2).mean()) < 1.5 / 255.0
     assert np.sqrt((error**2).mean()) < 0.1 * np.sqrt(((rendered - bare)[touched] ** 2).mean())

@@ -1,4 +1,4 @@
-"""The pressed membrane against the closed solution of the elastic foundation."""
+"""The pressed membrane compared with the closed solution of the elastic foundation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gelpolight_core.simulation.indenters import (
     coin,
     nut,
     press,
-    relief_from_picture,
+    relief_from_image,
 )
 
 
@@ -94,17 +94,17 @@ def test_turned_cuboid_keeps_its_side_and_its_angle() -> None:
 def test_reliefs_are_pressed_to_the_depth_asked_for(make: object) -> None:
     surface = press(make(depth_mm=0.5, pitch_mm=0.08), yaw_deg=20.0, pitch_mm=0.08)
     assert surface.depth_mm.max() == pytest.approx(0.5, abs=0.005)
-    # It touches over more than its rim and less than the whole circle that holds it.
+    # The contact is larger than the rim and smaller than the whole circle.
     assert 3.0 < surface.contact.sum() * 0.08**2 < math.pi * 4.0**2
     assert surface.depth_mm[surface.contact].std() > 0.01
 
 
-def test_a_height_picture_is_pressed_as_it_shows(tmp_path: Path) -> None:
+def test_a_height_image_is_pressed_with_its_shape(tmp_path: Path) -> None:
     grey = np.zeros((41, 61), np.uint16)
     grey[10:31, 10:51] = 65535
     path = tmp_path / "plate.png"
     path.write_bytes(cv2.imencode(".png", grey)[1].tobytes())
-    plate = relief_from_picture(path, width_mm=6.0, relief_mm=0.4, depth_mm=0.3)
+    plate = relief_from_image(path, width_mm=6.0, relief_mm=0.4, depth_mm=0.3)
     x, y = np.meshgrid(np.array([0.0, 1.9, 2.5]), np.array([0.0, 0.9]))
     # White is 0.3 mm deep, black 0.4 mm higher up, above the undeformed membrane.
     expected = [[0.3, 0.3, -0.1], [0.3, 0.3, -0.1]]
@@ -112,12 +112,12 @@ def test_a_height_picture_is_pressed_as_it_shows(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no picture"])
-def test_what_is_no_height_picture_is_refused(tmp_path: Path, content: bytes | None) -> None:
+def test_an_invalid_height_image_is_refused(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "heights.png"
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(InputError, match=r"heights\.png"):
-        relief_from_picture(path, width_mm=6.0, relief_mm=0.4, depth_mm=0.3)
+        relief_from_image(path, width_mm=6.0, relief_mm=0.4, depth_mm=0.3)
 
 
 def test_membrane_is_at_rest_at_the_edge_of_the_patch() -> None:

@@ -1,4 +1,4 @@
-"""Long renderings can be stopped, and looking up to be stopped changes no picture."""
+"""Long renderings can be stopped, and the check for a stop changes no image."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ DESIGN = SensorDesign().scaled(0.25)
 
 
 class Stopped(Exception):
-    """What the test stops the work with."""
+    """The exception that the test uses to stop the work."""
 
 
 class StopAfter:
-    """Lets the work look up `count` times, then stops it."""
+    """Allows `count` checks, then stops the work."""
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -55,14 +55,14 @@ def test_pressing_is_stopped(count: int) -> None:
         press(Cuboid(5.0, 1.0), interrupt=StopAfter(count))
 
 
-def test_a_picture_of_a_press_and_of_a_board_are_stopped(sensor: VirtualSensor) -> None:
+def test_images_of_a_press_and_of_a_board_can_be_stopped(sensor: VirtualSensor) -> None:
     state = pressed_membrane(DESIGN, Cuboid(4.0, 1.0), x_mm=0.0, y_mm=0.0)
     for shown in (state, BoardOnTop()):
         with pytest.raises(Stopped):
             sensor.brightness(shown, interrupt=StopAfter(1))
 
 
-def test_work_that_is_let_go_on_gives_the_same_picture(sensor: VirtualSensor) -> None:
+def test_uninterrupted_work_gives_the_same_image(sensor: VirtualSensor) -> None:
     ticks: list[float] = []
     look_up = lambda: ticks.append(time.monotonic())  # noqa: E731
     state = pressed_membrane(DESIGN, Cuboid(4.0, 1.0), x_mm=1.0, y_mm=0.0, interrupt=look_up)
@@ -93,6 +93,6 @@ def test_a_pixels_direction_is_seen_at_that_pixel() -> None:
 def test_the_poses_of_a_session_are_had_one_by_one(sensor: VirtualSensor) -> None:
     poses = checkerboard_poses(DESIGN)
     assert len(poses) == 16
-    # Each fills a good part of the picture: white paper brighter than the room behind it.
+    # Each fills a large part of the image: white paper brighter than the room behind it.
     picture = sensor.brightness(Checkerboard(poses[3]))[..., 0]
     assert 0.1 < (picture > 0.5).mean() < 0.6

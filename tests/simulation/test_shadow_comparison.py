@@ -58,7 +58,7 @@ def test_low_light_shadow_has_the_size_that_the_outline_gives() -> None:
     assert mean == pytest.approx(4.0 * length, rel=0.05)
 
 
-def test_figure_is_a_picture(comparison, tmp_path: Path) -> None:
+def test_the_figure_is_an_image(comparison, tmp_path: Path) -> None:
     draw_shadow_comparison(comparison, tmp_path / "shadow.png")
     picture = cv2.imread(str(tmp_path / "shadow.png"))
     assert picture.shape[0] > 400

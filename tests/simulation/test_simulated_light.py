@@ -1,4 +1,4 @@
-"""The virtual sensor's light, rays and shadows against closed formulas."""
+"""The virtual sensor's light, rays and shadows compared with closed formulas."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PLAIN = MembraneDesign(specular_weight=0.0, variation=0.0, speck_count=0)
 
 
 def small_design(**changes: object) -> SensorDesign:
-    """Return the default sensor with a quiet camera of 160 x 120 pixels."""
+    """Return the default sensor with a noise-free camera of 160 x 120 pixels."""
     return replace(SensorDesign(camera=QUIET, membrane=PLAIN), **changes).scaled(0.125)
 
 
@@ -132,7 +132,7 @@ def test_mirror_spots_stand_at_the_mirror_twins() -> None:
         weight = picture[..., k]
         spot = np.array([(u * weight).sum(), (v * weight).sum()]) / weight.sum()
         expected = camera.fx * twin[:2] / twin[2] + (camera.cx, camera.cy)
-        # 8 x 8 rays per pixel place the centroid of a 5 px disc to a few hundredths.
+        # 8 x 8 rays per pixel locate the centroid of a 5 px disc to a few hundredths.
         assert np.allclose(spot, expected, atol=0.03)
 
 
@@ -177,11 +177,12 @@ def test_a_wall_turned_from_the_camera_is_hidden_behind_the_plateau() -> None:
     middle = (0.0 - surface.y0_mm) / surface.pitch_mm
 
     def depth_seen(x_on_top: float) -> float:
-        # The camera stands at the left: its ray goes right by 0.5 mm per mm towards the membrane.
+        # The camera is at the left: its ray goes right by 0.5 mm per mm towards the membrane.
         cell = ((x_on_top - surface.x0_mm) / surface.pitch_mm, middle)
         return visible_depth(*parts, cell, (-0.5 / surface.pitch_mm, 0.0))
 
-    # The ray over the step's edge meets the flat part 0.5 mm further right: nothing before is seen.
+    # The ray over the edge of the step meets the flat part 0.5 mm further right: nothing before is
+    # visible.
     assert depth_seen(0.45) == pytest.approx(1.0, abs=1e-6)
     assert depth_seen(0.56) == pytest.approx(0.0, abs=1e-6)
     seen = np.array([depth_seen(x) for x in np.linspace(-1.0, 2.0, 400)])
@@ -198,7 +199,7 @@ def test_camera_sees_a_pressed_rim_where_the_projection_puts_it() -> None:
         points = np.hstack([(4.0, 3.0) + along * way, np.full_like(along, -1.0)])
         u, v = np.rint(project_through_layers(design.camera, design.layers, points)).T.astype(int)
         change = np.abs(np.gradient(flat[v, u]))
-        # The face's brightness breaks off at its rim, 2.5 mm from its middle, to a pixel.
+        # The brightness of the face ends at its rim, 2.5 mm from its centre, to a pixel.
         assert along[np.argmax(change > 10.0 * np.median(change[:50]) + 0.01), 0] == pytest.approx(
             2.5, abs=0.06
         )

@@ -1,4 +1,4 @@
-"""A simulated session is a complete session folder, the same for the same seed."""
+"""A simulated session is a complete session folder, identical for the same seed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import pytest
 from gelpolight_core.design.parts import BallPress, Press, SessionDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
+from gelpolight_core.session.closed import ClosedSession, read_any_session
 from gelpolight_core.simulation.boards import board_views
 from gelpolight_core.simulation.session import press_names, simulate_session
 
@@ -36,14 +37,14 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """Return the hash of every picture."""
+    """Return the hash of every image."""
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(folder.rglob("*.png"))
     }
 
 
-def test_every_stage_has_its_pictures(session: Path) -> None:
+def test_every_stage_has_its_images(session: Path) -> None:
     counts = {p.name: len(list(p.glob("*.png"))) for p in session.iterdir() if p.is_dir()}
     assert counts == {
         "checkerboard": 16,
@@ -57,7 +58,24 @@ def test_every_stage_has_its_pictures(session: Path) -> None:
     }
 
 
-def test_pictures_are_colour_and_boards_are_grey(session: Path) -> None:
+def test_a_closed_sensor_shows_background_balls_and_scale_only(
+    session: Path, tmp_path: Path
+) -> None:
+    closed = tmp_path / "closed"
+    simulate_session(replace(DESIGN, presses=()), closed, seed=3, scale=SCALE, closed=True)
+    assert {p.name for p in closed.iterdir() if p.is_dir()} == {
+        "background", "balls", "presses", "truth"
+    }  # fmt: skip
+    same = digests(session)
+    assert all(same[name] == digest for name, digest in digests(closed).items())
+    read = read_any_session(closed)
+    assert isinstance(read, ClosedSession)
+    # The membrane is 34.26 mm behind the lens as refraction shows it, the focal length 346.4 px.
+    assert read.mm_per_px == pytest.approx(34.26 / 346.4, rel=0.02)
+    assert read.ball_radius_mm("ball_01.png") == 4.0
+
+
+def test_images_are_in_colour_and_boards_are_grey(session: Path) -> None:
     for path in session.rglob("*.png"):
         picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         grey = path.parent.name in ("checkerboard", "top_pose")
@@ -70,7 +88,7 @@ def test_description_and_truth_say_what_was_simulated(session: Path) -> None:
     assert text["balls"] == {"ball_00.png": 3.0, "ball_01.png": 4.0}
     truth = json.loads((session / "truth.json").read_text())
     assert truth["camera"]["fx"] == pytest.approx(1385.6 * SCALE)
-    # An LED's place in the camera frame keeps its height below the plane.
+    # The position of an LED in the camera frame keeps its height below the plane.
     normal, offset = np.array(truth["top_plane"]["normal_camera"]), truth["top_plane"]["offset_mm"]
     for led, design in zip(truth["leds"].values(), DESIGN.leds, strict=True):
         assert offset - normal @ led["camera_mm"] == pytest.approx(design.height_mm)
@@ -109,11 +127,11 @@ def test_boards_are_found_where_they_were_put(session: Path) -> None:
             np.array(camera.distortion),
         )
         gaps = np.linalg.norm(corners.reshape(-1, 1, 2) - expected.reshape(1, -1, 2), axis=2)
-        # A square is about ten pixels wide here: the finder is good to a tenth of a pixel.
+        # A square is about ten pixels wide here: the detector is accurate to a tenth of a pixel.
         assert gaps.min(axis=1).mean() < 0.15
 
 
-def test_the_same_seed_gives_the_same_pictures(session: Path, tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_images(session: Path, tmp_path: Path) -> None:
     simulate_session(DESIGN, tmp_path / "again", seed=3, scale=SCALE)
     simulate_session(replace(DESIGN, balls=(), presses=()), tmp_path / "other", seed=4, scale=SCALE)
     assert digests(tmp_path / "again") == digests(session)
@@ -121,9 +139,9 @@ def test_the_same_seed_gives_the_same_pictures(session: Path, tmp_path: Path) ->
     assert all(digest != digests(session)[name] for name, digest in other.items())
 
 
-def test_a_folder_that_holds_files_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_with_files_is_not_changed(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
-    with pytest.raises(InputError, match="files already"):
+    with pytest.raises(InputError, match="already contains files"):
         simulate_session(DESIGN, tmp_path, scale=SCALE)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
 
@@ -141,7 +159,7 @@ def test_progress_can_stop_the_work(tmp_path: Path) -> None:
 def test_a_session_that_cannot_be_finished_leaves_the_folder_as_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Half a session would be taken for a whole one, or stand in the way of the next try."""
+    """Half a session would be mistaken for a complete one, or block the next attempt."""
 
     def full(path: Path, _writer: object) -> None:
         if path.suffix == ".png":
@@ -160,7 +178,7 @@ def test_repeated_presses_get_names_of_their_own() -> None:
 
 
 def test_what_a_design_asks_for_besides_is_there(tmp_path: Path) -> None:
-    """A camera of gamma 2.2 that declares nothing, with a series and single-LED pictures."""
+    """A camera of gamma 2.2 that declares nothing, with a series and single-LED images."""
     design = replace(
         DESIGN,
         balls=(),
@@ -177,7 +195,7 @@ def test_what_a_design_asks_for_besides_is_there(tmp_path: Path) -> None:
     light = [
         (cv2.imread(str(tmp_path / "bent/response" / name))[place] / 255.0) ** 2.2 for name in times
     ]
-    # To half a step of the brighter one: 2.2 / 2 / 255 of its light over its value.
+    # Half a step of the brighter value: 2.2 / 2 / 255 of its light over its value.
     ratio = times["exp_02.png"] / times["exp_01.png"]
     assert light[2] / light[1] == pytest.approx(ratio, rel=0.05)
     for channel, name in zip((2, 1, 0), ("red", "green", "blue"), strict=True):

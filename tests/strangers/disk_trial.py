@@ -19,11 +19,11 @@ from recorded import noisy
 from test_every_file_written import tree
 from written import DRAWN, KINDS, RECORD, Written
 
-from app.shell.log import Log
-from app.shell.settings import Settings
+from app.services.log import Log
+from app.services.settings import Settings
 from app.workspace.workspace import Workspace
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.io.lock import RunLock
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter

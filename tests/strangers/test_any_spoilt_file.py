@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+import fuzz
 import pytest
+from fuzz_kinds import Kind, all_kinds
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "packaging"))
-
-import fuzz  # noqa: E402
-from fuzz_kinds import Kind, all_kinds  # noqa: E402
 
 NAMES = (
     "calibration", "recording", "PNG picture", "TIFF picture", "records", "true depth", "session",

@@ -13,7 +13,7 @@ import pytest
 from recorded import noisy
 from written import calibration
 
-from app.inspect import record_control
+from app.workspace import trash as trash_module
 from app.workspace import workspace as workspace_module
 from app.workspace.sessions import file_time
 from app.workspace.workspace import Workspace
@@ -21,7 +21,7 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.measurement import protocol_run
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
-from gelpolight_core.session.outside import KnownFiles
+from gelpolight_core.session.known_files import KnownFiles
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
 
@@ -39,7 +39,7 @@ class Clock(datetime):
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> type[Clock]:
-    modules: tuple[ModuleType, ...] = (workspace_module, record_control, protocol_run)
+    modules: tuple[ModuleType, ...] = (workspace_module, trash_module, protocol_run)
     for module in modules:
         monkeypatch.setattr(module, "datetime", Clock)
     monkeypatch.setattr(Clock, "shown", NOW)
@@ -85,13 +85,11 @@ def test_a_recording_never_takes_the_name_of_one_of_the_same_second(
 ) -> None:
     first = workspace.recording_path("A")
     first.write_bytes(b"one")
-    also = record_control.recording_path(workspace, "A")
-    also.write_bytes(b"two")
+    workspace.recording_path("A").write_bytes(b"two")
     clock.shown = NOW + timedelta(hours=1)
     workspace.recording_path("A").write_bytes(b"three")
     clock.shown = NOW
     assert not workspace.recording_path("A").exists()
-    assert not record_control.recording_path(workspace, "A").exists()
     assert len(list(first.parent.iterdir())) == 3
 
 

@@ -72,7 +72,7 @@ def test_a_disk_that_is_full_at_any_byte_leaves_the_older_file(
 FAULTS = [
     ("fsync", errno.ENOSPC, "full|No space left"),
     ("fsync", errno.EIO, "cannot be written"),
-    ("replace", errno.EROFS, "can only be read"),
+    ("replace", errno.EROFS, "read-only"),
 ]
 
 

@@ -13,7 +13,8 @@ from gelpolight_core.batch.ledger import BatchLedger
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol_run import open_run
-from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import read_session
 
 HERE = Path(__file__).resolve().parent
 LONGEST_S = 0.5

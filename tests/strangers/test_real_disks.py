@@ -43,7 +43,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, str]]:
 
 @pytest.mark.parametrize(
     ("disk", "words"),
-    [("full", "the disk is full|No space left"), ("read-only", "only be read|Read-only")],
+    [("full", "The disk is full|No space left"), ("read-only", "read-only|Read-only")],
 )
 def test_every_kind_of_file_is_refused_in_a_sentence_and_nothing_is_lost(
     said: dict[str, dict[str, str]], disk: str, words: str

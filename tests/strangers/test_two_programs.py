@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from app.shell.settings import Settings
+from app.services.settings import Settings
 from app.workspace.workspace import Workspace
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.io.lock import RunLock
 from gelpolight_core.records.records import NAME, Records
-from gelpolight_core.session.session import read_picture, read_session
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
 
 HERE = Path(__file__).resolve().parent
@@ -119,7 +120,7 @@ def test_who_decides_second_is_told_in_a_sentence(
     """A decision is never written over one that was not seen."""
     root, done = worked
     said = {sentence for program in done for sentence in program["refused"]}
-    known = ("changed by something else", "another program is holding the records")
+    known = ("Another program has changed", "Another program is using the records")
     assert [sentence for sentence in said if not any(part in sentence for part in known)] == []
     assert read_session(root / "session").decisions.excluded
 
@@ -137,7 +138,7 @@ def test_settings_of_both_are_kept(tmp_path: Path) -> None:
 def test_the_folder_of_a_run_is_written_by_one_program(tmp_path: Path) -> None:
     script = (
         "import sys; from pathlib import Path;"
-        "from gelpolight_core.export.run_lock import RunLock;"
+        "from gelpolight_core.io.lock import RunLock;"
         "held = RunLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.readline()"
     )
     program = subprocess.Popen(

@@ -20,7 +20,7 @@ from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.atomic import NameTakenError, write_atomically
+from gelpolight_core.io.atomic import NameTakenError, write_atomically
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
 from gelpolight_core.recording.reader import Recording
@@ -29,7 +29,7 @@ from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.decisions import Decisions, read_decisions, write_decisions
-from gelpolight_core.session.outside import KnownFiles
+from gelpolight_core.session.known_files import KnownFiles
 from gelpolight_core.simulation.session import session_toml
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -57,7 +57,7 @@ def test_two_programs_that_capture_into_one_session_keep_both_pictures(session: 
 def test_a_new_file_never_takes_the_place_of_another(tmp_path: Path) -> None:
     path = tmp_path / "a"
     write_atomically(path, lambda stream: stream.write(b"one"), new=True)
-    with pytest.raises(NameTakenError, match="a file of this name"):
+    with pytest.raises(NameTakenError, match="A file with this name"):
         write_atomically(path, lambda stream: stream.write(b"two"), new=True)
     assert path.read_bytes() == b"one"
     assert list(tmp_path.iterdir()) == [path]
@@ -92,7 +92,7 @@ def test_a_strangers_session_leads_no_writer_out_of_its_folder(
     (session / name).unlink(missing_ok=True)
     (session / name).symlink_to(target)
     project = CalibrationProject(session)
-    with pytest.raises(InputError, match="a link that leads out of the folder"):
+    with pytest.raises(InputError, match="a link that points outside the folder"):
         match name:
             case "decisions.toml":
                 project.place_spot(0, (1.0, 2.0))
@@ -118,7 +118,7 @@ def test_a_list_of_indenters_that_another_program_changed_is_not_written_over(
     write_indenters(first_indenters(), tmp_path)
     before = KnownFiles([tmp_path / "indenters.json"])
     write_indenters(first_indenters()[:1], tmp_path)
-    with pytest.raises(InputError, match="changed by something else"):
+    with pytest.raises(InputError, match="Another program has changed"):
         before.refuse_changed(tmp_path / "indenters.json")
     assert len(read_indenters(tmp_path)) == 1
 
@@ -186,7 +186,7 @@ def test_a_power_cut_while_decisions_are_written_leaves_the_old_or_the_new_ones(
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from gelpolight_core.export.atomic import write_atomically
+from gelpolight_core.io.atomic import write_atomically
 
 def write(stream):
     stream.write(b"x" * 100_000)

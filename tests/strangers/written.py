@@ -17,7 +17,6 @@ from app.workspace.workspace import Workspace
 from gelpolight_core.batch.ledger import BatchLedger, FrameRow
 from gelpolight_core.batch.settings import BatchSettings, begin_or_go_on
 from gelpolight_core.batch.summary import write_summary
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.board_page import write_board
@@ -28,12 +27,13 @@ from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.protocol import Protocol
 from gelpolight_core.measurement.protocol_file import ProtocolFile, write_protocol_file
 from gelpolight_core.measurement.protocol_run import begin_run, open_run
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.table import write_csv
 from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.file import write_report
+from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.capture import write_picture
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import write_description

@@ -1,1 +1,1 @@
-"""Real cameras: what drivers offer, the drivers, and a camera that survives being unplugged."""
+"""Real cameras: the driver interface, the drivers, and a camera that reconnects."""

@@ -1,4 +1,4 @@
-"""Set a camera's settings, read them back, and say which of them hold."""
+"""Apply a camera's settings, read them back, and report which of them were accepted."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from gelpolight_core.session.camera_settings import CameraSettings
 from gelpolight_core.translation import tr
 
 TRIES = 2
-"""Some cameras take a value only once the one before has gone through."""
+"""Some cameras accept a value only after the previous one was processed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Applied:
-    """A setting that was asked for, and what became of it.
+    """A requested setting and its result.
 
     Attributes
     ----------
     key, label, unit : str
-        Which it is.
+        Key, label and unit of the setting.
     wanted : float
-        What was asked for.
+        Requested value.
     read : float or None
-        What was read back; None where the camera has no such setting.
+        Value read back; None if the camera has no such setting.
     step : float
-        The step that the camera can make.
+        Step size of the camera.
     why : str
-        What the camera said; empty where it said nothing.
+        Error message of the camera; empty if there was none.
     """
 
     key: str
@@ -45,14 +45,14 @@ class Applied:
 
     @property
     def holds(self) -> bool:
-        """Whether the camera has what was asked for, to half a step."""
+        """Whether the camera has the requested value, within half a step."""
         if self.read is None:
             return False
         return abs(self.read - self.wanted) <= max(0.5 * self.step, 0.005 * abs(self.wanted)) + 1e-6
 
     @property
     def sentence(self) -> str:
-        """What people read where it does not hold."""
+        """Message for the user if the value was not accepted."""
         if self.read is None:
             return tr("{what}: the camera has no such setting").format(what=self.label)
         return tr("{what} is {read}, not {wanted}").format(
@@ -66,19 +66,19 @@ class Applied:
 
 
 def apply_settings(camera: OpenCamera, wanted: Mapping[str, float]) -> tuple[Applied, ...]:
-    """Set a camera's settings in the order in which they release each other, and read them back.
+    """Apply settings in the order in which they unlock each other, and read them back.
 
     Parameters
     ----------
     camera : OpenCamera
-        Is delivering; many cameras forget what they were told before.
+        Must be delivering images; many cameras forget earlier settings.
     wanted : mapping
-        Value of each setting.
+        Requested value of each setting.
 
     Raises
     ------
     CameraGone
-        If it is unplugged meanwhile.
+        If the camera is unplugged meanwhile.
     """
     refusals: dict[str, str] = {}
     for _ in range(TRIES):
@@ -102,7 +102,7 @@ def _compare(
     for key in (key for key in ORDER if key in wanted):
         kind, control = CONTROLS[key], there.get(key)
         if kind.automatic and wanted.get(kind.automatic):
-            continue  # the camera sets it as it likes
+            continue  # the camera controls it automatically
         read, step = (None, 0.0) if control is None else (control.value, control.step)
         label, why = kind.label(), refusals.get(key, "")
         found.append(Applied(key, label, kind.unit, wanted[key], read, step, why))
@@ -110,7 +110,7 @@ def _compare(
 
 
 def locked(controls: Iterable[Setting]) -> dict[str, float]:
-    """Return the settings as they are now, with everything fixed that the camera sets by itself."""
+    """Return the present settings, with all automatic settings switched to fixed values."""
     values = {}
     for control in controls:
         held = CONTROLS[control.key].held
@@ -119,19 +119,19 @@ def locked(controls: Iterable[Setting]) -> dict[str, float]:
 
 
 def is_locked(controls: Iterable[Setting]) -> bool:
-    """Whether the camera sets nothing by itself, as far as it tells."""
+    """Return whether the camera reports no automatic setting."""
     return not any(CONTROLS[c.key].held is not None and c.value for c in controls)
 
 
 def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> QualityTable:
-    """Return what a person should know of a lock: the four that matter, and what does not hold.
+    """Return the figures of a lock: the four important settings, and settings not accepted.
 
     Parameters
     ----------
     applied : iterable of Applied
-        What was asked for.
+        Requested settings.
     controls : iterable of Setting
-        The camera's, as read back.
+        Settings of the camera as read back.
     """
     there = {control.key: control for control in controls}
     free = [c for c in there.values() if CONTROLS[c.key].held is not None and c.value]
@@ -147,7 +147,7 @@ def lock_quality(applied: Iterable[Applied], controls: Iterable[Setting]) -> Qua
 
 
 def _lock_advice() -> str:
-    return tr("The camera sets this by itself: press Lock")
+    return tr("The camera sets this automatically: click Lock")
 
 
 def _figure(applied: Applied) -> Figure:
@@ -156,8 +156,8 @@ def _figure(applied: Applied) -> Figure:
     verdict, advice = Verdict.PASS, ""
     if not applied.holds:
         verdict = Verdict.FAIL if serious else Verdict.WARN
-        said = ": ".join(filter(None, (applied.sentence, applied.why)))
-        advice = tr("{said}. Choose a value that the camera takes").format(said=said)
+        text = ": ".join(filter(None, (applied.sentence, applied.why)))
+        advice = tr("{text}. Choose a value that the camera accepts").format(text=text)
     unit = applied.unit
     return Figure(applied.key, applied.label, value, unit, None, None, verdict, advice)
 
@@ -165,21 +165,21 @@ def _figure(applied: Applied) -> Figure:
 def differences(
     stored: CameraSettings, got: Format | None, controls: Iterable[Setting]
 ) -> tuple[str, ...]:
-    """Return a clause for everything that is not as it was when the settings were stored.
+    """Return a clause for every difference from the stored settings.
 
     Parameters
     ----------
     stored : CameraSettings
-        Of a session or a calibration.
+        Settings of a session or a calibration.
     got : Format or None
-        The camera's, as read back; None where it is not known.
+        Format of the camera as read back; None if it is not known.
     controls : iterable of Setting
-        The camera's, as read back.
+        Settings of the camera as read back.
     """
     found = []
     if got is not None and stored.size != (0, 0) and (got.width, got.height) != stored.size:
         found.append(
-            tr("the pictures are {a}, not {b} pixels").format(
+            tr("the image size is {a}, not {b} pixels").format(
                 a=f"{got.width}x{got.height}", b="x".join(map(str, stored.size))
             )
         )

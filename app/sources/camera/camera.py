@@ -1,4 +1,4 @@
-"""A camera that is used by several at once, keeps its settings, and survives being unplugged."""
+"""A camera shared by several users; it keeps its settings and reconnects after unplugging."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ _LOG = logging.getLogger(__name__)
 SILENCE_S = 3.0
 SLOW_OPEN_S = 15.0
 SLOW_REOPEN_S = 2.0
-"""Less than a stream may be silent for."""
+"""Shorter than the silence after which a stream counts its source as lost."""
 CHECK_S = 5.0
 CLOSE_S = 0.5
-"""A camera that is still being opened is left to its thread; who stops a stream waits a second."""
+"""A camera that is still opening is left to its thread; stopping a stream may take only a second.
+"""
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 5.0
 UNSETTLED_FRAMES = 5
-"""A driver holds four pictures that were taken before a setting changed."""
+"""A driver buffers up to four images from before a setting changed."""
 
 Reader = Callable[[Frame], object]
 
@@ -45,27 +46,27 @@ Reader = Callable[[Frame], object]
 @dataclass(slots=True)
 class _Change:
     values: Mapping[str, float] | None
-    """None: lock what is."""
+    """None: lock the present settings."""
     future: Future[tuple[Applied, ...]] = field(default_factory=Future)
 
 
 class Camera:
-    """A camera and the one thread that opens, reads, sets and closes it.
+    """A camera and the single thread that opens, reads, sets and closes it.
 
     Parameters
     ----------
     driver : CameraDriver
         Opens it.
     device : Device
-        Which it is; found again by its identity when it was plugged in elsewhere.
-    told : callable, optional
+        The camera; its identity finds it again after it was plugged into another port.
+    on_change : callable, optional
         Called without argument, in the camera's thread, when :attr:`state` has changed.
     pause_s : float, optional
-        First pause before a camera that went away is tried again; doubles up to ten times.
+        First pause before a lost camera is tried again; doubles up to ten times.
     silence_s : float, optional
-        Without a picture for so long it counts as away.
+        Time without an image after which the camera counts as away.
     check_s : float, optional
-        So often its settings are read again: another program may change them.
+        Interval at which the settings are read again, because another program may change them.
     """
 
     def __init__(
@@ -73,13 +74,13 @@ class Camera:
         driver: CameraDriver,
         device: Device,
         *,
-        told: Callable[[], object] = lambda: None,
+        on_change: Callable[[], object] = lambda: None,
         pause_s: float = FIRST_PAUSE_S,
         silence_s: float = SILENCE_S,
         check_s: float = CHECK_S,
     ) -> None:
         self.device = device
-        self._driver, self._told = driver, told
+        self._driver, self._on_change = driver, on_change
         self._pause_s, self._silence_s, self._check_s = pause_s, silence_s, check_s
         self._lock = threading.Lock()
         self._state = CameraState()
@@ -93,28 +94,28 @@ class Camera:
         self._since_s = self._checked_s = 0.0
         self._was_live = False
 
-    # Any thread
+    # Called from any thread
 
     @property
     def state(self) -> CameraState:
-        """How it is now."""
+        """The present state."""
         with self._lock:
             return self._state
 
     @property
     def wanted(self) -> CameraSettings | None:
-        """How it is set whenever it is opened; None: as it comes."""
+        """The settings applied whenever the camera is opened; None: the camera's defaults."""
         with self._lock:
             return self._wanted
 
     @property
     def settling(self) -> bool:
-        """Whether it has yet to do what it was told."""
+        """Whether a request is still waiting."""
         with self._lock:
             return self._pending > 0 or self._reopen.is_set()
 
     def trouble(self) -> str:
-        """Return why no pictures come, as a sentence; empty while all is well."""
+        """Return why no images arrive, as a sentence; empty if all is well."""
         with self._lock:
             state, silent_s = self._state, time.monotonic() - self._since_s
         if state.phase == "away":
@@ -128,14 +129,14 @@ class Camera:
 
     @property
     def reopening(self) -> bool:
-        """Whether it was live and is being opened anew for a while, with nothing wrong."""
+        """Whether the camera is being reopened for a short time, without an error."""
         with self._lock:
             silent_s = time.monotonic() - self._since_s
-            anew = self._was_live and self._state.phase == "opening"
-            return anew and not self._state.sentence and silent_s > SLOW_REOPEN_S
+            reopening = self._was_live and self._state.phase == "opening"
+            return reopening and not self._state.sentence and silent_s > SLOW_REOPEN_S
 
     def attach(self, reader: Reader) -> None:
-        """Hand every frame to `reader`, in the camera's thread; the first one opens the camera."""
+        """Send frames to `reader` in the camera's thread; the first reader opens the camera."""
         with self._lock:
             self._readers.append(reader)
             if len(self._readers) > 1:
@@ -153,7 +154,7 @@ class Camera:
             self._thread.start()
 
     def detach(self, reader: Reader) -> None:
-        """Hand no more frames to `reader`; the last one closes the camera, without a long wait."""
+        """Stop sending frames to `reader`; the last one closes the camera without a long wait."""
         with self._lock:
             if reader not in self._readers:
                 return
@@ -167,7 +168,7 @@ class Camera:
             join(thread, CLOSE_S)
 
     def want(self, settings: CameraSettings | None) -> None:
-        """Set it so whenever it is opened, and now; another format opens it anew."""
+        """Apply settings now and whenever the camera is opened; another format reopens it."""
         with self._lock:
             before, self._wanted = self._wanted, settings
             live = self._state.phase == "live"
@@ -179,13 +180,13 @@ class Camera:
             self.change(settings.controls)
 
     def change(self, values: Mapping[str, float]) -> Future[tuple[Applied, ...]]:
-        """Set some settings between two pictures; the future tells what became of them."""
+        """Change some settings between two images; the future returns the results."""
         return self._submit(_Change(dict(values)))
 
     def lock(self) -> Future[tuple[Applied, ...]]:
-        """Fix everything that it sets by itself at what it is then, now and whenever it is opened.
+        """Fix all automatic settings at their values of that moment, now and whenever it is opened.
 
-        The future tells what became of it.
+        The future returns the results.
         """
         return self._submit(_Change(None))
 
@@ -199,7 +200,7 @@ class Camera:
         return change.future
 
     def settings_now(self) -> CameraSettings:
-        """Return how it is set, to be stored."""
+        """Return the present settings, to be stored."""
         state = self.state
         base = self._settings(state.format or format_of(self.wanted))
         return replace(base, controls={c.key: c.value for c in state.controls})
@@ -212,10 +213,11 @@ class Camera:
         size = got.width, got.height
         return replace(base, pixel_format=got.code, size=size, rate_hz=got.rate_hz)
 
-    # The camera's own thread
+    # In the camera's own thread
 
     def _run(self, end: threading.Event, before: threading.Thread | None) -> None:
-        # A driver that still hangs from the last time has the camera; two would not get it.
+        # A driver that still hangs from the last use blocks the camera; a second one could not open
+        # it.
         while before is not None and before.is_alive():
             if end.wait(0.05):
                 return
@@ -240,9 +242,9 @@ class Camera:
         self._fail_changes()
 
     def _use(self, end: threading.Event) -> None:
-        """Open the camera, and hand its pictures on until it goes away or shall be reopened."""
+        """Open the camera and pass its images on until it goes away or must be reopened."""
         with self._lock:
-            # Its sentence stays, where it was away: it is, until there is a picture.
+            # If it was away, its error message stays until an image arrives.
             self._state = replace(self._state, phase="opening")
             self._since_s = time.monotonic()
         self._reopen.clear()
@@ -252,7 +254,7 @@ class Camera:
             raise CameraGone(
                 tr("the camera is not plugged in"),
                 where=self.device.name,
-                advice=tr("Plug it in; it goes on by itself"),
+                advice=tr("Plug it in; it then continues automatically"),
             )
         offered = self._driver.formats(device)
         asked = format_of(wanted) or best_format(offered)
@@ -261,23 +263,23 @@ class Camera:
         opened = self._driver.open(device, asked)
         try:
             if not end.is_set():
-                self._first_picture(opened, end, offered, wanted)
+                self._first_image(opened, end, offered, wanted)
             while not end.is_set() and not self._reopen.is_set():
-                self._next_picture(opened, end)
+                self._next_image(opened, end)
                 self._carry_out_changes(opened)
         finally:
             self._fail_changes()
             opened.close()
 
-    def _first_picture(
+    def _first_image(
         self,
         opened: OpenCamera,
         end: threading.Event,
         offered: tuple[Format, ...],
         wanted: CameraSettings | None,
     ) -> None:
-        """Wait for the camera to deliver, then set it: many forget what they were told before."""
-        self._picture(opened, end)
+        """Wait until the camera delivers, then set it: many cameras forget earlier settings."""
+        self._next_frame(opened, end)
         applied = apply_settings(opened, {} if wanted is None else wanted.controls)
         got = opened.format
         state = CameraState("live", "", got, offered, opened.controls(), applied)
@@ -286,10 +288,10 @@ class Camera:
             self._was_live = True
             self._unsettled = UNSETTLED_FRAMES if applied else 0
             self._checked_s = self._since_s
-        self._told()
+        self._on_change()
 
-    def _picture(self, opened: OpenCamera, end: threading.Event) -> Frame | None:
-        """Wait for a picture as long as a camera may be silent; None when it shall end."""
+    def _next_frame(self, opened: OpenCamera, end: threading.Event) -> Frame | None:
+        """Wait for an image as long as a camera may be silent; None when the thread must end."""
         until_s = time.monotonic() + self._silence_s
         while not (end.is_set() or self._reopen.is_set()):
             read = opened.read()
@@ -303,8 +305,8 @@ class Camera:
                 raise self._silent(self._silence_s)
         return None
 
-    def _next_picture(self, opened: OpenCamera, end: threading.Event) -> None:
-        frame = self._picture(opened, end)
+    def _next_image(self, opened: OpenCamera, end: threading.Event) -> None:
+        frame = self._next_frame(opened, end)
         if frame is None:
             return
         with self._lock:
@@ -333,24 +335,24 @@ class Camera:
             if change.future.set_running_or_notify_cancel():
                 change.future.set_result(applied)
         if changes:
-            self._told()
+            self._on_change()
         elif time.monotonic() - self._checked_s > self._check_s:
             self._check(opened)
 
     def _check(self, opened: OpenCamera) -> None:
-        """Look whether another program, or the camera by itself, has set something."""
+        """Check whether another program, or the camera itself, has changed a setting."""
         self._checked_s = time.monotonic()
         controls = opened.controls()
         if controls != self.state.controls:
             with self._lock:
                 self._state = replace(self._state, controls=controls)
-            self._told()
+            self._on_change()
 
     def _went_away(self, sentence: str) -> None:
         with self._lock:
             self._state = replace(self._state, phase="away", sentence=sentence)
         self._fail_changes()
-        self._told()
+        self._on_change()
 
     def _fail_changes(self) -> None:
         with self._lock:
@@ -362,23 +364,23 @@ class Camera:
 
     def _away(self) -> InputError:
         return CameraGone(
-            tr("the camera gives no pictures now, so that it cannot be set"),
+            tr("the camera delivers no images now and cannot be set"),
             where=self.device.name,
-            advice=tr("Wait until its picture is there"),
+            advice=tr("Wait until an image arrives"),
         )
 
     def _silent(self, silent_s: float) -> CameraGone:
         return CameraGone(
-            tr("no picture has come for {s:.0f} seconds").format(s=silent_s),
+            tr("no image has arrived for {s:.0f} seconds").format(s=silent_s),
             where=self.device.name,
-            advice=tr("Check the camera and its cable; it is tried again by itself"),
+            advice=tr("Check the camera and its cable; the program tries again automatically"),
         )
 
     def _fault(self, error: Exception) -> CameraGone:
         return CameraGone(
-            tr("a fault of this program stopped the pictures ({kind}); the log has it").format(
+            tr("an internal error ({kind}) stopped the images; see the log").format(
                 kind=type(error).__name__
             ),
             where=self.device.name,
-            advice=tr("It is tried again by itself"),
+            advice=tr("The program tries again automatically"),
         )

@@ -1,4 +1,4 @@
-"""How a camera is, as everybody may read it."""
+"""The state of a camera; any thread may read it."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ Phase = Literal["closed", "opening", "live", "away"]
 
 @dataclass(frozen=True, slots=True)
 class CameraState:
-    """How a camera is.
+    """The state of a camera.
 
     Attributes
     ----------
     phase : str
-        ``closed``: nobody uses it; ``opening``; ``live``; ``away``: tried again and again.
+        ``closed`` (not used), ``opening``, ``live``, or ``away`` (tried again repeatedly).
     sentence : str
-        Why it is away.
+        Why the camera is away.
     format : Format or None
-        As read back; None before it was opened.
+        Format as read back; None before the camera was opened.
     offered : tuple of Format
-        What it lists; empty where the system does not tell.
+        Formats that the camera lists; empty if the system does not report them.
     controls : tuple of Setting
-        As the camera told them last.
+        Settings as last reported by the camera.
     applied : tuple of Applied
-        The settings that it was asked for when it was opened or set, and what became of them.
+        Settings requested when the camera was opened or set, with their results.
     """
 
     phase: Phase = "closed"
@@ -42,7 +42,7 @@ class CameraState:
 
 
 def format_of(settings: CameraSettings | None) -> Format | None:
-    """Return the format that is stored with settings; None where it is not."""
+    """Return the format stored with settings; None if it is not stored."""
     if settings is None or not settings.pixel_format or settings.size == (0, 0):
         return None
     return Format(settings.pixel_format, *settings.size, settings.rate_hz)

@@ -1,4 +1,4 @@
-"""The settings of cameras: their names in files, what people read, and in which order they go."""
+"""The settings of cameras: their names in files, their labels, and the order to apply them."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from gelpolight_core.translation import tr
 
 @dataclass(frozen=True, slots=True)
 class ControlKind:
-    """A setting that cameras may have.
+    """A setting that a camera may have.
 
     Attributes
     ----------
     label : callable
-        Returns what people read.
+        Returns the label for the user.
     unit : str
-        Of its value; empty for the camera's own scale.
+        Unit of the value; empty for the camera's own scale.
     automatic : str
-        Key of the switch that leaves it to the camera; empty where there is none.
+        Key of the switch for the automatic mode; empty if there is none.
     switch : bool
-        Whether it is on (1) or off (0).
+        Whether it is a switch, on (1) or off (0).
     held : float or None
-        What it is locked to; None: what it has.
+        Value when locked; None: its present value.
     """
 
     label: Callable[[], str]
@@ -33,20 +33,18 @@ class ControlKind:
     held: float | None = None
 
 
-# Switches go before what they release; that order is the one in which settings are applied.
+# Switches come before the settings that they unlock; settings are applied in this order.
 CONTROLS: Mapping[str, ControlKind] = {
-    "exposure_auto": ControlKind(lambda: tr("Exposure by the camera"), switch=True, held=0.0),
+    "exposure_auto": ControlKind(lambda: tr("Automatic exposure"), switch=True, held=0.0),
     "exposure_ms": ControlKind(lambda: tr("Exposure"), "ms", "exposure_auto"),
-    "white_balance_auto": ControlKind(
-        lambda: tr("White balance by the camera"), switch=True, held=0.0
-    ),
+    "white_balance_auto": ControlKind(lambda: tr("Automatic white balance"), switch=True, held=0.0),
     "white_balance_k": ControlKind(lambda: tr("White balance"), "K", "white_balance_auto"),
-    "gain_auto": ControlKind(lambda: tr("Gain by the camera"), switch=True, held=0.0),
+    "gain_auto": ControlKind(lambda: tr("Automatic gain"), switch=True, held=0.0),
     "gain": ControlKind(lambda: tr("Gain"), "", "gain_auto"),
-    "focus_auto": ControlKind(lambda: tr("Focus by the camera"), switch=True, held=0.0),
+    "focus_auto": ControlKind(lambda: tr("Automatic focus"), switch=True, held=0.0),
     "focus": ControlKind(lambda: tr("Focus"), "", "focus_auto"),
     "rate_follows_exposure": ControlKind(
-        lambda: tr("Rate follows the exposure"), switch=True, held=0.0
+        lambda: tr("Exposure may lower the frame rate"), switch=True, held=0.0
     ),
     "power_line_hz": ControlKind(lambda: tr("Mains frequency"), "Hz"),
     "gamma": ControlKind(lambda: tr("Gamma")),
@@ -58,4 +56,4 @@ CONTROLS: Mapping[str, ControlKind] = {
 }
 ORDER = tuple(CONTROLS)
 MAIN = ("exposure_ms", "white_balance_k", "gain", "focus")
-"""What is locked first of all."""
+"""The settings that are most important to lock."""

@@ -1,4 +1,4 @@
-"""What a driver of cameras offers; behind it everything is the system's, before it ours."""
+"""The interface of camera drivers, which hides the differences between systems."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from app.sources.source import Setting, SourceLost
 from gelpolight_core.translation import tr
 
 UNCOMPRESSED = ("RGB3", "BGR3", "YUYV", "UYVY", "NV12", "NV21", "YU12", "YV12")
-"""In the order of preference: full colour, colour at half width, at half width and height."""
+"""In order of preference: full colour, colour at half width, colour at half width and height."""
 COMPRESSED = ("MJPG", "JPEG")
 
 
 class CameraGone(SourceLost):
-    """The camera is not there, is in use elsewhere, or has stopped; it may come back."""
+    """The camera is missing, in use by another program, or has stopped; it may come back."""
 
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """A camera that is plugged in.
+    """A connected camera.
 
     Attributes
     ----------
     identity : str
-        Tells it from others, whatever the order in which they were plugged in: vendor and product,
-        and its serial number or place where the system tells them.
+        Identifies the camera independently of the order of connection: vendor and product, and
+        its serial number or port if the system reports them.
     name : str
-        What people read.
+        Name shown to the user.
     model : str
-        Vendor and product, ``046d:081b``; empty where they are not known.
+        Vendor and product, ``046d:081b``; empty if they are not known.
     place : str
-        What the driver opens it by; changes when it is plugged in again.
+        Address that the driver opens; changes when the camera is plugged in again.
     """
 
     identity: str
@@ -45,7 +45,7 @@ class Device:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How a camera sends its pictures.
+    """How a camera sends its images.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Format:
     width, height : int
         In pixels.
     rate_hz : float
-        Pictures per second.
+        Images per second.
     """
 
     code: str
@@ -64,70 +64,70 @@ class Format:
 
     @property
     def compressed(self) -> bool:
-        """Whether the pictures lose what JPEG loses."""
+        """Whether the images have compression losses, as with JPEG."""
         return self.code not in UNCOMPRESSED
 
     def __str__(self) -> str:
-        """Return it for people."""
-        text = tr("{code} {w} x {h} at {hz:g} pictures/s")
+        """Return the format as text for the user."""
+        text = tr("{code} {w} x {h} at {hz:g} images/s")
         return text.format(code=self.code, w=self.width, h=self.height, hz=self.rate_hz)
 
 
 class OpenCamera(Protocol):
-    """A camera that delivers. Pictures are taken by one thread, settings by any."""
+    """A camera that delivers. One thread reads the images; any thread may change settings."""
 
     @property
     def format(self) -> Format:
-        """The format as read back, which need not be the one that was asked for."""
+        """The format as read back, which may differ from the requested one."""
 
     def read(self) -> tuple[NDArray[np.uint8], float] | None:
-        """Wait for the next picture; (height, width, 3) RGB, and when it came (monotonic, s).
+        """Wait for the next image; (height, width, 3) RGB, and its arrival time (monotonic, s).
 
-        None where none has come in the driver's own time.
+        None if none arrives within the driver's own time limit.
 
         Raises
         ------
         CameraGone
-            If there will be no more.
+            If there will be no more images.
         """
 
     def controls(self) -> tuple[Setting, ...]:
-        """Return what can be set, as the camera tells it now."""
+        """Return the settings as the camera reports them now."""
 
     def set(self, key: str, value: float) -> None:
-        """Ask for a value; only :meth:`controls` tells what became of it.
+        """Request a value; :meth:`controls` returns the value that was accepted.
 
         Raises
         ------
         InputError
-            If the camera refuses aloud.
+            If the camera reports an error.
         """
 
     def close(self) -> None:
-        """Give it back."""
+        """Release the camera."""
 
 
 class CameraDriver(Protocol):
-    """Finds and opens cameras; may be asked by any thread."""
+    """Finds and opens cameras; may be used by any thread."""
 
     def devices(self) -> tuple[Device, ...]:
-        """Return the cameras that are plugged in."""
+        """Return the connected cameras."""
 
     def formats(self, device: Device) -> tuple[Format, ...]:
-        """Return the formats that a camera lists; none where the system does not tell them."""
+        """Return the formats that a camera lists; none if the system does not report them."""
 
     def open(self, device: Device, wanted: Format | None) -> OpenCamera:
-        """Open a camera, which may take seconds; None: as the camera comes.
+        """Open a camera, which may take seconds; format None: the camera's default.
 
         Raises
         ------
         CameraGone
-            If it is not there or in use.
+            If the camera is missing or in use.
         """
 
 
 def find_device(devices: tuple[Device, ...], identity: str, model: str) -> Device | None:
-    """Return the camera that was meant; where it moved, the only one of its make."""
+    """Return the given camera; if it was moved, the only connected one of the same model."""
     for device in devices:
         if device.identity == identity:
             return device
@@ -136,10 +136,10 @@ def find_device(devices: tuple[Device, ...], identity: str, model: str) -> Devic
 
 
 def best_format(formats: tuple[Format, ...], size: tuple[int, int] | None = None) -> Format | None:
-    """Return the format to calibrate with, of those that a camera lists.
+    """Return the best format for calibration among those that a camera lists.
 
-    Of the size asked for, where there is one; then uncompressed; then the largest that comes at
-    five pictures a second at least; then the fastest.
+    The requested size if there is one; then uncompressed; then the largest with at least five
+    images per second; then the fastest.
     """
     usable = [f for f in formats if f.code in UNCOMPRESSED + COMPRESSED]
     if not usable:
@@ -162,15 +162,15 @@ def best_format(formats: tuple[Format, ...], size: tuple[int, int] | None = None
 
 
 def compression_warning(chosen: Format, offered: tuple[Format, ...]) -> str:
-    """Return what speaks against a format in one sentence; empty where nothing does."""
+    """Return the drawback of a format in one sentence; empty if there is none."""
     if not chosen.compressed:
         return ""
     if any(not f.compressed for f in offered):
         return tr(
-            "{code} pictures are compressed and can be wrong by up to 19 grey levels: choose an"
-            " uncompressed format to calibrate, even a slower one."
+            "{code} images are compressed and can be wrong by up to 19 grey levels. Choose an "
+            "uncompressed format to calibrate, even if it is slower."
         ).format(code=chosen.code)
     return tr(
-        "This camera has compressed pictures only ({code}), which can be wrong by up to 19 grey"
-        " levels: average many frames, and expect more noise in the depth."
+        "This camera has only compressed images ({code}). They can be wrong by up to 19 grey "
+        "levels. Average many frames, and expect more noise in the depth."
     ).format(code=chosen.code)

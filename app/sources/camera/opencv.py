@@ -1,4 +1,4 @@
-"""Cameras through OpenCV, with what it cannot do asked of the system: names, formats, settings."""
+"""Cameras through OpenCV; names, formats and settings come from the operating system."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from app.sources.source import Setting
 from gelpolight_core.translation import tr
 
 SLOW_READ_S = 2.5
-"""OpenCV answers a time-out with the picture before, and says that all is well."""
+"""After a time-out OpenCV returns the previous image and reports success."""
 LINUX = sys.platform.startswith("linux")
 
 
 def camera_interface() -> int:
-    """Return OpenCV's number of this system's own camera interface."""
+    """Return OpenCV's number of this system's camera interface."""
     if LINUX:
         return cv2.CAP_V4L2
-    # DirectShow opens in a fraction of the time that Media Foundation takes, and sets more.
+    # DirectShow opens much faster than Media Foundation, and can set more.
     return cv2.CAP_DSHOW if sys.platform == "win32" else cv2.CAP_AVFOUNDATION
 
 
 class OpenCvDriver:
-    """The cameras of this machine.
+    """The cameras of this computer.
 
     Parameters
     ----------
     capture : callable, optional
-        What opens: ``cv2.VideoCapture``, given a place and an interface.
+        Opens a capture from an address and an interface, as ``cv2.VideoCapture``.
     interface : int, optional
-        OpenCV's number of it; that of this system without it.
+        OpenCV's number of the interface; by default that of this system.
     """
 
     def __init__(
@@ -50,13 +50,13 @@ class OpenCvDriver:
         self._interface = camera_interface() if interface is None else interface
 
     def devices(self) -> tuple[Device, ...]:
-        """Return the cameras that are plugged in."""
-        from cv2_enumerate_cameras import enumerate_cameras  # asks the system as it is loaded
+        """Return the connected cameras."""
+        from cv2_enumerate_cameras import enumerate_cameras  # queries the system when imported
 
         return tuple(_device(found) for found in enumerate_cameras(self._interface))
 
     def formats(self, device: Device) -> tuple[Format, ...]:
-        """Return the formats that a camera lists, those that OpenCV can read."""
+        """Return the listed formats of a camera that OpenCV can read."""
         if not self._is_v4l2:
             return ()
         found = V4l2(device.place)
@@ -69,15 +69,17 @@ class OpenCvDriver:
     def open(self, device: Device, wanted: Format | None) -> OpenCvCamera:
         """Open a camera, which may take seconds."""
         controls: V4l2 | None = V4l2(device.place) if self._is_v4l2 else None
-        place = device.place if not device.place.isdigit() else int(device.place)
-        capture = self._capture(place, self._interface)
+        address = device.place if not device.place.isdigit() else int(device.place)
+        capture = self._capture(address, self._interface)
         if not capture.isOpened():
             if controls is not None:
                 controls.close()
             raise CameraGone(
                 tr("the camera cannot be opened"),
                 where=device.name,
-                advice=tr("Close every other program that shows its picture, or plug it in again"),
+                advice=tr(
+                    "Close all other programs that use it, or unplug it and plug it in again"
+                ),
             )
         if wanted is not None:
             _ask_for(capture, wanted)
@@ -89,16 +91,16 @@ class OpenCvDriver:
 
 
 class OpenCvCamera:
-    """A capture of OpenCV that is open.
+    """An open OpenCV capture.
 
     Parameters
     ----------
     device : Device
-        Whose it is.
+        The camera.
     capture : cv2.VideoCapture
-        Belongs to this from now on.
+        Owned by this object from now on.
     controls : V4l2 or Properties
-        What sets it.
+        Access to its settings.
     """
 
     def __init__(self, device: Device, capture: Any, controls: V4l2 | Properties) -> None:
@@ -118,7 +120,7 @@ class OpenCvCamera:
         )
 
     def read(self) -> tuple[NDArray[np.uint8], float] | None:
-        """Wait for the next picture, RGB; None where none has come in OpenCV's own time."""
+        """Wait for the next image, RGB; None if none arrives within OpenCV's own time limit."""
         began_s = time.monotonic()
         good = self._capture.grab()
         came_s = time.monotonic()
@@ -127,60 +129,60 @@ class OpenCvCamera:
         good, bgr = self._capture.retrieve() if good else (False, None)
         if not good or bgr is None or not bgr.size:
             raise CameraGone(
-                tr("the camera gives no more pictures"),
+                tr("the camera delivers no more images"),
                 where=self._device.name,
                 advice=tr("Check its cable"),
             )
         return _rgb(bgr), came_s
 
     def controls(self) -> tuple[Setting, ...]:
-        """Return what can be set."""
+        """Return the settings."""
         return self._controls.controls()
 
     def set(self, key: str, value: float) -> None:
-        """Ask for a value."""
+        """Request a value."""
         self._controls.set(key, value)
 
     def close(self) -> None:
-        """Give the camera back."""
+        """Release the camera."""
         self._capture.release()
         self._controls.close()
 
 
 def _ask_for(capture: Any, wanted: Format) -> None:
-    """Ask for a format in the order in which drivers take it; what came of it is read back."""
+    """Request a format in the order that drivers need; the result is read back."""
     capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*wanted.code.ljust(4)))
     capture.set(cv2.CAP_PROP_FRAME_WIDTH, wanted.width)
     capture.set(cv2.CAP_PROP_FRAME_HEIGHT, wanted.height)
     capture.set(cv2.CAP_PROP_FPS, wanted.rate_hz)
 
 
-def _rgb(picture: NDArray[Any]) -> NDArray[np.uint8]:
-    """Return OpenCV's blue, green, red (or grey) as red, green, blue in memory of its own."""
-    bits = picture if picture.dtype == np.uint8 else (picture >> 8).astype(np.uint8)
+def _rgb(image: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return OpenCV's blue, green, red (or grey) as red, green, blue in separate memory."""
+    bits = image if image.dtype == np.uint8 else (image >> 8).astype(np.uint8)
     if bits.ndim == 2 or bits.shape[2] == 1:
         return np.asarray(cv2.cvtColor(bits, cv2.COLOR_GRAY2RGB), np.uint8)
     return np.asarray(cv2.cvtColor(bits, cv2.COLOR_BGR2RGB), np.uint8)
 
 
 def _device(found: Any) -> Device:
-    """Return a camera as cv2-enumerate-cameras tells it."""
+    """Return a camera listed by cv2-enumerate-cameras."""
     known = found.vid is not None and found.pid is not None
     model = f"{found.vid:04x}:{found.pid:04x}" if known else ""
     path = str(found.path or "")
     where = _linux_port(path) if LINUX else path
-    place = path if LINUX else str(found.index)
+    address = path if LINUX else str(found.index)
     identity = f"{model or found.name}@{where or found.index}"
-    return Device(identity, str(found.name or path), model, place)
+    return Device(identity, str(found.name or path), model, address)
 
 
 def _linux_port(path: str, folder: Path = Path("/sys/class/video4linux")) -> str:
-    """Return the serial number of the camera, or else the socket that it is plugged into."""
+    """Return the serial number of the camera, or else the port that it is plugged into."""
     try:
         interface = (folder / Path(path).name / "device").resolve(strict=True)
         serial = interface.parent / "serial"
         if serial.is_file() and re.search(r"[1-9A-Za-z]", text := serial.read_text().strip()):
             return f"{text}/{interface.name.rpartition(':')[2]}"
-    except OSError:  # no such folder in a container: the device's own name has to do
+    except OSError:  # no such folder in a container: use the device's own name
         return path
     return interface.name

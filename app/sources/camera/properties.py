@@ -1,6 +1,6 @@
-"""Settings of cameras through OpenCV, where the system has no interface of its own for us.
+"""Camera settings through OpenCV, on systems without another interface.
 
-OpenCV tells no ranges, and takes what it is given without a word; what is read back decides.
+OpenCV reports no ranges and no errors; only the value read back counts.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ABSENT = -1.0
 
 @dataclass(frozen=True, slots=True)
 class _Property:
-    """OpenCV's number of a setting, the range that is tried, and the way to and from our unit."""
+    """OpenCV's number of a setting, the range to try, and the conversion to and from our unit."""
 
     number: int
     low: float
@@ -64,9 +64,9 @@ class Properties:
     Parameters
     ----------
     capture : cv2.VideoCapture
-        Open; closed by its owner.
+        Open capture; its owner closes it.
     interface : int
-        OpenCV's number of the interface; macOS and files let nothing be set.
+        OpenCV's number of the interface; on macOS and for files nothing can be set.
     """
 
     def __init__(self, capture: Any, interface: int) -> None:
@@ -75,10 +75,10 @@ class Properties:
         self._known = _WINDOWS if windows else {}
 
     def close(self) -> None:
-        """Nothing is held here."""
+        """Do nothing: no resources are held here."""
 
     def controls(self) -> tuple[Setting, ...]:
-        """Return the settings that the camera answers for."""
+        """Return the settings that the camera supports."""
         found = []
         for key, kind in CONTROLS.items():
             known = self._known.get(key)
@@ -91,18 +91,18 @@ class Properties:
         return tuple(found)
 
     def set(self, key: str, value: float) -> None:
-        """Ask for a value.
+        """Request a value.
 
         Raises
         ------
         InputError
-            If the camera has no such setting, or says that it refuses.
+            If the camera has no such setting or rejects the value.
         """
         known = self._known.get(key)
         if known is None or not self._capture.set(known.number, known.theirs(value)):
             label = CONTROLS[key].label() if key in CONTROLS else key
             raise InputError(
-                tr("the camera does not take {what} {value:g}").format(what=label, value=value),
-                where=tr("camera"),
-                advice=tr("Set it in the camera maker's own program"),
+                tr("the camera does not accept {what} {value:g}").format(what=label, value=value),
+                where=tr("Camera"),
+                advice=tr("Set it in the camera manufacturer's program"),
             )

@@ -1,4 +1,4 @@
-"""Watch a camera's pictures for some seconds and say whether they stand still."""
+"""Watches a camera's images for some seconds and reports whether they are stable."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from gelpolight_core.session.camera_steadiness import (
 
 
 class SteadinessTest:
-    """Takes the levels of frames, not the frames; its `take` is a tap of a stream.
+    """Collects the levels of frames, not the frames; its `take` is a tap of a stream.
 
     Parameters
     ----------
     rate_hz : float
-        What the camera promised.
+        Nominal frame rate of the camera.
     frames : int, optional
-        How many it takes at least.
+        Least number of frames.
     span_s : float, optional
-        How long it takes at least.
+        Least duration.
     """
 
     def __init__(self, rate_hz: float, *, frames: int = FRAMES, span_s: float = SPAN_S) -> None:
@@ -39,7 +39,7 @@ class SteadinessTest:
         self._repeated = 0
 
     def take(self, frame: Frame) -> None:
-        """Look at a frame; one from before the last change is passed over."""
+        """Add a frame; frames from before the last change of settings are skipped."""
         if not frame.settled or self.share >= 1.0:
             return
         levels = band_levels(frame.rgb)
@@ -52,7 +52,7 @@ class SteadinessTest:
 
     @property
     def share(self) -> float:
-        """How much of it is done, 0..1."""
+        """Share of the test that is done, 0..1."""
         with self._lock:
             if len(self._times_s) < 2:
                 return 0.0
@@ -60,7 +60,7 @@ class SteadinessTest:
             return min(1.0, len(self._times_s) / self._frames, spent / max(self._span_s, 1e-9))
 
     def result(self) -> QualityTable:
-        """Return the verdict; only when the share done is 1."""
+        """Return the verdict; call it only when the share done is 1."""
         with self._lock:
             levels, times = np.stack(self._levels), np.asarray(self._times_s)
         return judge_steadiness(levels, times, rate_hz=self._rate_hz, repeated=self._repeated)

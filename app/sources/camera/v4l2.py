@@ -1,7 +1,7 @@
-"""Formats and settings of cameras on Linux, asked of the kernel (V4L2) itself.
+"""Formats and settings of cameras on Linux, from the kernel (V4L2).
 
-OpenCV rounds and renames what it sets (0.25 for "manual" becomes 0, which is automatic) and tells
-no ranges.
+OpenCV rounds and renames values (0.25 for "manual" becomes 0, which is automatic) and reports no
+ranges.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ from gelpolight_core.translation import tr
 Ioctl = Callable[[int, int, Any], Any]
 
 MOST = 256
-"""Of whatever a camera lists; one that lists without end is broken."""
-# Where a range of sizes is told in the place of sizes.
+"""Limit of any list from a camera; a longer list comes from a defective one."""
+# Sizes to try if the camera reports a range of sizes instead of a list.
 USUAL_SIZES = ((640, 480), (800, 600), (1280, 720), (1280, 960), (1600, 1200), (1920, 1080))
 
 EXPOSURE_MANUAL, EXPOSURE_AUTO, EXPOSURE_APERTURE = 1, 0, 3
@@ -54,7 +54,7 @@ MAINS_HZ = {0: 0.0, 1: 50.0, 2: 60.0}
 
 @dataclass(frozen=True, slots=True)
 class _Known:
-    """A control's number, and its value's size in our unit."""
+    """Number of a control, and the size of its kernel unit in our unit."""
 
     number: int
     scale: float = 1.0
@@ -81,19 +81,19 @@ _KNOWN = {
 
 
 class V4l2:
-    """A video device, held open beside whoever takes its pictures.
+    """A video device, open at the same time as the capture that reads its images.
 
     Parameters
     ----------
     path : str
-        Such as ``/dev/video0``.
+        Device path, such as ``/dev/video0``.
     ioctl : callable, optional
-        Asks the kernel; ``fcntl.ioctl`` without it.
+        Calls the kernel; by default ``fcntl.ioctl``.
 
     Raises
     ------
     CameraGone
-        If it cannot be opened.
+        If the device cannot be opened.
     """
 
     def __init__(self, path: str, *, ioctl: Ioctl | None = None) -> None:
@@ -108,13 +108,13 @@ class V4l2:
             raise gone(path, error) from error
 
     def close(self) -> None:
-        """Let it go; harmless when that is done."""
+        """Close the device; may be called twice."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
 
     def name(self) -> str:
-        """Return what the camera calls itself."""
+        """Return the camera's own name."""
         found = Capability()
         self._ask(VIDIOC_QUERYCAP, found)
         return bytes(found.card).decode("utf-8", "replace").strip()
@@ -165,36 +165,36 @@ class V4l2:
     # Settings
 
     def controls(self) -> tuple[Setting, ...]:
-        """Return the settings that the camera has, in the order in which they are applied."""
+        """Return the camera's settings in the order in which they are applied."""
         return tuple(filter(None, (self._control(key) for key in ORDER if key in _KNOWN)))
 
     def set(self, key: str, value: float) -> None:
-        """Ask for a value, within what the camera tells of its range.
+        """Request a value within the range that the camera reports.
 
         Raises
         ------
         InputError
-            If there is no such control or the camera refuses.
+            If there is no such control or the camera rejects the value.
         CameraGone
-            If it is gone.
+            If the camera is gone.
         """
         query = self._query(key)
         if query is None:
             raise InputError(
-                tr("the camera has no {what}").format(what=_label(key)),
+                tr("the camera has no setting {what}").format(what=_label(key)),
                 where=self.path,
-                advice=tr("Leave it as it is"),
+                advice=tr("Leave this setting unchanged"),
             )
         number = self._number_of(key, value, query)
         try:
             self._ask(VIDIOC_S_CTRL, ControlValue(query.id, number))
         except OSError as error:
             raise InputError(
-                tr("the camera refuses {what} {value:g} ({why})").format(
+                tr("the camera rejects {what} {value:g} ({why})").format(
                     what=_label(key), value=value, why=error.strerror
                 ),
                 where=self.path,
-                advice=tr("Switch off what the camera does by itself, and lock again"),
+                advice=tr("Switch off the camera's automatic settings, and lock again"),
             ) from error
 
     def _control(self, key: str) -> Setting | None:
@@ -205,7 +205,7 @@ class V4l2:
             held = ControlValue(query.id, 0)
             self._ask(VIDIOC_G_CTRL, held)
         except OSError:
-            return None  # listed, and not to be read: cameras do that
+            return None  # listed but not readable: some cameras do that
         kind, scale = CONTROLS[key], _KNOWN[key].scale
         writable = not query.flags & (READ_ONLY | GRABBED | INACTIVE)
         low, high, step, value = 0.0, 1.0, 1.0, float(held.value != 0)
@@ -240,7 +240,7 @@ class V4l2:
         return min(max(number, query.minimum), query.maximum)
 
     def _automatic_exposure(self, query: QueryControl) -> int:
-        """Return the way of automatic exposure that the camera has; most have only one."""
+        """Return the automatic exposure mode that the camera has; most have only one."""
         for number in (EXPOSURE_APERTURE, EXPOSURE_AUTO):
             try:
                 self._ask(VIDIOC_QUERYMENU, QueryMenu(id=query.id, index=number))
@@ -269,15 +269,15 @@ class V4l2:
             raise
 
 
-def gone(place: str, error: OSError) -> CameraGone:
-    """Return why a camera cannot be used, from what the system says."""
-    found, advice = tr("the camera is not there"), tr("Plug it in")
+def gone(address: str, error: OSError) -> CameraGone:
+    """Return why a camera cannot be used, from the system's error."""
+    found, advice = tr("the camera was not found"), tr("Plug it in")
     if error.errno in (errno.EBUSY, errno.EAGAIN):
         found, advice = tr("another program uses the camera"), tr("Close that program")
     elif error.errno in (errno.EACCES, errno.EPERM):
-        found = tr("this user may not use the camera")
-        advice = tr("Add the user to the group video, and log in again")
-    return CameraGone(found, where=place, advice=advice)
+        found = tr("this user has no permission to use the camera")
+        advice = tr('Add the user to the group "video", and log in again')
+    return CameraGone(found, where=address, advice=advice)
 
 
 def _letters(code: int) -> str:

@@ -1,4 +1,4 @@
-"""Structures and request numbers of V4L2, as ``linux/videodev2.h`` has them."""
+"""Structures and request numbers of V4L2, as in ``linux/videodev2.h``."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class FormatDescription(ctypes.Structure):
 
 
 class FrameSize(ctypes.Structure):
-    """``struct v4l2_frmsizeenum``: width and height, or least, most and step of both."""
+    """``struct v4l2_frmsizeenum``: width and height, or minimum, maximum and step of both."""
 
     _fields_ = (
         ("index", ctypes.c_uint32),
@@ -59,7 +59,7 @@ class FrameSize(ctypes.Structure):
 
 
 class FrameInterval(ctypes.Structure):
-    """``struct v4l2_frmivalenum``: a fraction of a second, or least, most and step of it."""
+    """``struct v4l2_frmivalenum``: a fraction of a second, or minimum, maximum and step of it."""
 
     _fields_ = (
         ("index", ctypes.c_uint32),
@@ -89,7 +89,7 @@ class QueryControl(ctypes.Structure):
 
 
 class QueryMenu(ctypes.Structure):
-    """``struct v4l2_querymenu``, packed as the kernel has it."""
+    """``struct v4l2_querymenu``, packed as in the kernel."""
 
     _pack_ = 1
     _layout_ = "ms"

@@ -1,4 +1,4 @@
-"""The bench panel lets a technician lay things on the virtual sensor."""
+"""The bench panel lets a technician place objects on the virtual sensor."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def panel(qtbot: Any, bench: Bench) -> Iterator[BenchPanel]:
 
 
 def find(panel: BenchPanel, kind: type[W], name: str) -> W:
-    """Return a control by its name, as a script would."""
+    """Return a control by its name."""
     widget = panel.findChild(kind, f"bench.{name}")
     assert widget is not None, name
     return widget
@@ -55,13 +55,15 @@ def choose(panel: BenchPanel, item: str) -> None:
 
 
 @pytest.mark.parametrize("item", ITEMS)
-def test_choosing_a_thing_lays_it_on_the_sensor(panel: BenchPanel, bench: Bench, item: str) -> None:
+def test_choosing_an_object_puts_it_on_the_sensor(
+    panel: BenchPanel, bench: Bench, item: str
+) -> None:
     choose(panel, item)
     assert bench.scene.item == item
     assert find(panel, QComboBox, "item").currentText() == item_names()[item]
 
 
-def test_only_what_applies_is_shown(panel: BenchPanel) -> None:
+def test_only_relevant_controls_are_shown(panel: BenchPanel) -> None:
     fields = {
         name: panel.findChild(QWidget, f"bench.{name}")
         for name in ("pose", "size_mm", "depth_mm", "x_mm", "yaw_deg")
@@ -87,7 +89,7 @@ def test_numbers_and_the_depth_slider_move_the_object(panel: BenchPanel, bench: 
     assert find(panel, QDoubleSpinBox, "depth_mm").value() == 1.5
 
 
-def test_a_ball_cannot_be_pressed_deeper_than_its_middle(panel: BenchPanel, bench: Bench) -> None:
+def test_a_ball_cannot_be_pressed_deeper_than_its_radius(panel: BenchPanel, bench: Bench) -> None:
     choose(panel, "ball")
     find(panel, QDoubleSpinBox, "size_mm").setValue(1.0)
     depth = find(panel, QDoubleSpinBox, "depth_mm")
@@ -95,7 +97,7 @@ def test_a_ball_cannot_be_pressed_deeper_than_its_middle(panel: BenchPanel, benc
     assert find(panel, QSlider, "depth_slider").maximum() == 50
 
 
-def test_poses_are_stepped_through_and_come_round(
+def test_buttons_step_cyclically_through_the_poses(
     qtbot: Any, panel: BenchPanel, bench: Bench
 ) -> None:
     choose(panel, "checkerboard")
@@ -108,7 +110,7 @@ def test_poses_are_stepped_through_and_come_round(
     assert (bench.scene.pose, pose.value()) == (15, 16)
 
 
-def test_dragging_on_the_picture_moves_the_object_and_its_numbers(
+def test_dragging_on_the_image_moves_the_object_and_its_numbers(
     panel: BenchPanel, bench: Bench
 ) -> None:
     choose(panel, "ball")
@@ -116,7 +118,7 @@ def test_dragging_on_the_picture_moves_the_object_and_its_numbers(
     scene = bench.scene
     assert scene.x_mm > 0.0 > scene.y_mm
     assert find(panel, QDoubleSpinBox, "x_mm").value() == pytest.approx(scene.x_mm, abs=0.005)
-    # What is shown is rounded; where the object lies is not.
+    # The control shows a rounded position; the object's position is exact.
     assert scene.x_mm != round(scene.x_mm, 2)
 
 
@@ -133,9 +135,7 @@ def test_exposure_noise_and_faults_reach_the_bench(panel: BenchPanel, bench: Ben
     assert "room_light" not in bench.conditions.faults
 
 
-def test_it_follows_what_others_change_from_another_thread(
-    qtbot: Any, panel: BenchPanel, bench: Bench
-) -> None:
+def test_changes_from_another_thread_are_shown(qtbot: Any, panel: BenchPanel, bench: Bench) -> None:
     other = threading.Thread(target=lambda: bench.adjust(exposure_ms=3.0))
     other.start()
     other.join()
@@ -143,7 +143,7 @@ def test_it_follows_what_others_change_from_another_thread(
     qtbot.waitUntil(lambda: box.value() == 3.0)
 
 
-def test_every_control_has_a_name_and_says_what_it_is(panel: BenchPanel) -> None:
+def test_every_control_has_a_name_and_a_description(panel: BenchPanel) -> None:
     for kind in (QComboBox, QAbstractSpinBox, QSlider, QAbstractButton):
         for widget in panel.findChildren(kind):
             assert widget.objectName().startswith("bench."), widget
@@ -156,8 +156,8 @@ def test_it_fits_a_narrow_dock(panel: BenchPanel) -> None:
         assert panel.minimumSizeHint().width() <= 300
 
 
-def test_a_panel_that_is_gone_hears_no_more(qtbot: Any, bench: Bench) -> None:
+def test_a_deleted_panel_is_not_notified(qtbot: Any, bench: Bench) -> None:
     panel = BenchPanel(bench=bench)
     panel.deleteLater()
     qtbot.waitUntil(lambda: not isValid(panel))
-    bench.lay("ball")  # would raise, were the deleted panel told
+    bench.lay("ball")  # would raise if the deleted panel were notified

@@ -1,4 +1,4 @@
-"""A person before the wizard, and a camera that shows what it is told."""
+"""A technician who uses the wizard, and a camera controlled by the test."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from app.sources.source import Frame, Setting, SourceLost
 from gelpolight_core.calibration.project import CalibrationProject
 
 RATE_HZ = 60.0
-# Far more than a loaded machine takes; only a failing test waits so long.
+# Much longer than a busy machine needs; only a failing test waits so long.
 WAIT_MS, REST_MS = 60_000, 300_000
 
 
 def read_rgb(path: Path) -> NDArray[Any]:
-    """Return a picture file as a camera of its depth would deliver it."""
+    """Return an image file as a camera of its bit depth delivers it."""
     raw = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
     return np.ascontiguousarray(raw[..., ::-1])
 
 
-class ToldCamera:
-    """A camera that shows what a test tells it to, each frame with a little noise of its own."""
+class ScriptedCamera:
+    """A camera that shows the images that a test sets, with new noise in each frame."""
 
     kind, name = "camera", "Told camera"
 
@@ -44,13 +44,13 @@ class ToldCamera:
         self._lock = threading.Lock()
 
     def show(self, rgb: NDArray[Any]) -> None:
-        """Show a picture from the next frame on."""
+        """Show an image from the next frame on."""
         with self._lock:
             self._rgb = rgb
             self.size = rgb.shape[1], rgb.shape[0]
 
     def open(self) -> None:
-        """Refuse where the cable is out."""
+        """Fail if the cable is unplugged."""
         self._refuse_broken()
 
     def frame(self, timeout_s: float) -> Frame | None:
@@ -68,11 +68,11 @@ class ToldCamera:
             return Frame(shown.astype(self._rgb.dtype), self._number, made_s)
 
     def settings(self) -> tuple[Setting, ...]:
-        """Return none."""
+        """Return no settings."""
         return ()
 
     def set(self, key: str, value: float) -> float:
-        """Refuse."""
+        """Refuse every setting."""
         raise KeyError(key, value)
 
     def close(self) -> None:
@@ -84,20 +84,20 @@ class ToldCamera:
 
 
 class Technician:
-    """Real clicks and keys, and eyes on what the wizard says."""
+    """Real clicks and keys, and checks of what the wizard shows."""
 
     def __init__(self, page: CalibratePage, qtbot: QtBot) -> None:
         self.page, self._qtbot = page, qtbot
 
     @property
     def wizard(self) -> Wizard:
-        """The wizard that is open."""
+        """The open wizard."""
         assert self.page.wizard is not None
         return self.page.wizard
 
     @property
     def session(self) -> Path:
-        """The session's folder."""
+        """The folder of the session."""
         return self.wizard.project.session.folder
 
     def begin(self, project: CalibrationProject, step: str) -> None:
@@ -106,36 +106,35 @@ class Technician:
         self.rest()
 
     def rest(self) -> None:
-        """Wait until nothing is under way."""
-        self._qtbot.waitUntil(lambda: not self.wizard.controller.busy, timeout=REST_MS)
+        """Wait until no work is in progress."""
+        self._qtbot.waitUntil(lambda: not self.wizard.model.busy, timeout=REST_MS)
 
     def until(self, what: Callable[[], object]) -> None:
-        """Wait for something to be seen."""
+        """Wait until a condition is true."""
         self._qtbot.waitUntil(lambda: bool(what()), timeout=WAIT_MS)
 
     def see(self, name: str) -> QWidget:
-        """Return a widget that can be seen."""
+        """Return a visible widget."""
         found = [w for w in self.page.findChildren(QWidget, name) if w.isVisible()]
         assert found, f"{name} cannot be seen"
         return found[0]
 
     def click(self, name: str) -> None:
-        """Click on a button that can be clicked."""
+        """Click an enabled button."""
         button = self.see(name)
         assert button.isEnabled(), f"{name} is disabled"
         self._qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
     def state(self, key: str) -> str:
-        """Return what the list of steps says of a step."""
-        row = [step.key for step in self.wizard.steps].index(key)
-        said = self.wizard.step_list.item(row).data(Qt.ItemDataRole.AccessibleTextRole)
-        return str(said).rpartition(", ")[2]
+        """Return the state that the step list shows for a step."""
+        row = [one.step.key for one in self.wizard.presenters].index(key)
+        return str(self.wizard.step_list.item(row).data(Qt.ItemDataRole.UserRole))
 
     def capture(self) -> str:
-        """Press Capture; return the picture's name as soon as it is told to be there."""
-        told: list[str] = []
-        self.wizard.controller.captured.connect(lambda _stage, name: told.append(name))
+        """Click Capture; return the image's name as soon as it is reported as saved."""
+        reported: list[str] = []
+        self.wizard.model.captured.connect(lambda _stage, name: reported.append(name))
         self.click("calibrate.capture")
-        self.until(lambda: told)
-        assert (self.session / self.wizard.step.folder / told[0]).is_file()
-        return told[0]
+        self.until(lambda: reported)
+        assert (self.session / self.wizard.open.step.folder / reported[0]).is_file()
+        return reported[0]

@@ -1,4 +1,4 @@
-"""What each stage says about a frame: the right picture, the wrong picture, no picture."""
+"""The detection of each stage: the right image, the wrong image, no image."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board, true_corners
 
-from app.calibrate.detect import (
-    BallSetting,
-    ball_setting,
-    detect_ball,
-    detect_board,
-    detect_mirror,
-    detect_top_pose,
-)
-from app.calibrate.detect_light import detect_background, detect_whiteboard
-from app.calibrate.detection import Detection, with_note
-from app.calibrate.marks import mirror_places
-from gelpolight_core.calibration.calibration import sensor_stack
+from app.calibrate.background.detector import detect_background
+from app.calibrate.balls.detector import BallSetting, detect_ball
+from app.calibrate.detection import Detection
+from app.calibrate.lens.detector import detect_board
+from app.calibrate.lights.detector import detect_mirror
+from app.calibrate.marks import mirror_positions_px
+from app.calibrate.radiance.detector import detect_whiteboard
+from app.calibrate.top_pose.detector import detect_top_pose
+from gelpolight_core.image.picture import Picture
+from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.camera import Camera
-from gelpolight_core.optics.checkerboard import BoardSpec, BoardView
+from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
-from gelpolight_core.session.picture import Picture
-from gelpolight_core.session.session import Session, read_picture, read_session
+from gelpolight_core.sensor_calibration import sensor_stack
+from gelpolight_core.session.board import BoardSpec
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import Session, read_session
 
 
 @dataclass(frozen=True)
 class Known:
-    """What earlier stages would have found."""
+    """Results of the earlier stages."""
 
     camera: Camera
     plane: TopPlane
@@ -42,18 +42,18 @@ class Known:
     crosstalk: np.ndarray
 
 
-def frame(picture: Picture) -> np.ndarray:
-    """Return a picture as a camera gives it."""
-    return np.round(np.clip(picture.rgb, 0.0, 1.0) * 255.0).astype(np.uint8)
+def frame(image: Picture) -> np.ndarray:
+    """Return an image as a camera delivers it."""
+    return np.round(np.clip(image.rgb, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
 def board_frame(**pose: float) -> np.ndarray:
-    """Return a frame that shows the 9 x 6 board in a pose."""
+    """Return a frame of the 9 x 6 board in a pose."""
     return frame(render_board(CAMERA, board_pose(**pose)))
 
 
 def view_of(detection: Detection) -> BoardView:
-    """Return the board that was found."""
+    """Return the detected board."""
     assert isinstance(detection.found, BoardView)
     return detection.found
 
@@ -71,7 +71,7 @@ def session(virtual_session: Path) -> Session:
 
 
 @pytest.fixture(scope="module")
-def pictures(session: Session) -> dict[str, np.ndarray]:
+def images(session: Session) -> dict[str, np.ndarray]:
     """Return one frame of every stage."""
     stages = ("checkerboard", "top_pose", "mirror", "whiteboard", "background", "balls")
     frames = {stage: frame(read_picture(session.files(stage)[0])) for stage in stages}
@@ -80,11 +80,11 @@ def pictures(session: Session) -> dict[str, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def known(session: Session, pictures: dict[str, np.ndarray]) -> Known:
-    """Return what a perfect calibration would know of the virtual sensor."""
+def known(session: Session, images: dict[str, np.ndarray]) -> Known:
+    """Return the results of a perfect calibration of the virtual sensor."""
     truth = json.loads((session.folder / "truth.json").read_text("utf-8"))
     optics, top = truth["camera"], truth["top_plane"]
-    height, width = pictures["mirror"].shape[:2]
+    height, width = images["mirror"].shape[:2]
     camera = Camera(
         width,
         height,
@@ -104,10 +104,10 @@ def known(session: Session, pictures: dict[str, np.ndarray]) -> Known:
 
 @pytest.fixture(scope="module")
 def setting(session: Session, known: Known) -> BallSetting:
-    """Return what the ball stage knows of the earlier ones."""
-    return ball_setting(
-        session.averaged("background"), known.table, known.led_positions_mm, known.crosstalk
-    )
+    """Return the setting of the ball stage."""
+    background, table = session.averaged("background"), known.table
+    bare = unmix(table.apply(background.rgb), known.crosstalk)
+    return BallSetting(table, known.led_positions_mm, known.crosstalk, bare, background.size)
 
 
 def test_a_board_is_marked_on_its_true_corners(tilted: np.ndarray) -> None:
@@ -120,65 +120,65 @@ def test_a_board_is_marked_on_its_true_corners(tilted: np.ndarray) -> None:
     assert away.max() < 0.2
 
 
-def test_sixteen_bit_frames_are_seen_as_well(tilted: np.ndarray) -> None:
+def test_boards_are_found_in_sixteen_bit_frames(tilted: np.ndarray) -> None:
     seen = detect_board(tilted.astype(np.uint16) * 257, BOARD)
     assert view_of(seen).corners_px == pytest.approx(
         view_of(detect_board(tilted, BOARD)).corners_px, abs=0.01
     )
 
 
-def test_the_next_view_is_asked_for_where_nothing_was_seen() -> None:
+def test_the_next_view_is_requested_where_no_corners_are() -> None:
     seen = detect_board(board_frame(tilt_deg=20.0, centre_mm=(-6.0, -4.0), distance_mm=60.0), BOARD)
     assert seen.ready
-    assert "at the bottom right" in seen.sentence or "at the top right" in seen.sentence
+    assert "bottom right" in seen.sentence or "top right" in seen.sentence
 
 
-def test_a_view_like_an_earlier_one_is_not_taken_again(tilted: np.ndarray) -> None:
+def test_a_view_like_an_earlier_one_is_not_ready(tilted: np.ndarray) -> None:
     first = view_of(detect_board(tilted, BOARD))
     again = detect_board(tilted, BOARD, earlier=[first])
     assert not again.ready
-    assert "as in an earlier view" in again.sentence
+    assert "like an earlier one" in again.sentence
     turned = replace(first, corners_px=first.corners_px[::-1])
     assert not detect_board(tilted, BOARD, earlier=[turned]).ready
     other = board_frame(tilt_deg=25.0, towards_deg=210.0)
     assert detect_board(other, BOARD, earlier=[first]).ready
 
 
-def test_after_two_flat_views_a_tilted_one_is_asked_for() -> None:
+def test_after_two_flat_views_a_tilted_one_is_requested() -> None:
     flat = [
         view_of(detect_board(board_frame(tilt_deg=2.0, roll_deg=roll), BOARD))
         for roll in (5.0, 40.0)
     ]
     third = board_frame(tilt_deg=2.0, roll_deg=-30.0)
-    assert "tilt it more" in detect_board(third, BOARD, earlier=flat).sentence
+    assert "Tilt it more" in detect_board(third, BOARD, earlier=flat).sentence
     assert not detect_board(third, BOARD, earlier=flat).ready
     assert detect_board(third, BOARD, earlier=flat[:1]).ready
 
 
-def test_earlier_views_stay_drawn_faintly_also_without_a_board(tilted: np.ndarray) -> None:
+def test_earlier_views_stay_visible_without_a_board(tilted: np.ndarray) -> None:
     first = view_of(detect_board(tilted, BOARD))
     black = np.zeros_like(tilted)
     nothing = detect_board(black, BOARD, earlier=[first])
     assert [line.role for line in nothing.overlay.lines] == ["info"]
-    assert nothing.sentence.startswith("The picture is black.")
+    assert nothing.sentence.startswith("The image is black.")
 
 
-def test_a_blurred_board_is_told_to_be_blurred(tilted: np.ndarray) -> None:
+def test_a_blurred_board_is_reported_as_blurred(tilted: np.ndarray) -> None:
     seen = detect_board(cv2.GaussianBlur(tilted, (0, 0), 4.0), BOARD)
     assert not seen.ready
     assert "blurred" in seen.sentence
 
 
-def test_patience_names_the_size_of_another_board(tilted: np.ndarray) -> None:
+def test_a_patient_search_names_the_size_of_another_board(tilted: np.ndarray) -> None:
     wanted = BoardSpec((7, 5), 3.0)
     assert not detect_board(tilted, wanted).ready
     assert "9 x 6 inner corners, not 7 x 5" in detect_board(tilted, wanted, patient=True).sentence
 
 
-def test_the_board_on_top_says_how_the_surface_lies(
-    pictures: dict[str, np.ndarray], session: Session, known: Known
+def test_the_board_on_top_gives_the_pose_of_the_surface(
+    images: dict[str, np.ndarray], session: Session, known: Known
 ) -> None:
-    seen = detect_top_pose(pictures["top_pose"], session.top_pose, known.camera)
+    seen = detect_top_pose(images["top_pose"], session.top_pose, known.camera)
     assert seen.ready
     assert f"{known.plane.distance_mm:.1f}" in seen.sentence
     origin = next(m for m in seen.overlay.markers if m.text == "origin")
@@ -187,10 +187,10 @@ def test_the_board_on_top_says_how_the_surface_lies(
 
 
 def test_mirror_spots_are_found_where_the_leds_are_mirrored(
-    pictures: dict[str, np.ndarray], known: Known
+    images: dict[str, np.ndarray], known: Known
 ) -> None:
-    expected = mirror_places(known.camera, known.plane, known.led_positions_mm)
-    seen = detect_mirror(pictures["mirror"], expected_px=expected, editable=True)
+    expected = mirror_positions_px(known.camera, known.plane, known.led_positions_mm)
+    seen = detect_mirror(images["mirror"], expected_px=expected, editable=True)
     assert seen.ready
     handles = {m.handle: (m.u, m.v) for m in seen.overlay.markers if m.handle}
     assert sorted(handles) == ["mirror.0", "mirror.1", "mirror.2"]
@@ -200,28 +200,30 @@ def test_mirror_spots_are_found_where_the_leds_are_mirrored(
         assert seen.overlay.masks[k].area[row, column]
 
 
-def test_a_spot_in_the_wrong_place_is_told(pictures: dict[str, np.ndarray], known: Known) -> None:
-    swapped = known.led_positions_mm[[1, 0, 2]]
-    expected = mirror_places(known.camera, known.plane, swapped)
-    seen = detect_mirror(pictures["mirror"], expected_px=expected)
-    assert "expected place" in seen.sentence
-
-
-def test_a_saturated_whiteboard_is_refused_and_shown_where(
-    pictures: dict[str, np.ndarray], known: Known
+def test_a_spot_at_a_wrong_position_is_reported(
+    images: dict[str, np.ndarray], known: Known
 ) -> None:
-    good = detect_whiteboard(pictures["whiteboard"], table=known.table)
+    swapped = known.led_positions_mm[[1, 0, 2]]
+    expected = mirror_positions_px(known.camera, known.plane, swapped)
+    seen = detect_mirror(images["mirror"], expected_px=expected)
+    assert "spot offset" in seen.sentence
+
+
+def test_a_saturated_whiteboard_is_rejected_and_marked(
+    images: dict[str, np.ndarray], known: Known
+) -> None:
+    good = detect_whiteboard(images["whiteboard"], table=known.table)
     assert good.ready, good.sentence
     assert all(mask.role != "bad" for mask in good.overlay.masks)
-    hot = np.clip(pictures["whiteboard"].astype(int) * 2, 0, 255).astype(np.uint8)
+    hot = np.clip(images["whiteboard"].astype(int) * 2, 0, 255).astype(np.uint8)
     bad = detect_whiteboard(hot, table=known.table)
     assert not bad.ready
     assert "Shorten the exposure" in bad.sentence
     np.testing.assert_array_equal(bad.overlay.masks[0].area, (hot == 255).any(axis=2))
 
 
-def test_a_missing_led_is_named(pictures: dict[str, np.ndarray], known: Known) -> None:
-    dark = pictures["whiteboard"].copy()
+def test_a_missing_led_is_named(images: dict[str, np.ndarray], known: Known) -> None:
+    dark = images["whiteboard"].copy()
     dark[..., 1] = 0
     for seen in (
         detect_whiteboard(dark, table=known.table),
@@ -232,67 +234,65 @@ def test_a_missing_led_is_named(pictures: dict[str, np.ndarray], known: Known) -
 
 
 def test_a_bare_membrane_is_ready_and_a_pressed_one_is_not(
-    pictures: dict[str, np.ndarray], known: Known
+    images: dict[str, np.ndarray], known: Known
 ) -> None:
-    table, white = known.table, pictures["whiteboard"]
-    bare = detect_background(pictures["background"], table=table, whiteboard=white)
+    table, white = known.table, images["whiteboard"]
+    bare = detect_background(images["background"], table=table, whiteboard=white)
     assert bare.ready, bare.sentence
     for pressed in ("balls", "press"):
-        seen = detect_background(pictures[pressed], table=table, whiteboard=white)
+        seen = detect_background(images[pressed], table=table, whiteboard=white)
         assert not seen.ready
-        assert "Lift off whatever touches" in seen.sentence
+        assert "Remove anything that touches" in seen.sentence
 
 
-def test_the_press_is_shown_where_it_is(
-    pictures: dict[str, np.ndarray], setting: BallSetting, known: Known
+def test_the_press_is_marked_at_its_position(
+    images: dict[str, np.ndarray], setting: BallSetting, known: Known
 ) -> None:
-    """By the detection of the background stage, against the ball stage's own circle."""
-    ball = detect_ball(pictures["balls"], setting, radius_mm=3.0, editable=True)
+    """Compares the background detection with the contact circle of the ball stage."""
+    ball = detect_ball(images["balls"], setting, radius_mm=3.0, editable=True)
     circle = ball.overlay.circles[0]
-    seen = detect_background(
-        pictures["balls"], table=known.table, whiteboard=pictures["whiteboard"]
-    )
+    seen = detect_background(images["balls"], table=known.table, whiteboard=images["whiteboard"])
     rows, columns = np.nonzero(seen.overlay.masks[0].area)
     assert np.hypot(columns.mean() - circle.u, rows.mean() - circle.v) < 0.5 * circle.radius_px
 
 
-def test_the_whiteboard_left_on_is_not_taken_for_the_membrane(
-    pictures: dict[str, np.ndarray],
+def test_the_whiteboard_is_not_accepted_as_background(
+    images: dict[str, np.ndarray],
 ) -> None:
-    seen = detect_background(pictures["whiteboard"], whiteboard=pictures["whiteboard"])
-    assert "just like the whiteboard's" in seen.sentence
-    assert "capture that again" in seen.sentence
+    seen = detect_background(images["whiteboard"], whiteboard=images["whiteboard"])
+    assert "same as the whiteboard image" in seen.sentence
+    assert "capture that one again" in seen.sentence
 
 
-def test_the_membrane_left_on_is_not_taken_for_the_whiteboard(
-    pictures: dict[str, np.ndarray], known: Known
+def test_the_membrane_is_not_accepted_as_whiteboard(
+    images: dict[str, np.ndarray], known: Known
 ) -> None:
-    bare = pictures["background"]
+    bare = images["background"]
     seen = detect_whiteboard(bare, table=known.table, background=bare)
     assert not seen.ready
-    assert "just like the background's" in seen.sentence
-    assert detect_whiteboard(pictures["whiteboard"], table=known.table, background=bare).ready
+    assert "same as the background" in seen.sentence
+    assert detect_whiteboard(images["whiteboard"], table=known.table, background=bare).ready
 
 
-def test_without_a_whiteboard_nothing_is_said_about_presses_but_that(
-    pictures: dict[str, np.ndarray], known: Known
+def test_without_a_whiteboard_contact_is_not_checked(
+    images: dict[str, np.ndarray], known: Known
 ) -> None:
-    seen = detect_background(pictures["background"], table=known.table)
-    assert "once the whiteboard is captured" in seen.sentence
+    seen = detect_background(images["background"], table=known.table)
+    assert "once the whiteboard has been captured" in seen.sentence
 
 
-def test_a_ball_is_circled_where_it_is_seen(
-    pictures: dict[str, np.ndarray], setting: BallSetting, session: Session
+def test_a_ball_is_circled_at_its_position(
+    images: dict[str, np.ndarray], setting: BallSetting, session: Session
 ) -> None:
     radius_mm = session.ball_radius_mm(session.files("balls")[0].name)
     seen = detect_ball(
-        pictures["balls"], setting, radius_mm=radius_mm, earlier_mm=[(0.0, 0.0)], editable=True
+        images["balls"], setting, radius_mm=radius_mm, earlier_mm=[(0.0, 0.0)], editable=True
     )
     assert seen.ready, seen.sentence
     (circle,) = seen.overlay.circles
     assert circle.handle == "ball"
-    # The raw picture is changed within the contact and hardly outside of the drape.
-    change = np.abs(pictures["balls"].astype(int) - pictures["background"]).sum(axis=2)
+    # The raw image changes inside the contact, and hardly outside of its surroundings.
+    change = np.abs(images["balls"].astype(int) - images["background"]).sum(axis=2)
     v, u = np.mgrid[: change.shape[0], : change.shape[1]]
     away = np.hypot(u - circle.u, v - circle.v) / circle.radius_px
     assert change[away < 1.0].mean() > 10.0 * change[(away > 2.5) & (away < 4.0)].mean()
@@ -323,10 +323,10 @@ WRONG = [
 ]
 
 
-def look(
+def detect_in(
     stage: str, rgb: np.ndarray, session: Session, known: Known, setting: BallSetting
 ) -> Detection:
-    """Return what a stage says about a frame."""
+    """Return the detection of a stage in a frame."""
     match stage:
         case "checkerboard":
             return detect_board(rgb, session.checkerboard)
@@ -343,41 +343,40 @@ def look(
 
 
 @pytest.mark.parametrize(("stage", "shown"), WRONG)
-def test_the_picture_of_another_stage_is_refused_in_a_sentence(
+def test_the_image_of_another_stage_is_rejected_with_a_sentence(
     stage: str,
     shown: str,
-    pictures: dict[str, np.ndarray],
+    images: dict[str, np.ndarray],
     session: Session,
     known: Known,
     setting: BallSetting,
 ) -> None:
-    seen = look(stage, pictures[shown], session, known, setting)
+    seen = detect_in(stage, images[shown], session, known, setting)
     assert not seen.ready
     assert not seen.sentence[0].islower()
     assert seen.sentence.endswith(".")
-    assert with_note(seen).notes[0].role == "bad"
 
 
 @pytest.mark.parametrize("stage", ["checkerboard", "top_pose", "mirror", "whiteboard", "balls"])
 @pytest.mark.parametrize("level", [0, 128, 255])
-def test_empty_pictures_are_refused_by_every_stage(
+def test_empty_images_are_rejected_by_every_stage(
     stage: str,
     level: int,
-    pictures: dict[str, np.ndarray],
+    images: dict[str, np.ndarray],
     session: Session,
     known: Known,
     setting: BallSetting,
 ) -> None:
-    empty = np.full_like(pictures["mirror"], level)
-    assert not look(stage, empty, session, known, setting).ready
+    empty = np.full_like(images["mirror"], level)
+    assert not detect_in(stage, empty, session, known, setting).ready
 
 
-def test_a_frame_of_another_size_is_refused(
-    pictures: dict[str, np.ndarray],
+def test_a_frame_of_another_size_is_rejected(
+    images: dict[str, np.ndarray],
     session: Session,
     known: Known,
     setting: BallSetting,
 ) -> None:
-    small = cv2.resize(pictures["balls"], (320, 240))
+    small = cv2.resize(images["balls"], (320, 240))
     for stage in ("top_pose", "balls"):
-        assert not look(stage, small, session, known, setting).ready
+        assert not detect_in(stage, small, session, known, setting).ready

@@ -1,4 +1,4 @@
-"""Results as pictures."""
+"""Stage results as images."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def is_filled(view: MapsView, count: int, share: float) -> None:
     assert len({shown.geometry().topLeft().toTuple() for shown in view._shown}) == count
 
 
-def test_a_single_picture_has_the_whole_room(qtbot: QtBot) -> None:
+def test_a_single_image_uses_the_whole_area(qtbot: QtBot) -> None:
     view = MapsView()
     qtbot.addWidget(view)
     view.resize(600, 400)
@@ -33,17 +33,17 @@ def test_a_single_picture_has_the_whole_room(qtbot: QtBot) -> None:
 
 
 def is_captioned(view: MapsView) -> None:
-    is_filled(view, 1, 0.9)  # else it is as it was at the size before
+    is_filled(view, 1, 0.9)  # otherwise it has the size from before
     (panel,) = view._shown
-    picture, pixmap = panel._picture, panel._picture.pixmap()
-    assert picture.height() - pixmap.height() <= 2
-    assert panel._caption.y() - picture.geometry().bottom() < 20
+    image, pixmap = panel._image, panel._image.pixmap()
+    assert image.height() - pixmap.height() <= 2
+    assert panel._caption.y() - image.geometry().bottom() < 20
     wide, high = pixmap.width() > 0.75 * panel.width(), pixmap.height() > 0.75 * panel.height()
     assert wide or high
 
 
-def test_the_words_stay_at_the_picture(qtbot: QtBot) -> None:
-    """Also where the room is higher than the picture can be, and after it was larger."""
+def test_the_texts_stay_close_to_the_image(qtbot: QtBot) -> None:
+    """Also if there is more height than the image can use, and after it was larger."""
     view = MapsView()
     qtbot.addWidget(view)
     view.show()

@@ -1,4 +1,4 @@
-"""The session keeps how its camera was set, and the camera is held to it."""
+"""A session stores its camera settings, and the camera is kept at them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 from technician import Technician
 
-from app.bench.stated import stated_session
-from app.shell.context import AppContext
-from app.widgets.source_button import SourceButton
+from app.bench.virtual_session import virtual_session
+from app.context.context import AppContext
+from app.context.source_button import SourceButton
 from gelpolight_core.calibration.inputs import Stage
-from gelpolight_core.calibration.pipeline import _provenance
 from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.session.camera_settings import settings_of_texts
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
@@ -48,7 +48,7 @@ def live(context: AppContext, qtbot: QtBot) -> None:
     qtbot.waitUntil(lambda: camera.state.phase == "live" and not camera.settling, timeout=WAIT_MS)
 
 
-def test_settings_are_kept_with_the_pictures_and_held_to_from_then_on(
+def test_settings_are_stored_with_the_images_and_monitored(
     technician: Technician,
     context: AppContext,
     fake: FakeCamera,
@@ -71,13 +71,13 @@ def test_settings_are_kept_with_the_pictures_and_held_to_from_then_on(
     assert kept.controls["exposure_auto"] == 0.0
 
     context.cameras.set(camera, {"exposure_ms": 12.0})
-    words = "not set as it was for the pictures of this session: Exposure is 12 ms, not 33.3 ms"
+    words = "differ from those for the images of this session: Exposure is 12 ms, not 33.3 ms"
     qtbot.waitUntil(lambda: words in caplog.text, timeout=WAIT_MS)
     technician.capture()
     technician.rest()
     assert read_session(fresh.session.folder).camera_settings == kept
 
-    fake.forgets = True  # as after a night without power
+    fake.forgets = True  # as after a power cut
     technician.page.leave()
     fake.opened = 0
     context.cameras.restore(camera)
@@ -89,11 +89,11 @@ def test_settings_are_kept_with_the_pictures_and_held_to_from_then_on(
     context.toasts.clear()
 
 
-def test_the_mirror_may_have_an_exposure_of_its_own(
+def test_the_mirror_may_have_its_own_exposure(
     technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
-    """What is kept is how the camera was set for the white board, with which all is compared."""
+    """The reference is the whiteboard image, with which all others are compared."""
     context.toasts.attach(technician.page, lambda: None)
     technician.begin(fresh, "lights")
     live(context, qtbot)
@@ -119,27 +119,55 @@ def test_the_mirror_may_have_an_exposure_of_its_own(
     context.toasts.clear()
 
 
-def test_imported_pictures_say_nothing_of_the_camera_that_is_live(
+def test_imported_images_do_not_store_the_live_camera(
     technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
     small_session: Path, qtbot: QtBot,
 ) -> None:  # fmt: skip
     technician.begin(fresh, "balls")
     live(context, qtbot)
-    technician.wizard.taking.import_files([small_session / "balls" / "ball_01.png"])
+    technician.wizard.open.import_files([small_session / "balls" / "ball_01.png"])
     technician.rest()
     assert fresh.session.captured("balls")
     assert read_session(fresh.session.folder).camera_settings is None
 
 
-def test_a_calibration_is_told_how_its_camera_was_set(computed_project: Made) -> None:
+def test_the_camera_of_another_sensor_is_rejected(
+    technician: Technician, context: AppContext, fake: FakeCamera, fresh: CalibrationProject,
+    qtbot: QtBot,
+) -> None:  # fmt: skip
+    """The same model but another camera: it belongs to another sensor."""
+    context.toasts.attach(technician.page, lambda: None)
+    technician.begin(fresh, "balls")
+    live(context, qtbot)
+    technician.capture()
+    technician.rest()
+    (first,) = fresh.session.captured("balls")
+    kept = fresh.session.camera_settings
+    assert kept is not None
+    fresh.set_camera(replace(kept, identity="046d:081b@SN2"))
+    technician.wizard.panel.capture.click()
+    technician.rest()
+    assert fresh.session.captured("balls") == (first,)
+    shown = technician.wizard.panel.notice.text()
+    assert "046d:081b@SN2" in shown
+    assert C310.identity in shown
+    fresh.set_camera(kept)
+    technician.capture()
+    technician.rest()
+    assert len(fresh.session.captured("balls")) == 2
+    context.toasts.clear()
+
+
+def test_a_calibration_contains_its_camera_settings(computed_project: Made) -> None:
     project, stored = computed_project(), settings_of_texts(TEXTS)
     before = {stage: status.state for stage, status in project.statuses().items()}
     project.set_camera(stored)
     assert {stage: status.state for stage, status in project.statuses().items()} == before
-    assert settings_of_texts(_provenance(project.session).camera_settings) == stored
+    made = provenance_of(project.session.folder, (), project.session.camera_settings)
+    assert settings_of_texts(made.camera_settings) == stored
 
 
-def test_stating_the_sensor_anew_keeps_the_camera(fresh: CalibrationProject) -> None:
+def test_changing_the_sensor_data_keeps_the_camera(fresh: CalibrationProject) -> None:
     stored = settings_of_texts(TEXTS)
     fresh.set_camera(stored)
     sensor = replace(fresh.session.sensor, led_height_mm=13.0)
@@ -148,7 +176,7 @@ def test_stating_the_sensor_anew_keeps_the_camera(fresh: CalibrationProject) -> 
     assert fresh.statuses()[Stage.LENS].state.value == "empty"
 
 
-def test_the_set_up_step_says_how_the_camera_is_and_opens_its_settings(
+def test_the_set_up_step_shows_the_camera_state_and_opens_its_settings(
     technician: Technician,
     context: AppContext,
     fake: FakeCamera,
@@ -156,23 +184,24 @@ def test_the_set_up_step_says_how_the_camera_is_and_opens_its_settings(
     qtbot: QtBot,
 ) -> None:
     technician.begin(fresh, "setup")
-    setup = technician.wizard.setup
-    assert "set and lock it before the first picture" in setup.camera.text()
+    setup = technician.wizard.at("setup").form
+    assert "set and lock the camera before the first image" in setup.camera.text()
     setup.camera_settings.click()
     dialog = technician.page.findChild(QWidget, "camera")
     live(context, qtbot)
     qtbot.waitUntil(lambda: "not locked" in setup.camera.text(), timeout=WAIT_MS)
     dialog.close()
     context.source.choose(None)
-    assert "No camera is chosen" in setup.camera.text()
+    assert "No camera is selected" in setup.camera.text()
     assert not setup.camera_settings.isEnabled()
 
 
-def test_the_camera_of_a_new_sensor_is_chosen_in_the_form(
+def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
     technician: Technician, context: AppContext, qtbot: QtBot
 ) -> None:
     context.cameras.driver = FakeDriver(FakeCamera())
     technician.page.begin()
+    technician.click("question.open")
     form = technician.page.form
     button = technician.see("setup.source")
     assert isinstance(button, SourceButton)
@@ -183,5 +212,5 @@ def test_the_camera_of_a_new_sensor_is_chosen_in_the_form(
     assert form.stated().sensor.serial == ""
 
     context.source.choose_virtual_sensor()
-    assert form.stated().sensor == stated_session().sensor
+    assert form.stated().sensor == virtual_session().sensor
     context.source.choose(None)

@@ -1,20 +1,20 @@
-"""What stands beside a step is of that step."""
+"""The side panel shows the data of its own step."""
 
 from __future__ import annotations
 
 from pytestqt.qtbot import QtBot
 
 from app.calibrate.step_panel import StepPanel
-from app.calibrate.steps import all_steps
+from app.calibrate.steps import OPEN_ROUTE, steps_of
 from gelpolight_core.quality import Figure, QualityTable, Verdict
 
 
-def test_a_step_that_is_computed_does_not_show_the_figures_of_the_one_before(
+def test_a_step_in_computation_does_not_show_figures_of_another_step(
     qtbot: QtBot,
 ) -> None:
     panel = StepPanel()
     qtbot.addWidget(panel)
-    first, second = all_steps()[:2]
+    first, second = steps_of(OPEN_ROUTE)[:2]
     figure = Figure("k", "Reprojection error", 0.2, "px", 0.3, 1.0, Verdict.PASS, "")
     panel.show_step(first, following=second.title)
     panel.show_state("pass", "Good.", [QualityTable((figure,))], recompute=False, finished=True)
@@ -27,16 +27,16 @@ def test_a_step_that_is_computed_does_not_show_the_figures_of_the_one_before(
     assert not panel.finished and "bold" not in panel.next.styleSheet()
 
 
-def test_the_button_says_whether_a_further_picture_takes_the_place_of_the_one_before(
+def test_the_button_says_whether_a_new_image_replaces_the_last_one(
     qtbot: QtBot,
 ) -> None:
     panel = StepPanel()
     qtbot.addWidget(panel)
-    said = {}
-    for step in all_steps():
+    expected_text = {}
+    for step in steps_of(OPEN_ROUTE):
         panel.show_step(step, following="")
         panel.show_count(1)
-        said[step.key] = panel.capture.text().replace("&", "")
-    assert said["top_pose"] == "Capture another"
-    assert said["background"] == said["lights"] == "Capture again"
-    assert said["balls"] == "Capture  (1 of 10)"
+        expected_text[step.key] = panel.capture.text().replace("&", "")
+    assert expected_text["top_pose"] == "Capture another"
+    assert expected_text["background"] == expected_text["lights"] == "Capture again"
+    assert expected_text["balls"] == "Capture  (1 of 10)"

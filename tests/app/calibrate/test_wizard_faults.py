@@ -1,4 +1,4 @@
-"""What a technician does wrong, and what goes wrong by itself: the page says what to do."""
+"""Mistakes of the technician and failures of the system: the page says what to do."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from technician import Technician, ToldCamera, read_rgb
+from technician import ScriptedCamera, Technician, read_rgb
 
-from app.shell.context import AppContext
+from app.context.context import AppContext
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.session import read_session
@@ -21,32 +21,32 @@ from gelpolight_core.session.session import read_session
 Made = Callable[[], CalibrationProject]
 
 
-def test_without_a_camera_the_page_says_where_to_get_pictures(
+def test_without_a_camera_the_page_says_where_to_get_images(
     technician: Technician, computed_project: Made
 ) -> None:
     technician.begin(computed_project(), "balls")
     panel = technician.wizard.panel
-    assert "choose one" in panel.live.text()
+    assert "No camera" in panel.live.text()
     assert "import" in panel.live.text()
     assert not panel.capture.isEnabled()
     technician.wizard.go_to("validation")
-    assert not technician.wizard.validation.measure.isEnabled()
+    assert not technician.wizard.at("validation").form.measure.isEnabled()
 
 
-def test_a_camera_that_stops_is_named_and_can_be_connected_again(
-    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path
+def test_a_stopped_camera_is_reported_and_can_be_reconnected(
+    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
 ) -> None:
     technician.begin(computed_project(), "balls")
     camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
     technician.until(lambda: "Ball found" in technician.wizard.panel.live.text())
     camera.broken = True
-    technician.until(technician.wizard.pictures.lost.isVisible)
-    assert "Check its cable" in technician.wizard.pictures.why.text()
+    technician.until(technician.wizard.area.lost.isVisible)
+    assert "Check its cable" in technician.wizard.area.why.text()
     technician.click("calibrate.capture")
     technician.until(lambda: "unplugged" in technician.wizard.panel.notice.text())
     camera.broken = False
     technician.click("calibrate.reconnect")
-    technician.until(lambda: not technician.wizard.pictures.lost.isVisible())
+    technician.until(lambda: not technician.wizard.area.lost.isVisible())
     technician.capture()
     technician.rest()
 
@@ -59,68 +59,71 @@ def test_a_camera_that_stops_is_named_and_can_be_connected_again(
         pytest.param(lambda one: one.page._leave_session(), id="session"),
     ],
 )
-def test_a_capture_that_is_left_before_it_is_complete_is_told_as_not_taken(
-    technician: Technician, camera: ToldCamera, computed_project: Made, context: AppContext,
+def test_an_aborted_capture_is_reported(
+    technician: Technician, camera: ScriptedCamera, computed_project: Made, context: AppContext,
     leave: Callable[[Technician], None],
 ) -> None:  # fmt: skip
-    """The camera shows nothing yet, so that the frames of a capture cannot come."""
+    """The camera shows no image yet, so the frames of a capture cannot arrive."""
     context.toasts.attach(technician.page, lambda: None)
     technician.begin(computed_project(), "background")
-    controller = technician.wizard.controller
+    controller = technician.wizard.model
     technician.click("calibrate.capture")
-    assert controller.watching.capturing
+    assert controller.live.capturing
     leave(technician)
-    assert not controller.watching.capturing
-    assert ["not taken" in toast.text for toast in context.toasts.shown()] == [True]
+    assert not controller.live.capturing
+    assert ["not captured" in toast.text for toast in context.toasts.shown()] == [True]
     context.toasts.clear()
 
 
 @pytest.mark.parametrize(
-    ("step", "shown", "said"),
+    ("step", "shown", "expected_text", "state"),
     [
-        pytest.param("lights", "background/background.png", "", id="membrane left on"),
-        pytest.param("lights", "black", "black", id="lens cap on"),
-        pytest.param("radiance", "bright", "exposure", id="far too much light"),
-        pytest.param("balls", "background/background.png", "Press", id="nothing pressed in"),
+        pytest.param("lights", "background/background.png", "", "fail", id="membrane left on"),
+        pytest.param("lights", "black", "black", "fail", id="lens cap on"),
+        pytest.param("radiance", "bright", "exposure", "fail", id="far too much light"),
+        # The other presses are still used.
+        pytest.param(
+            "balls", "background/background.png", "Left out", "warn", id="nothing pressed in"
+        ),
     ],
 )
-def test_a_wrong_picture_fails_with_advice_and_can_be_captured_again(
-    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path,
-    step: str, shown: str, said: str,
+def test_a_wrong_image_fails_with_advice_and_can_be_captured_again(
+    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path,
+    step: str, shown: str, expected_text: str, state: str,
 ) -> None:  # fmt: skip
     technician.begin(computed_project(), step)
     bare = read_rgb(small_session / "background" / "background.png")
     full = np.iinfo(bare.dtype).max
-    pictures = {"black": np.zeros_like(bare), "bright": np.full_like(bare, full)}
-    camera.show(pictures[shown] if shown in pictures else read_rgb(small_session / shown))
+    images = {"black": np.zeros_like(bare), "bright": np.full_like(bare, full)}
+    camera.show(images[shown] if shown in images else read_rgb(small_session / shown))
     technician.until(lambda: technician.wizard.panel.live.text())
     technician.capture()
     technician.rest()
     panel = technician.wizard.panel
-    assert technician.state(step) == "fail"
+    assert technician.state(step) == state
     sentence = panel.sentence.text()
-    assert said.lower() in sentence.lower()
+    assert expected_text.lower() in sentence.lower()
     assert len(sentence.split(". ")) >= 2, "it says what was found and what to do"
-    assert not panel.finished
+    assert panel.finished is (state == "warn"), "ten good presses are enough"
     assert panel.capture.isEnabled()
 
 
-def test_a_wrong_ball_radius_is_seen_in_the_figures(
+def test_a_wrong_ball_radius_changes_the_figures(
     technician: Technician, computed_project: Made
 ) -> None:
-    """Half the radius bends twice as much: the shading cannot be explained any more."""
+    """Half the radius means twice the curvature: the shading does not fit any more."""
     project = computed_project()
     technician.begin(project, "balls")
     name = project.session.found("balls")[0].name
-    technician.wizard.look_at(name)
-    technician.wizard.panel.radius.setValue(0.5 * project.session.ball_radius_mm(name))
+    technician.wizard.show_capture(name)
+    technician.wizard.at("balls").radius.box.setValue(project.session.ball_radius_mm(name))
     technician.rest()
-    assert technician.state("balls") in ("warning", "fail")
+    assert technician.state("balls") in ("warn", "fail")
     assert "radius" in technician.wizard.panel.sentence.text().lower()
 
 
 def wrong_files(session: Path, folder: Path) -> dict[str, Path]:
-    """Return picture files that do not belong into the session's balls."""
+    """Return image files that are not valid ball images of the session."""
     folder.mkdir()
     ball = read_rgb(session / "balls" / "ball_01.png")
     files = {name: folder / f"{name}.png" for name in ("grey", "size", "copy", "torn", "text")}
@@ -133,25 +136,25 @@ def wrong_files(session: Path, folder: Path) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "said"),
-    [("grey", "grey"), ("size", "160x120"), ("copy", "already"), ("torn", "whole"),
-     ("text", "whole")],
+    ("kind", "expected_text"),
+    [("grey", "grey"), ("size", "160x120"), ("copy", "already"), ("torn", "complete"),
+     ("text", "complete")],
 )  # fmt: skip
-def test_a_file_that_does_not_belong_there_is_not_imported(
-    technician: Technician, computed_project: Made, tmp_path: Path, kind: str, said: str
+def test_an_invalid_file_is_not_imported(
+    technician: Technician, computed_project: Made, tmp_path: Path, kind: str, expected_text: str
 ) -> None:
     project = computed_project()
     technician.begin(project, "balls")
     before = project.session.captured("balls")
     file = wrong_files(project.session.folder, tmp_path / "wrong")[kind]
-    technician.wizard.taking.import_files([file])
+    technician.wizard.open.import_files([file])
     technician.rest()
-    assert said in technician.wizard.panel.notice.text()
+    assert expected_text in technician.wizard.panel.notice.text()
     assert project.session.captured("balls") == before
     assert project.stale() == ()
 
 
-def test_good_files_are_imported_with_the_radius_that_is_shown(
+def test_good_files_are_imported_with_the_shown_radius(
     technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path
 ) -> None:
     project = computed_project()
@@ -161,25 +164,25 @@ def test_good_files_are_imported_with_the_radius_that_is_shown(
     cv2.imwrite(str(file), np.clip(shown - 1, 0, None).astype(np.uint16)[..., ::-1])
     if read_rgb(small_session / "balls" / "ball_01.png").dtype == np.uint8:
         cv2.imwrite(str(file), np.clip(shown - 1, 0, None).astype(np.uint8)[..., ::-1])
-    technician.wizard.panel.radius.setValue(4.0)
-    technician.wizard.taking.import_files([file])
+    technician.wizard.at("balls").radius.box.setValue(8.0)
+    technician.wizard.open.import_files([file])
     technician.rest()
     name = project.session.captured("balls")[-1].name
     assert project.session.ball_radii_mm[name] == 4.0
 
 
 def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let every file refuse to take its place, as where the disk is full."""
+    """Make every file operation fail, as on a full disk."""
 
     def refuse(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     for name in ("os.replace", "_place_new"):
-        monkeypatch.setattr(f"gelpolight_core.export.atomic.{name}", refuse)
+        monkeypatch.setattr(f"gelpolight_core.io.atomic.{name}", refuse)
 
 
-def test_a_full_disk_is_said_and_nothing_half_written_counts(
-    technician: Technician, camera: ToldCamera, computed_project: Made, small_session: Path,
+def test_a_full_disk_is_reported_and_partial_files_are_ignored(
+    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     project = computed_project()
@@ -192,8 +195,8 @@ def test_a_full_disk_is_said_and_nothing_half_written_counts(
     technician.until(lambda: "disk is full" in technician.wizard.panel.notice.text())
     technician.rest()
     assert sorted(project.session.folder.rglob("*")) == before
-    technician.wizard.controller.exclude(Stage.BALLS, "ball_01.png", True)
-    assert technician.wizard.controller.undo.count() == 0
+    technician.wizard.model.exclude(Stage.BALLS, "ball_01.png", True)
+    assert technician.wizard.model.undo.count() == 0
     assert "disk is full" in technician.wizard.panel.notice.text()
     assert project.session.decisions.excluded == frozenset()
     monkeypatch.undo()
@@ -201,7 +204,7 @@ def test_a_full_disk_is_said_and_nothing_half_written_counts(
     technician.rest()
 
 
-def test_a_picture_that_cannot_be_kept_is_told_though_the_session_was_left(
+def test_an_unsaved_image_is_reported_after_the_session_is_closed(
     technician: Technician, computed_project: Made, tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
@@ -210,7 +213,7 @@ def test_a_picture_that_cannot_be_kept_is_told_though_the_session_was_left(
     press = cv2.imread(str(project.session.found("balls")[0]))
     cv2.imwrite(str(tmp_path / "press.png"), np.roll(press, 1, axis=0))
     full_disk(monkeypatch)
-    technician.wizard.controller.import_files(Stage.BALLS, [tmp_path / "press.png"])
+    technician.wizard.model.import_files(Stage.BALLS, [tmp_path / "press.png"])
     technician.page._leave_session()
     assert "disk is full" in caplog.text
     monkeypatch.undo()
@@ -223,22 +226,23 @@ def test_a_ball_that_could_not_be_written_leaves_no_radius_behind(
     project = computed_project()
     radii = dict(project.session.ball_radii_mm)
     monkeypatch.setattr(
-        "gelpolight_core.calibration.kept_session.write_picture", lambda *_, **__: full_picture()
+        "gelpolight_core.calibration.editable_session.write_picture",
+        lambda *_, **__: raise_disk_full(),
     )
     with pytest.raises(Exception, match="disk is full"):
         project.add_capture(Stage.BALLS, [np.zeros((240, 320, 3), np.uint8)], radius_mm=2.0)
     assert read_session(project.session.folder).ball_radii_mm == radii
 
 
-def full_picture() -> None:
-    """Refuse to write."""
+def raise_disk_full() -> None:
+    """Fail to write."""
     from gelpolight_core.errors import InputError
 
     raise InputError("the disk is full", where="ball", advice="Free some space")
 
 
 @pytest.mark.parametrize("name", ["session.toml", "decisions.toml"])
-def test_a_file_broken_by_hand_is_named_on_the_page_when_the_session_is_opened(
+def test_a_damaged_file_is_named_when_the_session_is_opened(
     technician: Technician, computed_project: Made, context: AppContext, name: str
 ) -> None:
     project = computed_project()
@@ -250,14 +254,14 @@ def test_a_file_broken_by_hand_is_named_on_the_page_when_the_session_is_opened(
     assert name in problem.text()
 
 
-def test_a_picture_removed_by_hand_while_open_is_no_fault_of_the_program(
+def test_an_image_deleted_by_hand_causes_no_internal_error(
     technician: Technician, computed_project: Made
 ) -> None:
     project = computed_project()
     technician.begin(project, "balls")
     path = project.session.found("balls")[0]
     path.unlink()
-    technician.wizard.look_at(path.name)
+    technician.wizard.show_capture(path.name)
     assert path.name in technician.wizard.panel.notice.text()
     technician.wizard.go_to("balls")
     assert technician.state("balls") == "stale"

@@ -1,4 +1,4 @@
-"""What is changed in the set-up and not taken is neither lost nor left in silence."""
+"""Unapplied changes in the set-up form are kept, with a warning."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gelpolight_core.session.session import read_session
 Made = Callable[[], CalibrationProject]
 
 
-def test_what_was_changed_stays_and_is_told_as_the_step_is_left(
+def test_unapplied_changes_stay_with_a_warning_when_the_step_is_left(
     technician: Technician, computed_project: Made, caplog: pytest.LogCaptureFixture
 ) -> None:
     technician.begin(computed_project(), "setup")
@@ -22,37 +22,39 @@ def test_what_was_changed_stays_and_is_told_as_the_step_is_left(
     wizard.go_to("lens")
     assert "set-up" not in caplog.text
     wizard.go_to("setup")
-    wizard.setup.led_height.setValue(before + 0.5)
+    wizard.at("setup").form.led_height.setValue(before + 0.5)
     wizard.go_to("lens")
-    assert "in the set-up is not taken yet" in caplog.text
+    assert "set-up changes are not applied yet" in caplog.text
     assert read_session(technician.session).sensor.led_height_mm == before
     wizard.go_to("setup")
-    assert wizard.setup.led_height.value() == before + 0.5
-    wizard.setup.accept.click()
+    assert wizard.at("setup").form.led_height.value() == before + 0.5
+    wizard.at("setup").form.accept.click()
     assert read_session(technician.session).sensor.led_height_mm == before + 0.5
-    assert not wizard.setup.edited
-    wizard.controller.jobs.cancel()
+    assert not wizard.at("setup").form.edited
+    wizard.model.jobs.cancel()
     technician.rest()
 
 
-def test_what_was_changed_is_told_as_the_session_is_left(
+def test_unapplied_changes_give_a_warning_when_the_session_is_closed(
     technician: Technician, computed_project: Made, caplog: pytest.LogCaptureFixture
 ) -> None:
     technician.begin(computed_project(), "setup")
-    folder, form = technician.session, technician.wizard.setup
+    folder, form = technician.session, technician.wizard.at("setup").form
     before = read_session(folder)
     form.led_height.setValue(form.led_height.value() + 0.5)
     technician.page.begin()
     assert technician.page.wizard is None
-    assert "in the set-up was not taken" in caplog.text
+    assert "set-up changes were not applied" in caplog.text
     assert read_session(folder) == before
 
 
-def test_what_was_typed_of_a_new_sensor_stays_when_it_is_begun_again(
+def test_data_typed_for_a_new_sensor_stays_after_restart(
     technician: Technician,
 ) -> None:
     page = technician.page
     page.begin()
+    technician.click("question.open")
     page.form.serial.setText("B-002")
     page.begin()
+    technician.click("question.open")
     assert page.form.serial.text() == "B-002"

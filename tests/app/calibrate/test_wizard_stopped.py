@@ -1,4 +1,4 @@
-"""What waits behind work that is stopped is told so, and can come all the same."""
+"""Work that waited behind stopped work is reported or still done."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from technician import Technician
 
-from app.shell.jobs import Job
+from app.services.jobs import Job
 from gelpolight_core.calibration.project import CalibrationProject
 
 Made = Callable[[], CalibrationProject]
@@ -17,37 +17,36 @@ Made = Callable[[], CalibrationProject]
 
 @pytest.fixture
 def hold() -> Iterator[threading.Event]:
-    """Return what long work waits for."""
+    """Return the event that the long work waits for."""
     hold = threading.Event()
     yield hold
     hold.set()
 
 
-def test_the_curves_come_though_the_work_before_them_was_stopped(
+def test_the_curves_appear_after_earlier_work_was_stopped(
     technician: Technician, computed_project: Made, hold: threading.Event
 ) -> None:
     technician.begin(computed_project(), "balls")
     wizard = technician.wizard
-    wizard.controller.jobs.submit(Job("Long work", lambda _tell: hold.wait(60.0)))
+    wizard.model.jobs.submit(Job("Long work", lambda _tell: hold.wait(60.0)))
     wizard.go_to("reflectance")
-    curves = wizard.curves
-    assert curves is not None
-    assert "Gathering" in curves._said.text()
+    curves = wizard.at("reflectance").curves
+    assert "Collecting" in curves._message.text()
     wizard.panel.cancel_wanted.emit()
     hold.set()
     technician.until(lambda: curves.editor is not None)
     technician.rest()
 
 
-def test_a_report_that_was_stopped_as_it_waited_is_told_as_stopped(
+def test_a_waiting_report_that_was_stopped_is_reported(
     technician: Technician, computed_project: Made, hold: threading.Event, tmp_path: Path
 ) -> None:
     technician.begin(computed_project(), "result")
     wizard = technician.wizard
-    wizard.controller.jobs.submit(Job("Long work", lambda _tell: hold.wait(60.0)))
-    wizard.saving.write_report(tmp_path / "report.html")
+    wizard.model.jobs.submit(Job("Long work", lambda _tell: hold.wait(60.0)))
+    wizard.at("result").saving.write_report(tmp_path / "report.html")
     wizard.panel.cancel_wanted.emit()
     hold.set()
     technician.rest()
-    assert wizard.result.saved.text() == "Writing the report: stopped"
+    assert wizard.at("result").view.saved.text() == "Writing the report: stopped"
     assert not (tmp_path / "report.html").exists()

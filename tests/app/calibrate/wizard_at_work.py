@@ -1,7 +1,7 @@
 """A wizard at work until it is killed: ``python wizard_at_work.py SESSION PICTURES SEED``.
 
-Captures and corrects by turns on a session, and writes one JSON line for everything that the
-technician has been told is done; of what replaces something older, also that it is begun.
+Captures and corrects in turn on a session, and writes one JSON line for everything that is
+reported as done; for data that replaces older data, also when it starts.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from PySide6.QtCore import QTimer
-from technician import ToldCamera, read_rgb
+from technician import ScriptedCamera, read_rgb
 
 from app.calibrate.page import CalibratePage
 from app.calibrate.wizard import Wizard
@@ -25,24 +25,24 @@ TICK_MS = 5
 
 
 def tell(**done: object) -> None:
-    """Write what is done."""
+    """Write a line about finished work."""
     sys.stdout.write(json.dumps(done) + "\n")
     sys.stdout.flush()
 
 
 class Work:
-    """Does the next thing whenever the one before is done."""
+    """Starts the next action whenever the previous one is done."""
 
-    def __init__(self, wizard: Wizard, camera: ToldCamera, pictures: Path, seed: int) -> None:
-        self._wizard, self._camera, self._pictures = wizard, camera, pictures
+    def __init__(self, wizard: Wizard, camera: ScriptedCamera, images: Path, seed: int) -> None:
+        self._wizard, self._camera, self._images = wizard, camera, images
         self._random = random.Random(seed)
-        wizard.controller.captured.connect(self._on_captured)
+        wizard.model.captured.connect(self._on_captured)
         self._on_step("lens")
 
     def _on_step(self, key: str) -> None:
         self._wizard.go_to(key)
-        folder = self._wizard.step.folder
-        files = sorted((self._pictures / folder).glob("*.png"))
+        folder = self._wizard.open.step.folder
+        files = sorted((self._images / folder).glob("*.png"))
         self._camera.show(read_rgb(self._random.choice(files)))
 
     def _on_captured(self, stage: str, name: str) -> None:
@@ -51,9 +51,9 @@ class Work:
         tell(captured=f"{FOLDERS[Stage(stage)]}/{name}", radius_mm=radius)
 
     def go_on(self) -> None:
-        """Do the next thing, at random."""
-        controller = self._wizard.controller
-        if controller.busy_with_pictures:
+        """Start a random action."""
+        controller = self._wizard.model
+        if controller.busy_with_images:
             return
         chance = self._random.random()
         session = self._wizard.project.session
@@ -65,10 +65,10 @@ class Work:
             tell(excluded=f"checkerboard/{name}")
         elif chance < 0.5 and (balls := session.found("balls")):
             name = self._random.choice(balls).name
-            place = [float(self._random.randrange(20, 220)) for _ in range(3)]
-            tell(begun=name, value=place)
-            controller.place_ball(name, PlacedCircle(*place))
-            tell(decided=name, value=place)
+            position = [float(self._random.randrange(20, 220)) for _ in range(3)]
+            tell(begun=name, value=position)
+            self._wizard.at("balls").place_ball(name, PlacedCircle(*position))
+            tell(decided=name, value=position)
         elif chance < 0.6:
             nodes = [[0.0, 0.0], [0.5, 0.25 + 0.01 * self._random.randrange(20)], [1.0, 1.0]]
             project = self._wizard.project
@@ -76,24 +76,24 @@ class Work:
             project.edit_curves({0: tuple((c, v) for c, v in nodes)})
             tell(decided="curve", value=nodes)
         else:
-            self._wizard.panel.radius.setValue(2.0 + 0.1 * self._random.randrange(10))
+            self._wizard.at("balls").radius.box.setValue(4.0 + 0.2 * self._random.randrange(10))
             self._wizard.panel.capture.click()
 
 
 def main() -> None:
-    """Work until killed."""
-    session, pictures, seed = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+    """Work until the process is killed."""
+    session, images, seed = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     application = make_application()
     context = make_context(settings_file=session.parent / "desktop.ini")
     context.workspace.folder = session.parent / "workspace"
-    camera = ToldCamera()
+    camera = ScriptedCamera()
     context.source.choose(SourceInfo("camera", camera.name, "", lambda: camera))
     page = CalibratePage(context=context)
     page.show()
     page.enter()
     page.open_path(session)
     assert page.wizard is not None
-    work = Work(page.wizard, camera, pictures, seed)
+    work = Work(page.wizard, camera, images, seed)
     timer = QTimer(interval=TICK_MS)
     timer.timeout.connect(work.go_on)
     timer.start()

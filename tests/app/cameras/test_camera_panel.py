@@ -1,4 +1,4 @@
-"""A technician chooses a camera, locks it, and is told when it is not as it was."""
+"""A technician selects a camera, locks it, and is warned when its settings differ."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from pytestqt.qtbot import QtBot
 from app.cameras import panel as panel_module
 from app.cameras.dialog import CameraDialog
 from app.cameras.panel import CameraPanel
-from app.shell.context import AppContext
+from app.context.context import AppContext
+from app.context.source_button import SourceButton
 from app.sources.camera.camera import Camera
 from app.sources.camera.driver import Device, Format
 from app.sources.camera.steadiness import SteadinessTest
 from app.sources.stream import Stream
-from app.widgets.source_button import SourceButton
 from gelpolight_core.session.camera_settings import CameraSettings
 
 WAIT_MS = 60_000
@@ -33,7 +33,7 @@ def fake() -> FakeCamera:
 
 @pytest.fixture
 def host(context: AppContext, fake: FakeCamera, qtbot: QtBot) -> Iterator[QWidget]:
-    """Return a window over which messages are shown, with the fake camera plugged in."""
+    """Return a window that can show messages, with the fake camera plugged in."""
     context.cameras.driver = FakeDriver(fake)
     window = QWidget()
     qtbot.addWidget(window)
@@ -62,7 +62,7 @@ def values(camera: Camera) -> dict[str, float]:
     return {control.key: control.value for control in camera.state.controls}
 
 
-def test_cameras_are_chosen_by_name_and_none_is_said_in_words(
+def test_cameras_are_selected_by_name_and_none_is_shown_as_text(
     context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
 ) -> None:
     twin = Device("046d:081b@SN2", C310.name, C310.model, "/dev/video2")
@@ -81,10 +81,10 @@ def test_cameras_are_chosen_by_name_and_none_is_said_in_words(
     context.cameras.driver = FakeDriver(fake)
     button.list_cameras()
     (none,) = [action for action in button.menu().actions() if ".camera." in action.objectName()]
-    assert (none.text(), none.isEnabled()) == ("No camera is plugged in", False)
+    assert (none.text(), none.isEnabled()) == ("No camera connected", False)
 
 
-def test_the_dialog_opens_from_the_source_button_once_and_lets_the_camera_go(
+def test_the_dialog_opens_once_and_releases_the_camera(
     context: AppContext, host: QWidget, fake: FakeCamera, qtbot: QtBot
 ) -> None:
     button = SourceButton(context=context, page="inspect", none="No camera", parent=host)
@@ -99,26 +99,26 @@ def test_the_dialog_opens_from_the_source_button_once_and_lets_the_camera_go(
     assert fake.opened == 1
 
 
-def test_locking_fixes_what_the_camera_sets_by_itself(
+def test_locking_fixes_the_automatic_settings(
     context: AppContext, panel: CameraPanel, qtbot: QtBot
 ) -> None:
-    assert "still sets some things by itself" in panel.said.text()
+    assert "still automatic" in panel.state.text()
     assert context.status.value.camera_note == "not locked"
     assert not panel.findChild(QDoubleSpinBox, "camera.exposure_ms").isEnabled()
     qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: "Locked" in panel.said.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "Locked" in panel.state.text(), timeout=WAIT_MS)
     now = values(panel.camera)
     assert (now["exposure_auto"], now["white_balance_auto"]) == (0.0, 0.0)
-    assert now["exposure_ms"] == 33.3  # what the camera had come to by itself
+    assert now["exposure_ms"] == 33.3  # the value that the camera had chosen automatically
     assert panel.findChild(QDoubleSpinBox, "camera.exposure_ms").isEnabled()
     assert context.status.value.camera_note == ""
 
 
-def test_a_value_that_the_camera_does_not_take_is_shown_as_it_is(
+def test_a_rejected_value_is_shown_as_read_back(
     context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
 ) -> None:
     qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: "Locked" in panel.said.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "Locked" in panel.state.text(), timeout=WAIT_MS)
     fake.ignores = {"gain"}
     gain = panel.findChild(QDoubleSpinBox, "camera.gain")
     gain.setValue(90.0)
@@ -128,9 +128,7 @@ def test_a_value_that_the_camera_does_not_take_is_shown_as_it_is(
     assert "Gain is 64, not 90" in table.advice
 
 
-def test_exposure_is_given_back_to_the_camera_by_its_switch(
-    panel: CameraPanel, qtbot: QtBot
-) -> None:
+def test_a_switch_returns_exposure_to_automatic(panel: CameraPanel, qtbot: QtBot) -> None:
     qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_auto"] == 0.0, timeout=WAIT_MS)
     automatic = panel.findChild(QCheckBox, "camera.exposure_auto")
@@ -139,7 +137,7 @@ def test_exposure_is_given_back_to_the_camera_by_its_switch(
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_auto"] == 1.0, timeout=WAIT_MS)
 
 
-def test_a_format_is_chosen_of_those_listed_and_compression_is_warned_of(
+def test_a_listed_format_is_selected_with_a_compression_warning(
     context: AppContext, panel: CameraPanel, qtbot: QtBot, caplog: pytest.LogCaptureFixture
 ) -> None:
     code = panel.findChild(QComboBox, "camera.format")
@@ -154,7 +152,7 @@ def test_a_format_is_chosen_of_those_listed_and_compression_is_warned_of(
         lambda: panel.camera.state.format == Format("MJPG", 128, 96, 30.0), timeout=WAIT_MS
     )
     qtbot.waitUntil(panel.formats.warning.isVisible, timeout=WAIT_MS)
-    assert "choose an uncompressed format" in panel.formats.warning.text()
+    assert "Choose an uncompressed format" in panel.formats.warning.text()
     assert "19 grey levels" in caplog.text
 
 
@@ -168,16 +166,16 @@ def test_the_steadiness_test_ends_in_a_table(
     assert not panel.test.isEnabled()
     qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
     assert panel.steady._table.verdict.value == "pass"
-    assert "still sets some things by itself" in panel.said.text()  # steady by chance
+    assert "still automatic" in panel.state.text()  # stable by chance
     qtbot.mouseClick(panel.lock, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: "Locked. Test" in panel.said.text(), timeout=WAIT_MS)
-    assert not panel.steady._table.figures  # it was of other settings
+    qtbot.waitUntil(lambda: "Locked. Test" in panel.state.text(), timeout=WAIT_MS)
+    assert not panel.steady._table.figures  # it belonged to other settings
     qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: "stands still: close" in panel.said.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "image is stable. Close" in panel.state.text(), timeout=WAIT_MS)
     assert "camera_flicker_percent" in {figure.key for figure in panel.steady._table.figures}
 
 
-def test_an_unplugged_camera_is_said_and_its_return_too(
+def test_unplugging_and_reconnecting_a_camera_is_reported(
     context: AppContext,
     panel: CameraPanel,
     fake: FakeCamera,
@@ -186,14 +184,14 @@ def test_an_unplugged_camera_is_said_and_its_return_too(
 ) -> None:
     qtbot.mouseClick(panel.test, Qt.MouseButton.LeftButton)
     fake.plugged = False
-    qtbot.waitUntil(lambda: "not plugged in" in panel.said.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "not plugged in" in panel.state.text(), timeout=WAIT_MS)
     assert not panel.lock.isEnabled()
     fake.plugged = True
     qtbot.waitUntil(panel.test.isEnabled, timeout=WAIT_MS)
-    assert f"{C310.name} is back." in caplog.text
+    assert f"{C310.name} is connected again." in caplog.text
 
 
-def test_a_camera_is_held_to_how_the_calibration_was_made(
+def test_a_camera_is_kept_at_the_settings_of_the_calibration(
     context: AppContext,
     panel: CameraPanel,
     fake: FakeCamera,
@@ -205,9 +203,9 @@ def test_a_camera_is_held_to_how_the_calibration_was_made(
     stored = CameraSettings(C310.name, C310.identity, C310.model, "YUYV", (128, 96), 7.5, controls)
     context.cameras.refer("the calibration", stored)
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 12.0, timeout=WAIT_MS)
-    words = "not set as it was for the calibration: Gain is 64, not 9"
+    words = "differ from those for the calibration: Gain is 64, not 9"
     qtbot.waitUntil(lambda: words in caplog.text, timeout=WAIT_MS)
-    qtbot.waitUntil(lambda: "Gain is 64, not 9" in panel.said.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "Gain is 64, not 9" in panel.state.text(), timeout=WAIT_MS)
     assert context.status.value.camera_note == "not set as for the calibration"
     fake.ignores = set()
     qtbot.waitUntil(panel.restore.isEnabled, timeout=WAIT_MS)
@@ -216,18 +214,18 @@ def test_a_camera_is_held_to_how_the_calibration_was_made(
     qtbot.waitUntil(lambda: not panel.restore.isEnabled(), timeout=WAIT_MS)
     other = replace(stored, identity="1:2@x", model="0001:0002", name="Other")
     context.cameras.refer("the calibration", other)
-    qtbot.waitUntil(lambda: "another camera than Other" in panel.said.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "another camera than Other" in panel.state.text(), timeout=WAIT_MS)
     assert not panel.restore.isEnabled()
 
 
-def test_how_a_camera_was_set_is_remembered_without_a_session(
+def test_camera_settings_are_stored_without_a_session(
     context: AppContext, panel: CameraPanel, fake: FakeCamera, qtbot: QtBot
 ) -> None:
     context.cameras.set(panel.camera, {"exposure_auto": 0.0, "exposure_ms": 8.0})
     qtbot.waitUntil(lambda: values(panel.camera)["exposure_ms"] == 8.0, timeout=WAIT_MS)
     panel.watch(False)
     fake.forgets = True
-    context.cameras.driver = FakeDriver(fake)  # as after a new start
+    context.cameras.driver = FakeDriver(fake)  # as after a restart
     info = context.cameras.infos()[0]
     stream = Stream(info.open())
     stream.start()
@@ -236,7 +234,7 @@ def test_how_a_camera_was_set_is_remembered_without_a_session(
     assert fake.settings["exposure_ms"].value == 8.0
 
 
-def test_a_camera_that_nothing_can_set_is_said_to_be_one(
+def test_a_camera_without_settings_is_reported(
     context: AppContext, host: QWidget, qtbot: QtBot
 ) -> None:
     context.cameras.driver = FakeDriver(FakeCamera(settings={}, formats=()))
@@ -244,13 +242,13 @@ def test_a_camera_that_nothing_can_set_is_said_to_be_one(
     assert camera is not None
     shown = CameraPanel(context.cameras, camera, host)
     shown.watch(True)
-    qtbot.waitUntil(lambda: "its maker's program" in shown.said.text(), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: "its manufacturer's program" in shown.state.text(), timeout=WAIT_MS)
     assert not shown.lock.isEnabled()
-    assert "does not tell which formats" in shown.formats.warning.text()
+    assert "does not report the formats" in shown.formats.warning.text()
     shown.watch(False)
 
 
-def test_every_control_has_a_name_for_those_who_cannot_see_it(panel: CameraPanel) -> None:
+def test_every_control_has_an_accessible_name(panel: CameraPanel) -> None:
     for kind in (QPushButton, QCheckBox, QComboBox, QDoubleSpinBox):
         for widget in panel.findChildren(kind):
             assert widget.objectName().startswith("camera."), widget

@@ -1,4 +1,4 @@
-"""Dialogs of the Inspect page: opened a thousand times, none of them is left."""
+"""Dialogs of the Inspect page leave nothing behind after many uses."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.inspect.export_dialog import ExportDialog
-from app.inspect.screenshot import ScreenshotDialog
+from app.view3d.image_dialog import ImageDialog, MovieDialog
 
 MAKERS: dict[str, Callable[[QWidget], QDialog]] = {
     "export": lambda host: ExportDialog(Path("depth"), count=3, at=1, parent=host),
-    "screenshot": lambda host: ScreenshotDialog(400, 300, True, parent=host),
+    "image": lambda host: ImageDialog(QSize(400, 300), ("surface", "views"), parent=host),
+    "movie": lambda host: MovieDialog(QSize(400, 300), recording=True, parent=host),
 }
 
 
 @pytest.mark.parametrize("name", MAKERS)
-@pytest.mark.parametrize("way", ["escape", "accepted"])
-def test_nothing_of_a_dialog_is_left_when_it_is_closed(name: str, way: str, qtbot: QtBot) -> None:
+@pytest.mark.parametrize("mode", ["escape", "accepted"])
+def test_nothing_of_a_dialog_is_left_when_it_is_closed(name: str, mode: str, qtbot: QtBot) -> None:
     host = QWidget()
     qtbot.addWidget(host)
     host.show()
@@ -29,7 +30,7 @@ def test_nothing_of_a_dialog_is_left_when_it_is_closed(name: str, way: str, qtbo
     for _ in range(3):
         dialog = MAKERS[name](host)
         dialog.open()
-        if way == "escape":
+        if mode == "escape":
             qtbot.keyClick(dialog, Qt.Key.Key_Escape)
         else:
             dialog.accept()
@@ -42,7 +43,7 @@ def test_nothing_of_a_dialog_is_left_when_it_is_closed(name: str, way: str, qtbo
 @pytest.mark.parametrize(
     ("typed", "expected"), [("run 3", "lab/run 3"), ("/data/x", "/data/x"), ("~", "~")]
 )
-def test_a_mere_name_is_a_folder_beside_the_proposed(
+def test_a_name_without_path_is_a_folder_next_to_the_proposed_one(
     typed: str, expected: str, tmp_path: Path, qtbot: QtBot
 ) -> None:
     host = QWidget()

@@ -1,4 +1,4 @@
-"""The Inspect page, as a technician meets it."""
+"""The Inspect page as a technician uses it."""
 
 from __future__ import annotations
 
@@ -14,17 +14,15 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
-from app.inspect.actions import POLL_MS
+from app.context.context import AppContext
 from app.inspect.export import ExportChoice
 from app.inspect.page import InspectPage
-from app.inspect.zero import FRAMES, zero_calibration
-from app.shell.context import AppContext
+from app.live.zero import FRAMES, zero_calibration
 from app.sources.processor import Outcome
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.session import read_picture
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import read_picture
 
 WAIT_MS = 60_000
 
@@ -43,23 +41,23 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
 
 @pytest.fixture
 def presses(small_session: Path, context: AppContext) -> Path:
-    """Return a folder with one press, chosen as the camera."""
-    from app.sources.listing import picture_folders
+    """Return a folder with one press, selected as the camera."""
+    from app.sources.listing import image_folders
 
-    (info,) = picture_folders([small_session / "balls"])()
+    (info,) = image_folders([small_session / "balls"])()
     context.source.choose(info)
     return small_session / "balls"
 
 
 def _use(page: InspectPage, calibration: Calibration) -> None:
-    """Look through a calibration by the paper's model, which is quick."""
+    """Show depth through a calibration with the paper's model, which is fast."""
     reconstructor = Reconstructor(calibration, model="paper")
-    page.calibrations.loaded.emit(reconstructor, reconstructor)
+    page.depth.calibrations.loaded.emit(reconstructor, reconstructor)
 
 
 def _wait_for_depth(page: InspectPage, qtbot: QtBot) -> None:
     def there() -> bool:
-        return page.link.last is not None and page.link.last.heightmap is not None
+        return page.depth.last is not None and page.depth.last.heightmap is not None
 
     qtbot.waitUntil(there, timeout=WAIT_MS)
 
@@ -71,10 +69,10 @@ def _advice(page: InspectPage) -> tuple[str, QPushButton]:
     return text.text(), button
 
 
-def test_without_anything_it_says_what_to_do_next(page: InspectPage) -> None:
+def test_an_empty_page_shows_what_to_do_next(page: InspectPage) -> None:
     page.enter()
     text, button = _advice(page)
-    assert "choose where the pictures come from" in text
+    assert "Choose an image source" in text
     assert button.isVisible()
 
 
@@ -101,18 +99,18 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     assert surface.view is not None and surface.reason == ""
     view = surface.view
     qtbot.waitUntil(lambda: view.drawings > 3, timeout=WAIT_MS)
-    frames, drawings = page.views.height.map.shown_pictures, view.drawings
+    frames, drawings = page.views.height.map.shown_images, view.drawings
     qtbot.waitUntil(lambda: view.drawings > drawings + 5, timeout=WAIT_MS)
-    shown = page.views.height.map.shown_pictures - frames
-    # The last frame's painting may be under way.
+    shown = page.views.height.map.shown_images - frames
+    # The painting of the last frame may still be running.
     assert abs((view.drawings - drawings) - shown) <= 1
-    picture = view.grab().toImage()
+    picture = view.grabFramebuffer()
     middle = picture.pixelColor(picture.width() // 2, picture.height() // 2)
     corner = picture.pixelColor(4, 4)
     assert middle != corner
 
 
-def test_nothing_is_made_for_a_view_that_is_hidden(
+def test_hidden_views_are_not_computed(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     for name in ("surface", "section", "camera", "normals", "quality"):
@@ -120,14 +118,14 @@ def test_nothing_is_made_for_a_view_that_is_hidden(
     page.enter()
     _use(page, small_calibration)
     _wait_for_depth(page, qtbot)
-    last = page.link.last
+    last = page.depth.last
     assert last is not None and last.height is not None
     assert last.surface is None and last.normals is None and last.quality is None
     assert last.cut is None
     assert page.views.surface.view is None
 
 
-def test_the_cursor_is_in_all_views_and_read_below(
+def test_all_views_share_the_cursor_and_its_values_are_shown(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     page.enter()
@@ -140,7 +138,38 @@ def test_the_cursor_is_in_all_views_and_read_below(
     assert page.views.height.map._lines[0].value() == 1.0
 
 
-def test_a_standing_picture_stands_until_it_goes_on(
+def test_dragging_the_colour_bar_locks_the_range_and_a_double_click_releases_it(
+    page: InspectPage,
+) -> None:
+    height, display = page.views.height, page.views.display
+    height.range_dragged.emit(0.1, 0.45)
+    assert display.display.range_mm == pytest.approx((0.1, 0.45))
+    assert page.depth._maker.wanted.display.range_mm == display.display.range_mm
+    height.range_released.emit()
+    assert display.display.range_mm is None
+    assert page.depth._maker.wanted.display.range_mm is None
+
+
+def test_the_colour_range_starts_again_with_another_source_only(
+    page: InspectPage, presses: Path, small_session: Path, context: AppContext
+) -> None:
+    from app.sources.listing import image_folders
+
+    page.enter()
+    page.leave()
+    bare, deep = np.zeros((40, 40), np.float32), np.full((40, 40), 3.0, np.float32)
+    colours = page.depth._maker.colour_range
+    colours.update(deep, 0.0)
+    page.enter()
+    page.leave()
+    assert colours.update(bare, 1.0)[1] == 5.0
+    (info,) = image_folders([small_session / "background"])()
+    context.source.choose(info)
+    page.enter()
+    assert page.depth._maker.colour_range.update(bare, 2.0)[1] < 0.1
+
+
+def test_a_frozen_image_stays_until_it_is_continued(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     page.enter()
@@ -150,33 +179,33 @@ def test_a_standing_picture_stands_until_it_goes_on(
     page.setFocus()
     qtbot.waitUntil(page.hasFocus, timeout=WAIT_MS)
     qtbot.keyClick(page, Qt.Key.Key_Space)
-    assert page.link.paused
+    assert page.live.paused
     qtbot.wait(200)
-    assert page.link.last is not None
-    number = page.link.last.frame.number
+    assert page.depth.last is not None
+    number = page.depth.last.frame.number
     qtbot.wait(400)
-    assert page.link.last.frame.number == number
+    assert page.depth.last.frame.number == number
     page.pause_action.trigger()
-    qtbot.waitUntil(lambda: page.link.last.frame.number > number, timeout=WAIT_MS)  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: page.depth.last.frame.number > number, timeout=WAIT_MS)  # type: ignore[union-attr]
 
 
-def test_a_calibration_of_another_size_is_refused_and_says_which(
+def test_a_calibration_of_another_image_size_is_refused_with_both_sizes(
     page: InspectPage, tmp_path: Path, context: AppContext, small_calibration: Calibration,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
-    from app.sources.listing import picture_folders
+    from app.sources.listing import image_folders
 
     folder = tmp_path / "others"
     folder.mkdir()
     cv2.imwrite(str(folder / "one.png"), np.full((100, 120, 3), 90, np.uint8))
-    (info,) = picture_folders([folder])()
+    (info,) = image_folders([folder])()
     context.source.choose(info)
     page.enter()
     _use(page, small_calibration)
     qtbot.waitUntil(lambda: "120x100" in _advice(page)[0], timeout=WAIT_MS)
 
 
-def test_a_calibration_of_another_sensor_is_refused_and_says_whose(
+def test_a_calibration_of_another_sensor_is_refused_with_both_serials(
     page: InspectPage, context: AppContext, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     context.source.choose_virtual_sensor()
@@ -186,37 +215,39 @@ def test_a_calibration_of_another_sensor_is_refused_and_says_whose(
     text, button = _advice(page)
     assert "lab-7" in text and "virtual-1" in text
     assert "Calibrate the virtual sensor" in button.text()
-    assert page.link.live is None
+    assert page.depth.live_reconstructor is None
 
 
 def _wait_for_section(page: InspectPage, qtbot: QtBot) -> None:
     qtbot.waitUntil(lambda: page.views.section.cut.profile is not None, timeout=WAIT_MS)
 
 
-def test_nothing_of_a_calibration_stays_when_it_is_no_longer_looked_through(
+def test_an_unused_calibration_is_released(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     page.enter()
     _use(page, small_calibration)
     _wait_for_section(page, qtbot)
-    views, link = page.views, page.link
+    views, live = page.views, page.live
     page.views.pointed.emit(1.0, 2.0)
     figures = page.findChild(QLabel, "inspect.section.figures")
     readout = page.findChild(QLabel, "inspect.readout")
     assert figures is not None and readout is not None
-    assert views.height.map.has_picture and figures.text() and readout.text()
-    late = Outcome(link._processor.generation, link.last.frame, link.last)  # type: ignore[union-attr]
-    page.calibrations.loaded.emit(None, None)
-    link._outbox.put(late)
-    link._take()
-    page._tell()
-    assert not views.height.map.has_picture
+    assert views.height.map.has_image and figures.text() and readout.text()
+    last = page.depth.last
+    assert last is not None
+    late = Outcome(live._processor.generation, last.frame, last)  # type: ignore[union-attr]
+    page.depth.calibrations.loaded.emit(None, None)
+    live._outbox.put(late)
+    live._poll()
+    page._show_texts()
+    assert not views.height.map.has_image
     assert views.section.cut.profile is None
     assert (figures.text(), readout.text()) == ("", "")
-    assert page._places is None
+    assert page._pixel_map is None
 
 
-def test_a_picture_stands_no_longer_than_the_page_is_looked_at(
+def test_leaving_the_page_unfreezes_the_image(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     page.enter()
@@ -225,30 +256,28 @@ def test_a_picture_stands_no_longer_than_the_page_is_looked_at(
     page.pause(True)
     page.leave()
     page.enter()
-    assert not page.link.paused and not page.pause_action.isChecked()
+    assert not page.live.paused and not page.pause_action.isChecked()
     _wait_for_depth(page, qtbot)
 
 
-def test_a_standing_picture_goes_with_its_source(
+def test_a_frozen_image_ends_with_its_source(
     page: InspectPage, presses: Path, small_session: Path, context: AppContext,
     small_calibration: Calibration, qtbot: QtBot,
 ) -> None:  # fmt: skip
-    from app.sources.listing import picture_folders
+    from app.sources.listing import image_folders
 
     page.enter()
     _use(page, small_calibration)
     _wait_for_section(page, qtbot)
     page.pause(True)
-    (info,) = picture_folders([small_session / "background"])()
+    (info,) = image_folders([small_session / "background"])()
     context.source.choose(info)
-    assert not page.views.height.map.has_picture
-    assert not page.link.paused and not page.pause_action.isChecked()
+    assert not page.views.height.map.has_image
+    assert not page.live.paused and not page.pause_action.isChecked()
     _wait_for_section(page, qtbot)
 
 
-def test_the_layout_is_found_again_as_it_was_left(
-    page: InspectPage, context: AppContext, qtbot: QtBot
-) -> None:
+def test_the_layout_is_restored(page: InspectPage, context: AppContext, qtbot: QtBot) -> None:
     page.enter()
     page.views.docks["normals"].hide()
     page.views.docks["section"].hide()
@@ -268,9 +297,9 @@ def test_the_frame_that_is_shown_is_exported_as_reconstructed(
     _wait_for_depth(page, qtbot)
     page.pause(True)
     qtbot.wait(300)
-    last = page.link.last
+    last = page.depth.last
     assert last is not None and last.heightmap is not None
-    page.deeds.run_export(ExportChoice(tmp_path / "out", ("npz",)))
+    page.file_actions.run_export(ExportChoice(tmp_path / "out", ("npz",)))
     path = tmp_path / "out" / f"frame-{last.frame.number:05d}.npz"
     qtbot.waitUntil(path.is_file, timeout=WAIT_MS)
     with np.load(path, allow_pickle=False) as stored:
@@ -285,18 +314,20 @@ def test_a_recording_is_made_and_replayed(
     _use(page, small_calibration)
     _wait_for_depth(page, qtbot)
     page.recorder.start()
-    qtbot.wait(800)
-    page.recorder.stop()
+    qtbot.waitUntil(lambda: page.recorder.action.text().endswith("left"), timeout=WAIT_MS)
+    context.settings.recording_limit_gb = 1e-6  # it stops by itself
     qtbot.waitUntil(lambda: not page.recorder.busy, timeout=4 * WAIT_MS)
+    assert page.recorder.action.text() == "Record"
+    assert any("size limit" in notice.text for notice in context.toasts.history)
     (path,) = context.workspace.folder.glob("sensors/*/recordings/*.gplrec")
     page.open_path(path)
     _wait_for_depth(page, qtbot)
     assert page.replay.isVisible()
-    source = page.link.stream.source  # type: ignore[union-attr]
+    source = page.live.stream.source  # type: ignore[union-attr]
     assert source.header.calibration_id == small_calibration.identity  # type: ignore[attr-defined]
 
 
-def test_a_recording_ends_where_the_camera_is_opened_again(
+def test_reopening_the_camera_ends_the_recording(
     page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
 ) -> None:
     page.enter()
@@ -304,33 +335,33 @@ def test_a_recording_ends_where_the_camera_is_opened_again(
     _wait_for_depth(page, qtbot)
     page.recorder.start()
     qtbot.wait(300)
-    page.link.open()
+    page.live.open()
     assert not page.recorder.action.isChecked()
     qtbot.waitUntil(lambda: not page.recorder.busy, timeout=WAIT_MS)
 
 
-def test_zero_puts_the_background_of_now_into_use_and_can_be_undone(
+def test_zero_uses_the_present_background_and_can_be_undone(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
     qtbot: QtBot,
 ) -> None:  # fmt: skip
-    from app.sources.listing import picture_folders
+    from app.sources.listing import image_folders
 
-    (info,) = picture_folders([small_session / "background"])()
+    (info,) = image_folders([small_session / "background"])()
     context.source.choose(info)
     path = context.workspace.calibration_path(small_calibration.sensor.serial, "mine")
     write_calibration(small_calibration, path)
     context.workspace.use(path)
     page.enter()
-    qtbot.waitUntil(lambda: page.link.reconstructor is not None, timeout=4 * WAIT_MS)
-    page.deeds.zero()
+    qtbot.waitUntil(lambda: page.depth.reconstructor is not None, timeout=4 * WAIT_MS)
+    page.zero.set_zero()
     zero = path.with_name("mine-zero.gplcal")
     qtbot.waitUntil(lambda: context.workspace.in_use == zero, timeout=WAIT_MS)
     qtbot.waitUntil(lambda: not page.jobs.busy, timeout=4 * WAIT_MS)
-    page.deeds._use(path)
+    page.zero._use(path)
     assert context.workspace.in_use == path
 
 
-def test_undo_of_a_second_zero_brings_back_what_is_kept(
+def test_undo_of_a_second_zero_restores_the_original(
     page: InspectPage, small_session: Path, context: AppContext, small_calibration: Calibration,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
@@ -344,14 +375,14 @@ def test_undo_of_a_second_zero_brings_back_what_is_kept(
     second = zero_calibration(workspace, first.path, frames)
     assert workspace.in_use == first.path == second.path != path
     monkeypatch.setattr(context.toasts, "show", lambda *_, actions: offered.extend(actions))
-    page.deeds._on_zeroed(second)
+    page.zero._on_zeroed(second)
     ((_, undo),) = offered
     undo()
     assert workspace.in_use == path
     assert path.read_bytes() == kept
 
 
-def test_leaving_while_zero_waits_for_its_frames_is_no_failure(
+def test_leaving_while_zero_waits_for_frames_is_reported_as_zero_not_set(
     page: InspectPage, presses: Path, context: AppContext, qtbot: QtBot,
     small_calibration: Calibration, caplog: pytest.LogCaptureFixture,
 ) -> None:  # fmt: skip
@@ -359,31 +390,11 @@ def test_leaving_while_zero_waits_for_its_frames_is_no_failure(
     write_calibration(small_calibration, path)
     context.workspace.use(path)
     page.enter()
-    page.deeds.zero()
-    waiting = page.deeds._capture
+    page.zero.set_zero()
+    assert page.live.capturing
     page.leave()
-    assert waiting is not None
-    assert isinstance(waiting.exception(), InputError)  # its frames never came
-    qtbot.wait(3 * POLL_MS)
-    assert [record.message for record in caplog.records if record.levelno > logging.INFO] == []
+    assert not page.live.capturing  # its frames never arrived
+    qtbot.wait(100)
+    levels = [record.levelno for record in caplog.records if record.levelno > logging.INFO]
+    assert levels == [logging.WARNING]
     assert context.workspace.in_use == path
-
-
-def test_where_3d_is_not_to_be_had_the_relief_is_shown_and_the_reason_said(
-    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
-    from app.inspect.scene3d import Scene
-
-    def refuse(_self: Scene) -> None:
-        raise InputError("OpenGL 3.2 is not to be had here", where="3D view", advice="Install it")
-
-    monkeypatch.setattr(Scene, "__init__", refuse)
-    page.enter()
-    _use(page, small_calibration)
-    qtbot.waitUntil(lambda: page.views.surface.reason != "", timeout=WAIT_MS)
-    _wait_for_depth(page, qtbot)
-    assert "OpenGL" in page.views.surface.reason
-    flat = page.views.surface._flat
-    assert flat is not None
-    qtbot.waitUntil(lambda: flat.shown_pictures > 0, timeout=WAIT_MS)

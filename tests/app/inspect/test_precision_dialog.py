@@ -1,4 +1,4 @@
-"""Error against run time, as the program shows it."""
+"""The dialog for error against run time."""
 
 from __future__ import annotations
 
@@ -11,20 +11,18 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
+from app.context.context import AppContext
 from app.inspect import precision_dialog
 from app.inspect.precision_dialog import PrecisionDialog
 from app.inspect.precision_plot import LIMITS, PrecisionPlot
-from app.shell.context import AppContext
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.calibration.file import write_calibration
-from gelpolight_core.experiments.work_precision import Point
-from gelpolight_core.experiments.work_precision_trial import (
-    USUAL,
-    chosen_methods,
-    measure_calibration,
-)
+from gelpolight_core.experiments.front.measure import Point
+from gelpolight_core.experiments.front.trial import USUAL, measure_calibration, usual_methods
+from gelpolight_core.sensor_calibration import Calibration
 
-POINT = Point("A", "paper", "paper's model", "paper", 1.2, 0.02, 10.0, 12.0, 30.0, 6.0, 2.0, 2.6)
+POINT = Point(
+    "A", "paper", "paper's model", "paper", 1280, 1.2, 0.02, 10.0, 12.0, 30.0, 6.0, 2.0, 2.6
+)
 POINTS = (
     POINT,
     replace(POINT, method="full_fast", label="full model, fast", family="effort", rms_um=9.0),
@@ -48,7 +46,10 @@ def dialog(
 
 
 def test_the_calibration_in_use_is_measured_on_rendered_presses(
-    dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+    dialog: PrecisionDialog,
+    small_calibration: Calibration,
+    monkeypatch: pytest.MonkeyPatch,
+    qtbot: QtBot,
 ) -> None:
     asked = []
 
@@ -61,7 +62,8 @@ def test_the_calibration_in_use_is_measured_on_rendered_presses(
     assert "virtual" in dialog.presses.text()
     dialog.start.click()
     qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
-    assert asked and asked[0] in dialog.calibrations.currentText()
+    assert asked == [small_calibration.identity]
+    assert "small" in dialog.calibrations.currentText()
     assert dialog.table.rowCount() == len(POINTS)
     assert "refused" in dialog.words.text()
     for row in range(dialog.error.count()):
@@ -69,7 +71,7 @@ def test_the_calibration_in_use_is_measured_on_rendered_presses(
     assert not dialog.grab().isNull()
 
 
-def test_its_report_is_the_command_lines(
+def test_its_report_equals_that_of_the_command_line(
     dialog: PrecisionDialog, tmp_path: Path, qtbot: QtBot
 ) -> None:
     dialog.show_points(POINTS)
@@ -79,7 +81,7 @@ def test_its_report_is_the_command_lines(
     assert (tmp_path / "work-precision.csv").is_file()
 
 
-def test_presses_of_another_sensor_are_refused_in_a_sentence(
+def test_presses_of_another_sensor_are_refused_in_one_sentence(
     dialog: PrecisionDialog, tmp_path: Path, small_session: Path, qtbot: QtBot
 ) -> None:
     text = (small_session / "session.toml").read_text("utf-8")
@@ -91,24 +93,23 @@ def test_presses_of_another_sensor_are_refused_in_a_sentence(
     assert dialog.start.isEnabled()
 
 
-def test_a_calibration_is_measured_by_the_ways_that_people_choose_between(
+def test_a_calibration_is_measured_in_the_modes_offered_to_users(
     small_calibration: Calibration, small_session: Path
 ) -> None:
-    methods = [m for m in chosen_methods(False) if m.name in ("paper", "full_balanced")]
+    methods = [m for m in usual_methods() if m.name in ("paper", "full_balanced")]
     points = measure_calibration(small_calibration, small_session, methods, repeats=1)
     assert [p.method for p in points] == ["paper", "full_balanced"]
     assert all(p.median_ms and p.rms_um for p in points)
-    assert {m.name for m in chosen_methods(False)} == set(USUAL)
-    assert len(chosen_methods(True)) > len(USUAL)
+    assert {m.name for m in usual_methods()} == set(USUAL)
 
 
-@pytest.mark.parametrize("way", ["escape", "close"])
-def test_it_goes_away_when_it_is_closed_and_can_be_shown_again(
-    dialog: PrecisionDialog, way: str, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+@pytest.mark.parametrize("mode", ["escape", "close"])
+def test_it_can_be_closed_and_shown_again(
+    dialog: PrecisionDialog, mode: str, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:
     monkeypatch.setattr(precision_dialog, "measure_virtual", lambda *_, **__: POINTS)
     for _ in range(2):
-        if way == "escape":
+        if mode == "escape":
             qtbot.keyClick(dialog, Qt.Key.Key_Escape)
         else:
             dialog.close()
@@ -118,7 +119,7 @@ def test_it_goes_away_when_it_is_closed_and_can_be_shown_again(
     qtbot.waitUntil(lambda: bool(dialog.points), timeout=20_000)
 
 
-def test_closing_it_ends_what_is_measured(
+def test_closing_it_stops_the_measurement(
     dialog: PrecisionDialog, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:
     begun = threading.Event()
@@ -143,13 +144,13 @@ def ticks(plot: PrecisionPlot, side: str) -> list[str]:
     return [text for _, text in plot._plot.getAxis(side)._tickLevels[0]]
 
 
-def test_the_axes_say_round_values_however_far_one_looks(dialog: PrecisionDialog) -> None:
+def test_the_axes_have_round_values_at_any_zoom(dialog: PrecisionDialog) -> None:
     plot = dialog.plot
     view = plot._plot.getViewBox()
     assert ticks(plot, "bottom")
     for _ in range(200):
         view.scaleBy((4.0, 4.0))
-    # What brings the axes up to date must bear what a mouse wheel can do.
+    # The axis update must work for every zoom of a mouse wheel.
     dialog.show_points(POINTS)
     (left, right), (bottom, top) = plot._plot.viewRange()
     assert LIMITS["xMin"] <= left < right <= LIMITS["xMax"]

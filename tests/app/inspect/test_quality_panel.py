@@ -1,4 +1,4 @@
-"""What the quality view shows is what was chosen."""
+"""The quality view shows the selected quantity."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 from pytestqt.qtbot import QtBot
 
-from app.inspect.products import Maker, Wanted
 from app.inspect.quality_panel import QualityPanel
+from app.live.frame_results import Maker, Wanted
 from app.sources.source import Frame
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 
 
 class Reconstruction:
-    """Stands for a Reconstructor."""
+    """Replaces a Reconstructor."""
 
     def __init__(self, heightmap: HeightMap) -> None:
         self._heightmap = heightmap
@@ -23,35 +23,35 @@ class Reconstruction:
         return self._heightmap
 
 
-def test_another_figure_does_not_show_the_picture_and_words_of_the_one_before(
+def test_another_quantity_does_not_show_the_previous_image_and_legend(
     dome: HeightMap, qtbot: QtBot
 ) -> None:
-    """Flags beside the colours of an uncertainty would be read as one."""
+    """Flags next to the legend of an uncertainty would be misread as one."""
     panel = QualityPanel()
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
-    assert not panel.map.has_picture and "No depth" in panel.map._words.text()
+    assert not panel.map.has_image and "No depth" in panel.map._words.text()
     panel._what.setCurrentIndex(panel._what.findData("flags"))
     maker = Maker(Reconstruction(dome))  # type: ignore[arg-type]
     maker.wanted = Wanted(quality="flags")
     shown = maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
     panel.show_frame(shown, still=True)
-    assert panel.map.has_picture and panel._legend.text() and panel.bar.isHidden()
+    assert panel.map.has_image and panel._legend.text() and not panel.map.bar.isVisible()
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
-    assert not panel.map.has_picture and not panel._legend.text() and panel.bar.isHidden()
+    assert not panel.map.has_image and not panel._legend.text() and not panel.map.bar.isVisible()
     panel.show_frame(replace(shown, quality_top=0.002), still=True)
-    assert panel.map.has_picture and panel._legend.text() and not panel.bar.isHidden()
+    assert panel.map.has_image and panel._legend.text() and panel.map.bar.isVisible()
 
 
-def test_of_a_standing_picture_it_is_said_whether_an_uncertainty_is_to_come(
+def test_a_frozen_image_states_whether_an_uncertainty_will_follow(
     dome: HeightMap, qtbot: QtBot
 ) -> None:
-    """Just after Pause the exact frame is not there yet, and the full model does state one."""
+    """Just after Pause the exact frame is not ready, but the full model gives an uncertainty."""
     panel = QualityPanel()
     qtbot.addWidget(panel)
     panel._what.setCurrentIndex(panel._what.findData("uncertainty"))
     maker = Maker(Reconstruction(dome))  # type: ignore[arg-type]
     shown = replace(maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)), quality=None)
-    for model, words in (("full", "being found out"), ("paper", "states no uncertainty")):
+    for model, words in (("full", "Computing"), ("paper", "gives no uncertainty")):
         panel.show_frame(replace(shown, heightmap=replace(dome, model=model)), still=True)
         assert words in panel.map._words.text()

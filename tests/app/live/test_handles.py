@@ -1,4 +1,4 @@
-"""Marks that a person moves go where the hand goes, and stay in the picture."""
+"""Handles follow the mouse and stay in the image."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def test_a_circle_is_moved_by_its_centre_and_resized_all_along_its_rim(
     assert find_grip(handles_of(OVERLAY), u, v, reach_px=6.0) == (BALL, grip)
 
 
-def test_nothing_is_taken_hold_of_far_from_every_handle() -> None:
+def test_nothing_is_grabbed_far_from_every_handle() -> None:
     assert find_grip(handles_of(OVERLAY), 400.0, 400.0, reach_px=6.0) is None
 
 
 @given(pixels, pixels, pixels, pixels)
-def test_a_dragged_centre_follows_the_hand_and_stays_in_the_picture(
+def test_a_dragged_centre_follows_the_mouse_and_stays_in_the_image(
     u: float, v: float, to_u: float, to_v: float
 ) -> None:
     moved = drag(BALL, Grip.CENTRE, (u, v), (to_u, to_v), SIZE)
@@ -99,7 +99,7 @@ def test_the_keyboard_reaches_every_handle_in_turn() -> None:
     assert next_name((), "ball", 1) == ""
 
 
-def test_overlays_with_lines_can_be_compared_without_looking_into_arrays() -> None:
+def test_overlays_with_lines_are_compared_without_reading_arrays() -> None:
     line = Line(np.zeros((3, 2)), "info")
     assert Overlay(lines=(line,)) == Overlay(lines=(line,))
     assert Overlay(lines=(line,)) != Overlay(lines=(Line(np.zeros((3, 2)), "info"),))

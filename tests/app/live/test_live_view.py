@@ -1,4 +1,4 @@
-"""The live view: what is shown, where, and what a person can do with it."""
+"""The live view: what it shows, where, and what the user can do with it."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from PySide6.QtWidgets import QApplication, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.live.drawing import ROLE_COLOURS
+from app.live.image_checks import pixel_text
 from app.live.live_view import LiveView
 from app.live.overlay import Circle, Line, Marker, Mask, Note, Overlay
-from app.live.picture_checks import pixel_text
 from app.shell.shortcuts import shortcuts_of
 from gelpolight_core.errors import InputError
 
@@ -27,7 +27,7 @@ HEIGHT, WIDTH = 60, 80
 
 
 class Slot:
-    """A mailbox of one."""
+    """A slot for one frame."""
 
     def __init__(self) -> None:
         self.frame: Any = None
@@ -52,13 +52,13 @@ class FakeStream:
         self.newest.frame = SimpleNamespace(rgb=rgb, number=1, time_s=0.0)
 
     def figures(self) -> SimpleNamespace:
-        """Return what a stream tells of itself."""
+        """Return the figures of the stream."""
         return SimpleNamespace(rate_hz=30.0, made=1, dropped=2, lost=self.lost)
 
 
 @pytest.fixture
 def view(qtbot: QtBot) -> LiveView:
-    """Return a view on the screen."""
+    """Return a visible view."""
     made = LiveView()
     qtbot.addWidget(made)
     made.resize(900, 760)
@@ -68,7 +68,7 @@ def view(qtbot: QtBot) -> LiveView:
 
 
 def black() -> np.ndarray:
-    """Return a black picture."""
+    """Return a black image."""
     return np.zeros((HEIGHT, WIDTH, 3), np.uint8)
 
 
@@ -80,7 +80,7 @@ def child(view: LiveView, name: str) -> Any:
 
 
 def pixels(widget: QWidget) -> np.ndarray:
-    """Return what a widget shows, (rows, columns, 3)."""
+    """Return the pixels of a widget, (rows, columns, 3)."""
     image = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
     flat = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
     return flat[:, : 3 * image.width()].reshape(image.height(), image.width(), 3).copy()
@@ -93,46 +93,46 @@ def middle(mask: np.ndarray) -> tuple[float, float]:
     return float(columns.mean() + 0.5), float(rows.mean() + 0.5)
 
 
-def mouse(picture: Any, kind: QEvent.Type, at: tuple[float, float], held: bool) -> None:
-    """Send the picture a mouse event at a place in it, as the window system would."""
-    QTest.qWait(12)  # the scene takes at most a hundred moves a second
-    place = QPointF(*at)
+def mouse(image_view: Any, kind: QEvent.Type, at: tuple[float, float], held: bool) -> None:
+    """Send a mouse event at an image position, like the window system."""
+    QTest.qWait(12)  # the scene processes at most a hundred moves per second
+    position = QPointF(*at)
     left, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
     button = none if kind == QEvent.Type.MouseMove else left
     event = QMouseEvent(
         kind,
-        place,
-        QPointF(picture.viewport().mapToGlobal(place.toPoint())),
+        position,
+        QPointF(image_view.viewport().mapToGlobal(position.toPoint())),
         button,
         left if held else none,
         Qt.KeyboardModifier.NoModifier,
     )
-    QApplication.sendEvent(picture.viewport(), event)
+    QApplication.sendEvent(image_view.viewport(), event)
 
 
 def drag(view: LiveView, start: tuple[float, float], end: tuple[float, float]) -> None:
-    """Drag with the left button from one picture point to another, in small steps."""
-    picture = child(view, "live.picture")
+    """Drag with the left button from one image point to another, in small steps."""
+    image_view = child(view, "live.image")
     route = [np.add(start, np.subtract(end, start) * t) for t in np.linspace(0.0, 1.0, 9)]
-    places = [picture.view_position(*point) for point in route]
-    mouse(picture, QEvent.Type.MouseMove, places[0], False)
-    mouse(picture, QEvent.Type.MouseButtonPress, places[0], True)
-    for place in places[1:]:
-        mouse(picture, QEvent.Type.MouseMove, place, True)
-    mouse(picture, QEvent.Type.MouseButtonRelease, places[-1], False)
+    positions = [image_view.view_position(*point) for point in route]
+    mouse(image_view, QEvent.Type.MouseMove, positions[0], False)
+    mouse(image_view, QEvent.Type.MouseButtonPress, positions[0], True)
+    for position in positions[1:]:
+        mouse(image_view, QEvent.Type.MouseMove, position, True)
+    mouse(image_view, QEvent.Type.MouseButtonRelease, positions[-1], False)
     QApplication.processEvents()
 
 
 @pytest.mark.parametrize(("u", "v"), [(0, 0), (7, 5), (WIDTH - 1, HEIGHT - 1)])
 def test_whole_numbers_are_pixel_centres(view: LiveView, u: int, v: int) -> None:
-    """Not their corners: half a pixel would spoil every mark that a person sets."""
+    """Not their corners: half a pixel would shift every mark that the user sets."""
     rgb = black()
     rgb[v, u] = 255
-    view.show_picture(rgb)
-    picture = child(view, "live.picture")
-    x, y = picture.view_position(u, v)
-    shown = middle(pixels(picture).min(axis=2) > 128)
-    # A picture pixel is ten on the screen; smoothing and rounding leave one.
+    view.show_image(rgb)
+    image_view = child(view, "live.image")
+    x, y = image_view.view_position(u, v)
+    shown = middle(pixels(image_view).min(axis=2) > 128)
+    # An image pixel has ten screen pixels; smoothing and rounding leave one.
     assert shown == pytest.approx((x, y), abs=1.0)
 
 
@@ -140,19 +140,19 @@ def test_whole_numbers_are_pixel_centres(view: LiveView, u: int, v: int) -> None
 def test_a_marker_sits_on_the_centre_of_its_pixel(view: LiveView, kind: Any) -> None:
     rgb = black()
     rgb[20, 30] = (60, 60, 60)
-    view.show_picture(rgb)
-    picture = child(view, "live.picture")
-    pixel = middle(pixels(picture)[..., 0] > 50)
+    view.show_image(rgb)
+    image_view = child(view, "live.image")
+    pixel = middle(pixels(image_view)[..., 0] > 50)
     view.set_overlay(Overlay(markers=(Marker(30.0, 20.0, kind, "good"),)))
     green = np.array(QColor(ROLE_COLOURS["good"]).getRgb()[:3])
-    marked = (np.abs(pixels(picture).astype(int) - green) < 60).all(axis=2)
+    marked = (np.abs(pixels(image_view).astype(int) - green) < 60).all(axis=2)
     assert middle(marked) == pytest.approx(pixel, abs=1.0)
 
 
 def test_every_kind_of_mark_shows_and_can_be_switched_off(view: LiveView) -> None:
-    view.show_picture(black())
-    picture = child(view, "live.picture")
-    bare = pixels(picture)
+    view.show_image(black())
+    image_view = child(view, "live.image")
+    bare = pixels(image_view)
     area = np.zeros((HEIGHT, WIDTH), bool)
     area[5:9, 5:9] = True
     items: dict[str, Any] = {
@@ -164,85 +164,85 @@ def test_every_kind_of_mark_shows_and_can_be_switched_off(view: LiveView) -> Non
     }
     for kind, item in items.items():
         view.set_overlay(Overlay(**{kind: (item,)}))
-        assert (pixels(picture) != bare).any(), kind
+        assert (pixels(image_view) != bare).any(), kind
     child(view, "live.overlay").click()
-    np.testing.assert_array_equal(pixels(picture), bare)
+    np.testing.assert_array_equal(pixels(image_view), bare)
     view.set_overlay(Overlay(notes=(Note("later", "bad"),)))
-    np.testing.assert_array_equal(pixels(picture), bare)
+    np.testing.assert_array_equal(pixels(image_view), bare)
 
 
 def test_a_masked_pixel_is_tinted_and_its_neighbours_are_not(view: LiveView) -> None:
-    view.show_picture(black())
-    picture = child(view, "live.picture")
+    view.show_image(black())
+    image_view = child(view, "live.image")
     area = np.zeros((HEIGHT, WIDTH), bool)
     area[20, 30] = True
     view.set_overlay(Overlay(masks=(Mask(area, "bad"),)))
-    shown = pixels(picture)
-    assert middle(shown[..., 0] > 60) == pytest.approx(picture.view_position(30, 20), abs=1.0)
+    shown = pixels(image_view)
+    assert middle(shown[..., 0] > 60) == pytest.approx(image_view.view_position(30, 20), abs=1.0)
 
 
-def test_a_dragged_circle_tells_where_it_went(view: LiveView, qtbot: QtBot) -> None:
-    view.show_picture(black())
+def test_a_dragged_circle_reports_its_new_position(view: LiveView, qtbot: QtBot) -> None:
+    view.show_image(black())
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
-    with qtbot.waitSignal(view.moved) as told:
+    with qtbot.waitSignal(view.moved) as reported:
         drag(view, (40.0, 30.0), (45.0, 26.0))
-    assert told.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (45.0, 26.0, 12.0))]
+    assert reported.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (45.0, 26.0, 12.0))]
 
 
 def test_a_dragged_rim_resizes_the_circle(view: LiveView, qtbot: QtBot) -> None:
-    view.show_picture(black())
+    view.show_image(black())
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
-    with qtbot.waitSignal(view.moved) as told:
+    with qtbot.waitSignal(view.moved) as reported:
         drag(view, (52.0, 30.0), (56.0, 30.0))
-    assert told.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (40.0, 30.0, 16.0))]
+    assert reported.args == ["ball", *(pytest.approx(x, abs=0.15) for x in (40.0, 30.0, 16.0))]
 
 
-def test_marks_without_a_handle_let_the_picture_be_moved(view: LiveView, qtbot: QtBot) -> None:
-    view.show_picture(black())
+def test_the_image_can_be_panned_over_marks_without_a_handle(view: LiveView, qtbot: QtBot) -> None:
+    view.show_image(black())
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good"),)))
-    picture = child(view, "live.picture")
-    before = picture.view_position(40.0, 30.0)
+    image_view = child(view, "live.image")
+    before = image_view.view_position(40.0, 30.0)
     with qtbot.assertNotEmitted(view.moved):
         drag(view, (40.0, 30.0), (45.0, 30.0))
-    after = picture.view_position(40.0, 30.0)
-    assert after[0] - before[0] == pytest.approx(5.0 * picture.scale_px, rel=0.2)
+    after = image_view.view_position(40.0, 30.0)
+    assert after[0] - before[0] == pytest.approx(5.0 * image_view.scale_px, rel=0.2)
 
 
-def test_a_newer_result_does_not_tear_a_handle_from_the_hand(view: LiveView) -> None:
-    view.show_picture(black())
+def test_a_newer_result_does_not_move_a_dragged_handle(view: LiveView) -> None:
+    view.show_image(black())
     circle = Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),))
     view.set_overlay(circle)
-    picture = child(view, "live.picture")
-    places = [picture.view_position(u, 30.0) for u in (40.0, 42.0, 44.0, 46.0)]
-    mouse(picture, QEvent.Type.MouseMove, places[0], False)
-    mouse(picture, QEvent.Type.MouseButtonPress, places[0], True)
-    for place in places[1:]:
-        mouse(picture, QEvent.Type.MouseMove, place, True)
+    image_view = child(view, "live.image")
+    positions = [image_view.view_position(u, 30.0) for u in (40.0, 42.0, 44.0, 46.0)]
+    mouse(image_view, QEvent.Type.MouseMove, positions[0], False)
+    mouse(image_view, QEvent.Type.MouseButtonPress, positions[0], True)
+    for position in positions[1:]:
+        mouse(image_view, QEvent.Type.MouseMove, position, True)
     view.set_overlay(circle)
-    assert picture.overlay.handles[0].u > 43.0
-    mouse(picture, QEvent.Type.MouseButtonRelease, places[-1], False)
+    assert image_view.overlay.handles[0].u > 43.0
+    mouse(image_view, QEvent.Type.MouseButtonRelease, positions[-1], False)
 
 
-def test_arrow_keys_nudge_the_chosen_handle(view: LiveView, qtbot: QtBot) -> None:
-    view.show_picture(black())
+def test_arrow_keys_move_the_selected_handle(view: LiveView, qtbot: QtBot) -> None:
+    view.show_image(black())
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
     qtbot.keyClick(view, Qt.Key.Key_PageDown)
-    with qtbot.waitSignal(view.moved) as told:
+    with qtbot.waitSignal(view.moved) as reported:
         qtbot.keyClick(view, Qt.Key.Key_Right)
         qtbot.keyClick(view, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
         qtbot.keyClick(view, Qt.Key.Key_Plus)
         qtbot.keyClick(view, Qt.Key.Key_Minus, Qt.KeyboardModifier.ControlModifier)
-    assert told.args == ["ball", *(pytest.approx(x) for x in (40.2, 28.0, 10.2))]
+    assert reported.args == ["ball", *(pytest.approx(x) for x in (40.2, 28.0, 10.2))]
 
 
-def test_hiding_the_view_does_not_lose_a_nudge(view: LiveView, qtbot: QtBot) -> None:
-    view.show_picture(black())
+def test_hiding_the_view_does_not_lose_a_move_by_key(view: LiveView, qtbot: QtBot) -> None:
+    view.show_image(black())
     view.set_overlay(Overlay(markers=(Marker(5.0, 6.0, "plus", "led0", handle="mirror.0"),)))
     qtbot.keyClick(view, Qt.Key.Key_PageDown)
     qtbot.keyClick(view, Qt.Key.Key_Down)
-    with qtbot.waitSignal(view.moved) as told:
+    with qtbot.waitSignal(view.moved) as reported:
         view.hide()
-    assert told.args == ["mirror.0", 5.0, pytest.approx(6.2), 0.0]
+    assert reported.args == ["mirror.0", 5.0, pytest.approx(6.2), 0.0]
 
 
 def test_the_newest_frame_of_a_stream_is_shown(view: LiveView, qtbot: QtBot) -> None:
@@ -251,41 +251,41 @@ def test_the_newest_frame_of_a_stream_is_shown(view: LiveView, qtbot: QtBot) -> 
     rgb = black()
     rgb[:] = (0, 90, 0)
     stream.put(rgb)
-    picture = child(view, "live.picture")
-    qtbot.waitUntil(lambda: bool((pixels(picture)[300, 450] == (0, 90, 0)).all()))
+    image_view = child(view, "live.image")
+    qtbot.waitUntil(lambda: bool((pixels(image_view)[300, 450] == (0, 90, 0)).all()))
     assert child(view, "live.rate").text() == "30 frames/s, 2 dropped"
     assert child(view, "live.focus").isVisible()
 
 
-def test_nothing_is_drawn_while_no_frame_comes(view: LiveView, qtbot: QtBot) -> None:
+def test_nothing_is_drawn_without_a_new_frame(view: LiveView, qtbot: QtBot) -> None:
     stream = FakeStream()
     view.set_stream(stream)
     stream.put(black())
     qtbot.waitUntil(lambda: stream.newest.frame is None)
     qtbot.wait(50)
     painted = []
-    item = child(view, "live.picture").overlay
+    item = child(view, "live.image").overlay
     paint = item.paint
     item.paint = lambda *a: (painted.append(1), paint(*a))
     qtbot.wait(150)
     assert not painted
 
 
-def test_a_frozen_picture_stays_while_the_stream_goes_on(view: LiveView, qtbot: QtBot) -> None:
+def test_a_frozen_image_stays_while_the_stream_continues(view: LiveView, qtbot: QtBot) -> None:
     stream = FakeStream()
     view.set_stream(stream)
     stream.put(np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
-    picture = child(view, "live.picture")
-    qtbot.waitUntil(lambda: bool((pixels(picture)[300, 450] == 90).all()))
+    image_view = child(view, "live.image")
+    qtbot.waitUntil(lambda: bool((pixels(image_view)[300, 450] == 90).all()))
     view.freeze(True)
     stream.put(np.full((HEIGHT, WIDTH, 3), 30, np.uint8))
     qtbot.wait(80)
-    assert (pixels(picture)[300, 450] == 90).all()
+    assert (pixels(image_view)[300, 450] == 90).all()
     view.freeze(False)
-    qtbot.waitUntil(lambda: bool((pixels(picture)[300, 450] == 30).all()))
+    qtbot.waitUntil(lambda: bool((pixels(image_view)[300, 450] == 30).all()))
 
 
-def test_why_the_camera_was_lost_is_told(view: LiveView, qtbot: QtBot) -> None:
+def test_the_reason_for_a_lost_camera_is_shown(view: LiveView, qtbot: QtBot) -> None:
     stream = FakeStream()
     view.set_stream(stream)
     stream.put(black())
@@ -295,35 +295,35 @@ def test_why_the_camera_was_lost_is_told(view: LiveView, qtbot: QtBot) -> None:
 
 
 def test_without_a_stream_the_view_says_so(view: LiveView) -> None:
-    view.show_picture(black())
+    view.show_image(black())
     view.set_stream(None)
-    picture = child(view, "live.picture")
-    words = [label.text() for label in picture.findChildren(QWidget) if hasattr(label, "text")]
-    assert "No camera. Choose a source." in words
-    assert picture.picture_size == (0, 0)
+    image_view = child(view, "live.image")
+    words = [label.text() for label in image_view.findChildren(QWidget) if hasattr(label, "text")]
+    assert "No camera. Select a source." in words
+    assert image_view.picture_size == (0, 0)
 
 
 def test_stripes_come_and_go_on_a_still(view: LiveView) -> None:
-    view.show_picture(np.full((HEIGHT, WIDTH, 3), 255, np.uint8))
-    picture = child(view, "live.picture")
+    view.show_image(np.full((HEIGHT, WIDTH, 3), 255, np.uint8))
+    image_view = child(view, "live.image")
     magenta = (255, 0, 255)
-    assert not (pixels(picture) == magenta).all(axis=2).any()
+    assert not (pixels(image_view) == magenta).all(axis=2).any()
     view.zebra(True)
-    assert (pixels(picture) == magenta).all(axis=2).mean() > 0.2
+    assert (pixels(image_view) == magenta).all(axis=2).mean() > 0.2
     view.zebra(False)
-    assert not (pixels(picture) == magenta).all(axis=2).any()
+    assert not (pixels(image_view) == magenta).all(axis=2).any()
 
 
-def test_sixteen_bit_frames_are_shown_and_read_in_their_own_numbers(view: LiveView) -> None:
+def test_sixteen_bit_frames_are_shown_with_their_own_values(view: LiveView) -> None:
     rgb = np.full((HEIGHT, WIDTH, 3), 30000, np.uint16)
-    view.show_picture(rgb)
-    assert (pixels(child(view, "live.picture"))[300, 450] == 30000 >> 8).all()
+    view.show_image(rgb)
+    assert (pixels(child(view, "live.image"))[300, 450] == 30000 >> 8).all()
     assert pixel_text(rgb, 3.4, 4.6) == (
         "u 3, v 5:  R 30000 (46 %)   G 30000 (46 %)   B 30000 (46 %)"
     )
 
 
-def test_the_readout_knows_where_the_picture_ends() -> None:
+def test_the_readout_ends_at_the_image_border() -> None:
     rgb = black()
     assert pixel_text(rgb, -0.4, HEIGHT - 0.6).startswith(f"u 0, v {HEIGHT - 1}:")
     for u, v in ((-0.6, 5.0), (5.0, -0.6), (WIDTH - 0.4, 5.0), (5.0, HEIGHT - 0.4)):
@@ -332,11 +332,11 @@ def test_the_readout_knows_where_the_picture_ends() -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_a_snapshot_holds_the_very_numbers_and_no_marks(
+def test_a_snapshot_contains_the_exact_values_and_no_marks(
     view: LiveView, tmp_path: Path, dtype: type
 ) -> None:
     rgb = np.random.default_rng(1).integers(0, np.iinfo(dtype).max, (HEIGHT, WIDTH, 3), dtype)
-    view.show_picture(rgb)
+    view.show_image(rgb)
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good"),)))
     view.zebra(True)
     path = tmp_path / "shot.png"
@@ -345,65 +345,67 @@ def test_a_snapshot_holds_the_very_numbers_and_no_marks(
     np.testing.assert_array_equal(read[..., ::-1], rgb)
 
 
-def test_the_snapshot_key_writes_into_the_folder_and_says_where(
+def test_the_snapshot_key_saves_into_the_folder_and_reports_the_path(
     view: LiveView, qtbot: QtBot, tmp_path: Path
 ) -> None:
     view.snapshot_folder = tmp_path / "pictures"
-    view.show_picture(black())
-    with qtbot.waitSignal(view.saved) as told:
+    view.show_image(black())
+    with qtbot.waitSignal(view.saved) as reported:
         child(view, "live.snapshot").click()
-    assert Path(told.args[0]).parent == tmp_path / "pictures"
-    assert Path(told.args[0]).is_file()
+    assert Path(reported.args[0]).parent == tmp_path / "pictures"
+    assert Path(reported.args[0]).is_file()
 
 
-def test_a_snapshot_of_nothing_is_refused_in_a_sentence(view: LiveView, qtbot: QtBot) -> None:
-    with pytest.raises(InputError, match="Choose a source"):
+def test_a_snapshot_without_an_image_is_rejected_with_a_sentence(
+    view: LiveView, qtbot: QtBot
+) -> None:
+    with pytest.raises(InputError, match="Select a source"):
         view.snapshot(Path("never.png"))
-    with qtbot.waitSignal(view.refused) as told:
+    with qtbot.waitSignal(view.refused) as reported:
         child(view, "live.snapshot").click()
-    assert "there is no picture" in told.args[0]
+    assert "there is no image" in reported.args[0]
 
 
 def test_fit_full_size_and_double_click(view: LiveView) -> None:
-    view.show_picture(black())
-    picture = child(view, "live.picture")
-    fitted = picture.scale_px
+    view.show_image(black())
+    image_view = child(view, "live.image")
+    fitted = image_view.scale_px
     assert fitted == pytest.approx(
-        min(picture.width() / WIDTH, picture.height() / HEIGHT), rel=0.02
+        min(image_view.width() / WIDTH, image_view.height() / HEIGHT), rel=0.02
     )
     view.full_size()
-    assert picture.scale_px == pytest.approx(1.0, rel=1e-6)
+    assert image_view.scale_px == pytest.approx(1.0, rel=1e-6)
     assert child(view, "live.zoom").text() == "100 %"
     view.resize(700, 600)
-    assert picture.scale_px == pytest.approx(1.0, rel=0.01)
-    place = picture.view_position(20.0, 20.0)
-    mouse(picture, QEvent.Type.MouseButtonDblClick, place, True)
-    mouse(picture, QEvent.Type.MouseButtonRelease, place, False)
-    assert picture.scale_px > 4.0
+    assert image_view.scale_px == pytest.approx(1.0, rel=0.01)
+    position = image_view.view_position(20.0, 20.0)
+    mouse(image_view, QEvent.Type.MouseButtonDblClick, position, True)
+    mouse(image_view, QEvent.Type.MouseButtonRelease, position, False)
+    assert image_view.scale_px > 4.0
     view.full_size()
     view.fit()
-    assert picture.scale_px > 4.0
+    assert image_view.scale_px > 4.0
     view.resize(500, 400)
     QApplication.processEvents()
-    assert picture.scale_px == pytest.approx(
-        min(picture.width() / WIDTH, picture.height() / HEIGHT), rel=0.02
+    assert image_view.scale_px == pytest.approx(
+        min(image_view.width() / WIDTH, image_view.height() / HEIGHT), rel=0.02
     )
 
 
-def test_a_click_tells_the_pixel(view: LiveView, qtbot: QtBot) -> None:
-    view.show_picture(black())
-    picture = child(view, "live.picture")
-    place = picture.view_position(33.0, 21.0)
-    with qtbot.waitSignal(view.clicked) as told:
-        mouse(picture, QEvent.Type.MouseButtonPress, place, True)
-        mouse(picture, QEvent.Type.MouseButtonRelease, place, False)
-    assert told.args == [pytest.approx(33.0, abs=0.1), pytest.approx(21.0, abs=0.1)]
+def test_a_click_reports_the_pixel(view: LiveView, qtbot: QtBot) -> None:
+    view.show_image(black())
+    image_view = child(view, "live.image")
+    position = image_view.view_position(33.0, 21.0)
+    with qtbot.waitSignal(view.clicked) as reported:
+        mouse(image_view, QEvent.Type.MouseButtonPress, position, True)
+        mouse(image_view, QEvent.Type.MouseButtonRelease, position, False)
+    assert reported.args == [pytest.approx(33.0, abs=0.1), pytest.approx(21.0, abs=0.1)]
 
 
 def test_every_tool_has_a_name_a_tip_with_its_key_and_a_key_that_works(
     view: LiveView, qtbot: QtBot
 ) -> None:
-    view.show_picture(black())
+    view.show_image(black())
     view.activateWindow()
     view.setFocus()
     qtbot.waitUntil(view.isActiveWindow)
@@ -433,7 +435,7 @@ def test_tools_follow_the_theme(view: LiveView) -> None:
     palette.setColor(palette.ColorRole.ButtonText, QColor("#ff0000"))
     try:
         QApplication.setPalette(palette)
-        # Under a style sheet, Qt tells widgets of another palette when the sheet is set anew.
+        # With a style sheet, Qt sends a palette change to widgets only when the sheet is set again.
         application.setStyleSheet(sheet + " ")
         QApplication.processEvents()
         assert button.icon().cacheKey() != before
@@ -443,49 +445,45 @@ def test_tools_follow_the_theme(view: LiveView) -> None:
         application.setStyleSheet(sheet)
 
 
-def test_drags_are_handed_on_where_they_are_wanted_and_the_picture_stays(
-    view: LiveView, qtbot: QtBot
-) -> None:
-    view.show_picture(black())
+def test_requested_drags_are_emitted_and_do_not_pan(view: LiveView, qtbot: QtBot) -> None:
+    view.show_image(black())
     view.hand_drags_on(True)
-    picture = child(view, "live.picture")
-    before = picture.view_position(40.0, 30.0)
-    told: list[tuple[str, float, float]] = []
-    view.dragged.connect(lambda *what: told.append(what))
+    image_view = child(view, "live.image")
+    before = image_view.view_position(40.0, 30.0)
+    reported: list[tuple[str, float, float]] = []
+    view.dragged.connect(lambda *what: reported.append(what))
     with qtbot.assertNotEmitted(view.clicked):
         drag(view, (40.0, 30.0), (50.0, 20.0))
-    assert [phase for phase, _, _ in told] == ["begin", *["move"] * (len(told) - 2), "end"]
-    assert told[0][1:] == pytest.approx((40.0, 30.0), abs=0.2)
-    assert told[-1][1:] == pytest.approx((50.0, 20.0), abs=0.2)
-    assert picture.view_position(40.0, 30.0) == before
+    assert [phase for phase, _, _ in reported] == ["begin", *["move"] * (len(reported) - 2), "end"]
+    assert reported[0][1:] == pytest.approx((40.0, 30.0), abs=0.2)
+    assert reported[-1][1:] == pytest.approx((50.0, 20.0), abs=0.2)
+    assert image_view.view_position(40.0, 30.0) == before
 
 
-def test_a_handle_is_dragged_before_what_lies_below_it(view: LiveView, qtbot: QtBot) -> None:
-    view.show_picture(black())
+def test_a_handle_is_dragged_before_the_object_below_it(view: LiveView, qtbot: QtBot) -> None:
+    view.show_image(black())
     view.hand_drags_on(True)
     view.set_overlay(Overlay(circles=(Circle(40.0, 30.0, 12.0, "good", handle="ball"),)))
     with qtbot.assertNotEmitted(view.dragged), qtbot.waitSignal(view.moved):
         drag(view, (40.0, 30.0), (45.0, 30.0))
 
 
-def test_no_magnification_is_told_without_a_picture(view: LiveView) -> None:
+def test_no_magnification_is_shown_without_an_image(view: LiveView) -> None:
     assert child(view, "live.zoom").text() == ""
-    view.show_picture(black())
+    view.show_image(black())
     assert child(view, "live.zoom").text().endswith("%")
     view.set_stream(None)
     assert child(view, "live.zoom").text() == ""
 
 
 @pytest.mark.parametrize("width", [370, 630, 900])
-def test_the_exposures_advice_is_never_cut_off_and_moves_nothing(
-    view: LiveView, width: int
-) -> None:
+def test_the_exposure_advice_is_never_cut_off_and_moves_nothing(view: LiveView, width: int) -> None:
     view.resize(width, 700)
     QApplication.processEvents()
     heights = set()
     for level in (0, 10, 128, 255):
         bright = np.full((HEIGHT, WIDTH, 3), level, np.uint8)
-        view.show_picture(bright)
+        view.show_image(bright)
         QApplication.processEvents()
         label = child(view, "live.exposure")
         assert label.text()
@@ -496,8 +494,8 @@ def test_the_exposures_advice_is_never_cut_off_and_moves_nothing(
     assert len(heights) == 1
 
 
-def test_the_keys_of_the_picture_are_on_the_sheet_of_shortcuts(qtbot: QtBot) -> None:
+def test_the_keys_of_the_image_are_in_the_shortcut_list(qtbot: QtBot) -> None:
     view = LiveView()
     qtbot.addWidget(view)
-    told = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(view)}
-    assert ("live", "Z", "Stripes where saturated") in told
+    reported = {(shortcut.group, shortcut.keys, shortcut.text) for shortcut in shortcuts_of(view)}
+    assert ("live", "Z", "Mark saturated pixels") in reported

@@ -1,4 +1,4 @@
-"""A camera before the small sensor of the scene: bare, or with something pressed where one says."""
+"""A camera on the small sensor of the scene: bare, or with an object pressed in."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import scene
 from numpy.typing import NDArray
 
 from app.sources.source import Frame, Setting
-from gelpolight_core.calibration.calibration import Calibration
+from gelpolight_core.sensor_calibration import Calibration
 
 RATE_HZ = 60.0
 WALL_MM = 0.25
@@ -20,7 +20,7 @@ WALL_MM = 0.25
 def picture(
     calibration: Calibration, place_mm: tuple[float, float] | None, size_mm: float = 5.0
 ) -> NDArray[np.float64]:
-    """Return what the camera sees (240, 320, 3), 0..1, of a round press 0.5 mm high, or of none."""
+    """Return the camera image (240, 320, 3), 0..1, of a round press 0.5 mm high, or of none."""
 
     def slopes(points: NDArray[np.float64]) -> NDArray[np.float64]:
         if place_mm is None:
@@ -34,7 +34,7 @@ def picture(
 
 
 class SceneCamera:
-    """Shows what a test puts before it, each frame with a noise of its own."""
+    """Shows what a test places before it. Each frame has its own noise."""
 
     kind, name, size = "camera", "Scene camera", (320, 240)
 
@@ -46,7 +46,7 @@ class SceneCamera:
         self.shaking = self.cropped = False
 
     def press(self, place_mm: tuple[float, float] | None) -> None:
-        """Press at a place from the next frame on; None: lift."""
+        """Press at a point from the next frame on. None: lift."""
         light = picture(self._calibration, place_mm)
         with self._lock:
             self._light = light
@@ -61,7 +61,8 @@ class SceneCamera:
             light, self._number = self._light, self._number + 1
             rng = np.random.default_rng(self._number)
             if self.shaking:
-                # By chance: to who sees every fifth frame a regular movement may stand still.
+                # Random: otherwise a regular movement could look still to a check of every fifth
+                # frame.
                 light = np.roll(light, rng.integers(0, 5, 2), axis=(1, 0))
             if self.cropped:
                 light = light[:, ::2]

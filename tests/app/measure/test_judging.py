@@ -1,4 +1,4 @@
-"""Errors and verdicts: those of the core's comparison, and nothing where no truth is stated."""
+"""Errors and verdicts: equal to the core's comparison, and none without a true value."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from app.measure.judging import Stated, judge
 from app.measure.keeping import Kept, record_of
-from app.shell.settings import Limits
+from app.services.settings import Limits
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.measurement.result import Measurement, Truth, compare
 from gelpolight_core.measurement.tools import Cylinder, Distance, ToolResult
-from gelpolight_core.reconstruction.heightmap import HeightMap
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.records.entry import DOUBTFUL, FAILED, PASSED, UNJUDGED
 
 LENGTHS = st.floats(0.01, 50.0)
@@ -96,7 +96,7 @@ def test_the_verdict_follows_the_limits() -> None:
     assert record_of(_kept(PRESSED, Stated())).verdict == UNJUDGED
 
 
-def test_a_record_says_what_was_measured_with_what_and_by_whom() -> None:
+def test_a_record_contains_object_calibration_and_operator() -> None:
     record = record_of(_kept(APART, Stated(size_mm=3.01, name="Gauge")))
     assert (record.serial, record.calibration_id, record.picture) == ("A", "A-1", "p.png")
     assert (record.operator, record.note) == ("Ada", "by hand")

@@ -1,4 +1,4 @@
-"""What a technician does on the Measure page: measure, correct, compare, keep, find it again."""
+"""The work of a technician on the Measure page: measure, correct, compare, save, find again."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from PySide6.QtGui import QAction, QDropEvent
 from pytestqt.qtbot import QtBot
 
 from app.command_line.main import main
+from app.context.context import AppContext
 from app.measure.grips import grips_of
 from app.measure.judging import Stated
 from app.measure.page import MeasurePage
-from app.shell.context import AppContext
-from app.shell.settings import Limits
-from gelpolight_core.calibration.calibration import Calibration
+from app.services.settings import Limits
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.measurement.tools import ProfileWidth
 from gelpolight_core.recording.recording import RecordingHeader
 from gelpolight_core.recording.writer import RecordingWriter
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME, Records
+from gelpolight_core.sensor_calibration import Calibration
 
 PATIENCE_MS = 60_000
 
@@ -47,13 +47,13 @@ def calibration_file(
 
 @pytest.fixture
 def press(small_session: Path) -> Path:
-    """Return the picture of a cylinder."""
+    """Return the image of a cylinder."""
     return next(iter(sorted((small_session / "presses").glob("cylinder*.png"))))
 
 
 @pytest.fixture
 def library(context: AppContext, calibration_file: Path) -> Path:
-    """Put the calibration into the workspace and into use."""
+    """Put the calibration into the workspace and select it."""
     path = context.workspace.import_calibration(calibration_file)
     context.workspace.use(path)
     return path
@@ -61,7 +61,7 @@ def library(context: AppContext, calibration_file: Path) -> Path:
 
 @pytest.fixture
 def page(context: AppContext, qtbot: QtBot) -> Iterator[MeasurePage]:
-    """Return the page, shown."""
+    """Return the visible page."""
     made = _open(context)
     yield made
     _close(made)
@@ -83,14 +83,14 @@ def _close(page: MeasurePage) -> None:
 
 
 def _measured(page: MeasurePage, qtbot: QtBot) -> None:
-    work = page.desk.work
+    work = page.press_view.work
     qtbot.waitUntil(lambda: work.result is not None and not work.busy, timeout=PATIENCE_MS)
 
 
 def _put_cylinder(page: MeasurePage, press: Path, qtbot: QtBot) -> None:
     page.open_path(press)
-    qtbot.waitUntil(lambda: page.desk.work.heightmap is not None, timeout=PATIENCE_MS)
-    page.desk.propose()
+    qtbot.waitUntil(lambda: page.press_view.work.heightmap is not None, timeout=PATIENCE_MS)
+    page.press_view.propose()
     _measured(page, qtbot)
 
 
@@ -98,28 +98,28 @@ def _kept(page: MeasurePage, qtbot: QtBot, count: int) -> None:
     qtbot.waitUntil(lambda: len(page.book.records) == count and not page.book.busy)
 
 
-def test_without_a_calibration_the_page_says_what_to_do(page: MeasurePage) -> None:
-    assert "calibration" in page.desk.banner.findChild(object, "inspect.advice").text()
-    assert not page.desk.map.tools.buttons["distance"].isEnabled()
-    assert not page.desk.panel.keep.isEnabled()
+def test_without_a_calibration_the_page_shows_what_to_do(page: MeasurePage) -> None:
+    assert "calibration" in page.press_view.banner.findChild(object, "inspect.advice").text()
+    assert not page.press_view.map.tools.buttons["distance"].isEnabled()
+    assert not page.press_view.panel.keep.isEnabled()
     assert page.results.stack.currentIndex() == 0
 
 
-def test_damaged_records_are_kept_aside_and_it_is_said(context: AppContext, qtbot: QtBot) -> None:
+def test_damaged_records_are_set_aside_and_reported(context: AppContext, qtbot: QtBot) -> None:
     context.workspace.folder.mkdir(parents=True)
     (context.workspace.folder / "records.sqlite").write_bytes(b"no database at all" * 100)
     page = _open(context)
-    told: list[str] = []
-    page.book.noticed.connect(told.append)
-    qtbot.waitUntil(lambda: bool(told))
-    assert "damaged" in told[0]
+    reported: list[str] = []
+    page.book.noticed.connect(reported.append)
+    qtbot.waitUntil(lambda: bool(reported))
+    assert "damaged" in reported[0]
     assert len(list(context.workspace.folder.glob("records.damaged-*"))) == 1
     _close(page)
     context.toasts.clear()
 
 
 @pytest.mark.usefixtures("library")
-def test_a_press_is_recognised_measured_compared_and_kept_like_the_command_says(
+def test_a_press_is_detected_measured_compared_and_saved_like_the_command_does(
     page: MeasurePage,
     context: AppContext,
     qtbot: QtBot,
@@ -128,25 +128,26 @@ def test_a_press_is_recognised_measured_compared_and_kept_like_the_command_says(
     calibration_file: Path,
 ) -> None:
     _put_cylinder(page, press, qtbot)
-    desk = page.desk
-    assert desk.work.tool.name == "cylinder"
+    press_view = page.press_view
+    assert press_view.work.tool.name == "cylinder"
     true = _true(press)
-    desk.panel.truth.state(Stated(float(true["diameter_mm"]), float(true["height_mm"])))
-    desk.panel.who.setText("Ada")
-    desk.panel.note.setText("on the bench")
-    desk.keep()
+    press_view.panel.truth.state(Stated(float(true["diameter_mm"]), float(true["height_mm"])))
+    press_view.panel.operator.setText("Ada")
+    press_view.panel.note.setText("on the bench")
+    press_view.keep()
     _kept(page, qtbot, 1)
 
-    at = desk.work.tool.at_mm
+    at = press_view.work.tool.at_mm
     result = tmp_path / "result.json"
     arguments = ["measure", str(calibration_file), str(press), "--shape", "cylinder"]
     arguments += ["--truth", str(press.parent / "truth.csv"), "--json", str(result)]
     assert main([*arguments, "--seed", repr(at[0]), repr(at[1])]) == 0
-    told = json.loads(result.read_text())
+    reported = json.loads(result.read_text())
+    assert reported.pop("faults") == []
     (record,) = page.book.records
-    assert {k: record.details[k] for k in told} == told
-    assert [q.value for q in record.quantities] == [told["diameter_mm"], told["height_mm"]]
-    assert [q.error_percent for q in record.quantities] == list(told["error_percent"].values())
+    assert {k: record.details[k] for k in reported} == reported
+    assert [q.value for q in record.quantities] == [reported["diameter_mm"], reported["height_mm"]]
+    assert [q.error_percent for q in record.quantities] == list(reported["error_percent"].values())
     assert (record.operator, record.note, record.picture) == ("Ada", "on the bench", press.name)
 
     with closing(sqlite3.connect(context.workspace.folder / NAME)) as records:
@@ -155,9 +156,9 @@ def test_a_press_is_recognised_measured_compared_and_kept_like_the_command_says(
     used = read_calibration(calibration_file)
     assert known == (used.identity, "full", used.provenance.created, used.verdict.value)
 
-    # The limits are the person's: remembered, and followed at once.
+    # The limits of the user are saved and applied at once.
     page._keep_limits(Limits(size_percent=0.001))
-    assert "beyond" in desk.panel.truth.verdict.text()
+    assert "outside" in press_view.panel.truth.verdict.text()
     assert context.settings.limits.size_percent == 0.001
 
     again = _open(context)
@@ -172,11 +173,11 @@ def _true(press: Path) -> dict[str, str]:
 
 
 @pytest.mark.usefixtures("library")
-def test_tools_are_placed_moved_by_keys_and_taken_back(
+def test_tools_are_placed_moved_by_keys_and_undone(
     page: MeasurePage, qtbot: QtBot, press: Path
 ) -> None:
     page.open_path(press)
-    work, tool_map = page.desk.work, page.desk.map
+    work, tool_map = page.press_view.work, page.press_view.map
     qtbot.waitUntil(lambda: work.heightmap is not None, timeout=PATIENCE_MS)
     tool_map.tools.buttons["distance"].click()
     tool_map.layer.clicked.emit(-2.0, 0.0)
@@ -184,7 +185,7 @@ def test_tools_are_placed_moved_by_keys_and_taken_back(
     _measured(page, qtbot)
     assert work.result.figures[0].value == pytest.approx(4.0)
 
-    # Three nudges of one end are one step of the history.
+    # Three key moves of one end are one undo step.
     tool_map._next_grip(1)
     for _ in range(3):
         qtbot.keyClick(tool_map, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
@@ -205,7 +206,7 @@ def test_tools_are_placed_moved_by_keys_and_taken_back(
     work.undo.undo()
     assert len(work.sheet.items) == 1
 
-    # By keys alone: choose, place in the middle, let another one go.
+    # With the keyboard only: choose a tool, place it in the middle, cancel another one.
     tool_map.tools.buttons["rectangle"].click()
     qtbot.keyClick(tool_map, Qt.Key.Key_Return)
     assert [item.tool.name for item in work.sheet.items] == ["distance", "rectangle"]
@@ -216,12 +217,12 @@ def test_tools_are_placed_moved_by_keys_and_taken_back(
 
 
 @pytest.mark.usefixtures("library")
-def test_what_is_removed_from_the_records_comes_back_by_undo_and_goes_out_as_csv(
+def test_removed_records_are_restored_by_undo_and_exported_as_csv(
     page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
     _put_cylinder(page, press, qtbot)
     for count in (1, 2):
-        page.desk.keep()
+        page.press_view.keep()
         _kept(page, qtbot, count)
     results = page.results
     page.tabs.setCurrentWidget(results)
@@ -247,16 +248,16 @@ def test_what_is_removed_from_the_records_comes_back_by_undo_and_goes_out_as_csv
 
 
 @pytest.mark.usefixtures("library")
-def test_a_picture_of_another_size_is_refused_by_a_sentence_and_the_next_one_is_taken(
+def test_an_image_of_another_size_is_refused_and_the_next_one_is_accepted(
     page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
     wrong = tmp_path / "other.png"
     rgb = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
     cv2.imwrite(str(wrong), rgb)
     page.open_path(wrong)
-    advice = page.desk.banner.findChild(object, "inspect.advice")
+    advice = page.press_view.banner.findChild(object, "inspect.advice")
     qtbot.waitUntil(lambda: "64x48" in advice.text(), timeout=PATIENCE_MS)
-    assert not page.desk.panel.keep.isEnabled()
+    assert not page.press_view.panel.keep.isEnabled()
 
     dropped = QMimeData()
     dropped.setUrls([QUrl.fromLocalFile(str(press))])
@@ -269,36 +270,36 @@ def test_a_picture_of_another_size_is_refused_by_a_sentence_and_the_next_one_is_
             Qt.KeyboardModifier.NoModifier,
         )
     )
-    qtbot.waitUntil(lambda: page.desk.work.heightmap is not None, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: page.press_view.work.heightmap is not None, timeout=PATIENCE_MS)
     assert "64x48" not in advice.text()
 
 
 @pytest.mark.usefixtures("library")
-def test_a_steady_press_before_the_camera_is_held_and_recognised_by_itself(
+def test_a_steady_press_is_frozen_and_detected_automatically(
     page: MeasurePage, context: AppContext, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
-    from app.sources.listing import picture_folders
+    from app.sources.listing import image_folders
 
     folder = tmp_path / "camera"
     folder.mkdir()
     shutil.copy(press, folder / press.name)
-    for info in picture_folders([folder])():
+    for info in image_folders([folder])():
         context.source.choose(info)
     _measured(page, qtbot)
-    desk = page.desk
-    assert desk.hold_action.isChecked()
-    assert desk.work.tool.name == "cylinder"
-    held = desk.work.result.measurement.as_json()
+    press_view = page.press_view
+    assert press_view.hold_action.isChecked()
+    assert press_view.work.tool.name == "cylinder"
+    held = press_view.work.result.measurement.as_json()
 
-    # It is the very picture: from its file the figures are the same to the last bit.
-    desk.open_file(press)
-    desk.propose()
+    # It is the same image: from its file the figures are identical to the last bit.
+    press_view.open_file(press)
+    press_view.propose()
     _measured(page, qtbot)
-    assert desk.work.result.measurement.as_json() == held
+    assert press_view.work.result.measurement.as_json() == held
 
-    desk.hold_action.trigger()
-    assert desk.work.taken is None
-    assert not desk.panel.keep.isEnabled()
+    press_view.hold_action.trigger()
+    assert press_view.work.image is None
+    assert not press_view.panel.keep.isEnabled()
 
 
 @pytest.mark.usefixtures("library")
@@ -306,29 +307,29 @@ def test_a_section_is_shown_where_its_width_was_read_and_the_tools_in_the_other_
     page: MeasurePage, qtbot: QtBot, press: Path
 ) -> None:
     page.open_path(press)
-    desk = page.desk
-    qtbot.waitUntil(lambda: desk.work.heightmap is not None, timeout=PATIENCE_MS)
-    desk.details.open_at(desk.details.section)
-    depth = desk.work.heightmap
+    press_view = page.press_view
+    qtbot.waitUntil(lambda: press_view.work.heightmap is not None, timeout=PATIENCE_MS)
+    press_view.details.open_at(press_view.details.section)
+    depth = press_view.work.heightmap
     row, column = np.unravel_index(depth.depth_mm.argmax(), depth.depth_mm.shape)
     x, y = float(depth.x_mm[column]), float(depth.y_mm[row])
-    desk.work.add(ProfileWidth((x - 6.0, y), (x + 6.0, y)))
+    press_view.work.add(ProfileWidth((x - 6.0, y), (x + 6.0, y)))
     _measured(page, qtbot)
-    assert desk.details.section.currentWidget() is desk.details.plot
-    assert not desk.map.panel.grab().isNull() and not desk.details.plot.grab().isNull()
+    assert press_view.details.section.currentWidget() is press_view.details.plot
+    assert not press_view.map.panel.grab().isNull() and not press_view.details.plot.grab().isNull()
 
-    desk.details.open_at(desk.details.camera)
-    assert desk.details.camera.picture_size == (320, 240)
-    desk.details.open_at(desk.details.surface)
-    qtbot.waitUntil(lambda: desk.details.surface.view is not None, timeout=PATIENCE_MS)
-    view = desk.details.surface.view
+    press_view.details.open_at(press_view.details.camera)
+    assert press_view.details.camera.picture_size == (320, 240)
+    press_view.details.open_at(press_view.details.surface)
+    qtbot.waitUntil(lambda: press_view.details.surface.view is not None, timeout=PATIENCE_MS)
+    view = press_view.details.surface.view
     qtbot.waitUntil(lambda: view.drawings > 0, timeout=PATIENCE_MS)
-    desk.details.open_at(desk.details.surface, False)
-    assert not desk.details.wants_surface
+    press_view.details.open_at(press_view.details.surface, False)
+    assert not press_view.details.wants_surface
 
 
 @pytest.mark.usefixtures("library")
-def test_a_recording_is_gone_through_frame_by_frame(
+def test_a_recording_can_be_measured_frame_by_frame(
     page: MeasurePage, qtbot: QtBot, press: Path, tmp_path: Path
 ) -> None:
     rgb = np.ascontiguousarray(cv2.imread(str(press))[..., ::-1])
@@ -336,19 +337,19 @@ def test_a_recording_is_gone_through_frame_by_frame(
     with RecordingWriter(path, RecordingHeader(serial="virtual-1")) as writer:
         for number in range(4):
             writer.append(rgb, number, 100.0 + 0.05 * number)
-    page.desk.auto.setChecked(False)
+    page.press_view.auto.setChecked(False)
     page.open_path(path)
-    desk = page.desk
-    qtbot.waitUntil(lambda: desk.replay.isVisible(), timeout=PATIENCE_MS)
-    qtbot.waitUntil(lambda: desk.hold_action.isEnabled(), timeout=PATIENCE_MS)
-    desk.hold()
-    assert desk.work.taken is not None
-    desk.replay.findChild(QAction, "replay.on").trigger()
-    assert desk.work.taken is None
-    qtbot.waitUntil(lambda: desk.hold_action.isEnabled(), timeout=PATIENCE_MS)
+    press_view = page.press_view
+    qtbot.waitUntil(lambda: press_view.replay.isVisible(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: press_view.hold_action.isEnabled(), timeout=PATIENCE_MS)
+    press_view.hold()
+    assert press_view.work.image is not None
+    press_view.replay.findChild(QAction, "replay.on").trigger()
+    assert press_view.work.image is None
+    qtbot.waitUntil(lambda: press_view.hold_action.isEnabled(), timeout=PATIENCE_MS)
 
 
-def test_another_workspace_is_read_at_once_and_what_was_meant_for_the_first_is_refused(
+def test_another_workspace_is_read_at_once_and_pending_changes_are_refused(
     page: MeasurePage, context: AppContext, qtbot: QtBot, tmp_path: Path
 ) -> None:
     book, go = page.book, threading.Event()

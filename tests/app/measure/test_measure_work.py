@@ -1,4 +1,4 @@
-"""The picture that is measured on belongs to the page alone."""
+"""Only the page keeps the measured image in memory."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import cv2
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.calibrate.lut_worker import Answered, NewestWins
-from app.measure.measuring import Answer, Measuring, Question, Taken
+from app.measure.measuring import Answer, MeasuredImage, Measuring, Question
 from app.measure.sheet import Sheet
 from app.measure.work import Work
+from app.services.newest_wins import Answered, NewestWins
 from app.sources.source import Frame
-from gelpolight_core.calibration.calibration import Calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
 
 PATIENCE_MS = 60_000
 
@@ -28,25 +28,44 @@ def _other_sensors(calibration: Calibration) -> Calibration:
     return replace(calibration, sensor=replace(calibration.sensor, serial="B-2"))
 
 
-def test_a_picture_that_is_put_away_is_let_go_and_the_next_one_is_measured(
+def test_a_removed_image_is_released_and_the_next_one_is_measured(
     small_calibration: Calibration, small_session: Path, qtbot: QtBot
 ) -> None:
-    taken = Taken("press", next((small_session / "presses").glob("cylinder*.png")))
+    image = MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png")))
     work = Work()
     work.use(Reconstructor(small_calibration))
-    work.take(taken)
+    work.take(image)
     qtbot.waitUntil(lambda: work.answer is not None, timeout=PATIENCE_MS)
     assert work.answer is not None
     linear = weakref.ref(work.answer.linear)
     work.take(None)
     assert not work.busy
     qtbot.waitUntil(lambda: linear() is None)
-    work.take(taken)
+    work.take(image)
     qtbot.waitUntil(lambda: work.answer is not None and not work.busy, timeout=PATIENCE_MS)
     work.close()
 
 
-def test_what_an_earlier_calibration_says_is_not_shown_for_the_one_in_use(
+def test_a_second_request_to_detect_the_object_adds_no_second_tool(
+    small_calibration: Calibration, small_session: Path, qtbot: QtBot
+) -> None:
+    work = Work()
+    work.use(Reconstructor(small_calibration))
+    work.take(MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png"))))
+    work.propose()
+    assert work.detecting
+    work.propose()  # an impatient click
+    qtbot.waitUntil(lambda: bool(work.sheet.items) and not work.busy, timeout=PATIENCE_MS)
+    assert not work.detecting
+    first = work.chosen
+    work.choose(0)
+    work.propose()
+    qtbot.waitUntil(lambda: work.chosen == first, timeout=PATIENCE_MS)
+    assert len(work.sheet.items) == 1
+    work.close()
+
+
+def test_results_of_an_earlier_calibration_are_not_shown(
     small_calibration: Calibration,
     small_session: Path,
     qtbot: QtBot,
@@ -74,7 +93,7 @@ def test_what_an_earlier_calibration_says_is_not_shown_for_the_one_in_use(
     monkeypatch.setattr("app.measure.work.NewestWins", Watched)
     work = Work()
     work.use(Reconstructor(first))
-    work.take(Taken("press", next((small_session / "presses").glob("cylinder*.png"))))
+    work.take(MeasuredImage("press", next((small_session / "presses").glob("cylinder*.png"))))
     assert begun.wait(60.0)
     work.use(Reconstructor(second))
     go[first.sensor.serial].set()
@@ -94,8 +113,8 @@ def test_a_frame_of_another_sensor_is_refused_though_its_size_fits(
     frame = Frame(cv2.imread(str(path))[..., ::-1].copy(), 0, 0.0)
     measuring, model = Measuring(), small_calibration.model
     for serial in ("", small_calibration.sensor.serial):
-        taken = Taken("press", frame=frame, serial=serial)
-        assert measuring(Question(small_calibration, model, taken, Sheet())) is not None
-    taken = Taken("press", frame=frame, serial="B-2")
-    with pytest.raises(InputError, match="the picture is of B-2"):
-        measuring(Question(small_calibration, model, taken, Sheet()))
+        image = MeasuredImage("press", frame=frame, serial=serial)
+        assert measuring(Question(small_calibration, model, image, Sheet())) is not None
+    image = MeasuredImage("press", frame=frame, serial="B-2")
+    with pytest.raises(InputError, match="sensor B-2"):
+        measuring(Question(small_calibration, model, image, Sheet()))

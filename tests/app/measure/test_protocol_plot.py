@@ -6,11 +6,11 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.measure.protocol_plot import Fig13
-from app.shell import theme
+from app.theme import theme
 
 
 class Counting(Fig13):
-    """Counts how often it is drawn anew."""
+    """Counts how often it is redrawn."""
 
     drawn = 0
 
@@ -18,8 +18,8 @@ class Counting(Fig13):
         self.drawn += 1
 
 
-def test_it_is_drawn_anew_once_when_the_theme_has_changed(qapp: QApplication, qtbot: QtBot) -> None:
-    """Not while Qt goes through its widgets to tell them: plots are made and deleted by it."""
+def test_a_theme_change_redraws_it_once(qapp: QApplication, qtbot: QtBot) -> None:
+    """Not while Qt walks over its widgets to notify them: the redraw creates and deletes plots."""
     figure = Counting()
     qtbot.addWidget(figure)
     figure.show()

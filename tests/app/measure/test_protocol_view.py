@@ -1,4 +1,4 @@
-"""The protocol as a technician goes through it: shown where, taken when still, left, reported."""
+"""The protocol as a technician uses it: mark, automatic capture, interruption, report."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.command_line.main import main
+from app.context.context import AppContext
+from app.measure.press_check import TOLERANCE_MM, ImageMap, PressCheck, make_target
 from app.measure.protocol_bench import BenchHand
-from app.measure.protocol_look import TOLERANCE_MM, PictureMap, PressLooker, make_target
 from app.measure.protocol_view import ProtocolView
-from app.shell.context import AppContext
-from app.shell.settings import Limits
+from app.services.settings import Limits
 from app.sources.bench import Bench
 from app.sources.source import SourceInfo
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.export.run_lock import RunLock
+from gelpolight_core.io.lock import RunLock
 from gelpolight_core.measurement.protocol import PressWanted, Protocol
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.optics.refraction import camera_to_membrane
@@ -39,10 +39,10 @@ def frame(place_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("shape", ["cylinder", "cuboid"])
-def test_the_mark_lies_where_the_camera_will_see_the_object(shape: str) -> None:
+def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
     calibration = scene.calibration()
     press = PressWanted(Truth(shape, 4.0, 1.0), (3.0, -2.0), 30.0, "r01", 1)
-    target = make_target(press, PictureMap(calibration))
+    target = make_target(press, ImageMap(calibration))
     seen = np.vstack([target.outline_px, [target.centre_px]])
     back, _ = camera_to_membrane(
         calibration.camera.directions(seen), calibration.plane, calibration.stack
@@ -55,19 +55,19 @@ def test_the_mark_lies_where_the_camera_will_see_the_object(shape: str) -> None:
     assert target.pixels_per_mm == pytest.approx(1.0 / calibration.table.grid.pitch_mm, rel=0.05)
 
 
-def test_the_live_picture_is_followed_from_lifting_to_holding() -> None:
+def test_the_live_image_is_followed_from_lifting_to_holding() -> None:
     press = PressWanted(Truth("cylinder", 5.0, 0.5), (2.0, 1.0), 0.0, "r01", 1)
-    target = make_target(press, PictureMap(scene.calibration()))
-    looker = PressLooker(target, frame(None, 0))
-    assert looker(frame(press.place_mm, 1)).sentence == "Lift everything off the sensor."
-    assert looker.phase == "lift"
-    assert looker(frame(None, 2)).sentence.startswith("Press it in at the mark")
+    target = make_target(press, ImageMap(scene.calibration()))
+    check = PressCheck(target, frame(None, 0))
+    assert check(frame(press.place_mm, 1)).sentence == "Lift everything off the sensor."
+    assert check.phase == "lift"
+    assert check(frame(None, 2)).sentence.startswith("Press the object in at the mark")
     beside = (2.0 + 2 * TOLERANCE_MM, 1.0)
-    assert "mm beside the mark" in looker(frame(beside, 3)).sentence
-    assert looker.phase == "press"
-    held = looker(frame(press.place_mm, 4))
-    assert held.ready and looker.phase == "hold"
-    assert not looker(np.zeros((12, 16, 3), np.uint8)).ready
+    assert "mm from the mark" in check(frame(beside, 3)).sentence
+    assert check.phase == "press"
+    held = check(frame(press.place_mm, 4))
+    assert held.held and check.phase == "hold"
+    assert not check(np.zeros((12, 16, 3), np.uint8)).held
 
 
 def test_the_bench_presses_once_about_where_it_should() -> None:
@@ -89,7 +89,7 @@ def test_the_bench_presses_once_about_where_it_should() -> None:
 
 @pytest.fixture
 def camera(context: AppContext) -> SceneCamera:
-    """Return the chosen camera; its calibration is in the library."""
+    """Return the selected camera. Its calibration is in the library."""
     calibration = scene.calibration()
     write_calibration(calibration, context.workspace.calibration_path("T-1", "first"))
     made = SceneCamera(calibration)
@@ -111,7 +111,7 @@ def view(context: AppContext, camera: SceneCamera, qtbot: QtBot) -> Iterator[Pro
 
 
 def choose(view: ProtocolView, *, repeats: int, regions: int = 0) -> None:
-    """Choose a cylinder of 5 mm and 0.5 mm height alone."""
+    """Select only a cylinder of 5 mm and 0.5 mm height."""
     for boxes, kept in (
         (view.setup.shapes, "cylinder"),
         (view.setup.sizes, None),
@@ -137,13 +137,13 @@ def take_bare(view: ProtocolView, qtbot: QtBot) -> None:
 
 
 def wait_until_asked(view: ProtocolView, qtbot: QtBot) -> None:
-    """Wait until the program has seen the bare membrane, and asks for a press."""
+    """Wait until the program has captured the bare membrane and requests a press."""
     live = view.pressing.panel.live
-    qtbot.waitUntil(lambda: live.text().startswith("Press it in"), timeout=WAIT_MS)
+    qtbot.waitUntil(lambda: live.text().startswith("Press the object in"), timeout=WAIT_MS)
 
 
 def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
-    """Press where the program says, wait until it has taken it, and lift."""
+    """Press at the mark, wait until it is captured, and lift."""
     wait_until_asked(view, qtbot)
     run = view.work.run
     before, wanted = run.progress.done, run.next()
@@ -152,7 +152,7 @@ def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
     camera.press(None)
 
 
-def test_what_is_chosen_is_counted_before_it_is_begun(view: ProtocolView) -> None:
+def test_the_number_of_presses_is_shown_before_the_start(view: ProtocolView) -> None:
     assert "Objects: 18. Presses: 540" in view.setup.summary.text()
     choose(view, repeats=2, regions=3)
     assert "Objects: 1. Presses: 5" in view.setup.summary.text()
@@ -160,7 +160,27 @@ def test_what_is_chosen_is_counted_before_it_is_begun(view: ProtocolView) -> Non
     assert not view.setup.begin.isEnabled()
 
 
-def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
+def test_a_membrane_with_an_object_on_it_is_not_accepted_as_bare(
+    view: ProtocolView, camera: SceneCamera, qtbot: QtBot
+) -> None:
+    choose(view, repeats=1, regions=1)
+    camera.press((0.0, 0.0))
+    view.setup.begin.click()
+    qtbot.waitUntil(lambda: view.pressing is not None, timeout=WAIT_MS)
+    panel = view.pressing.panel
+    qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
+    panel.bare.click()
+    qtbot.waitUntil(
+        lambda: panel.live.text().startswith("Something presses on the membrane"), timeout=WAIT_MS
+    )
+    assert not panel.capture.isEnabled()
+    camera.press(None)
+    qtbot.wait(100)  # the frames with the object have passed
+    take_bare(view, qtbot)
+    assert panel.bare.isVisible()  # if that was wrong after all, it can be done again
+
+
+def test_presses_are_captured_automatically_continued_and_reported(
     view: ProtocolView, camera: SceneCamera, context: AppContext, qtbot: QtBot, tmp_path: Path
 ) -> None:
     choose(view, repeats=1, regions=1)
@@ -174,7 +194,7 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
     assert view.work is None
     again = view.findChild(QPushButton, "protocol.run.0")
     assert "1 of 2 presses" in again.text()
-    with RunLock(folder):  # as another program does
+    with RunLock(folder):  # like another program
         again.click()
         qtbot.waitUntil(lambda: "written by" in view.setup.problem.text(), timeout=WAIT_MS)
     kept: list[MeasurementRecord] = []
@@ -186,7 +206,7 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
     context.settings.limits = Limits(size_percent=1e-6, height_percent=1e-6)
     press_next(view, camera, qtbot)
 
-    # The last press leads to the result by itself.
+    # The last press shows the result automatically.
     qtbot.waitUntil(lambda: "all 2 presses" in view.result.verdict.text(), timeout=WAIT_MS)
     assert [(r.shape, r.picture, r.serial) for r in kept] == [
         ("evaluation", str(folder), view.work.run.content.serial)
@@ -197,7 +217,7 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
     names = {path.suffix for path in (folder / "report").iterdir()}
     assert {".csv", ".html", ".pdf"} <= names
 
-    # The report is judged as it was shown, whatever the limits are now.
+    # The report uses the limits that were shown, not the present ones.
     assert context.settings.limits == Limits()
     assert "Fail (" in view.result.verdict.text()
     assert "Fail</span>" in (folder / "report" / "evaluation.html").read_text()
@@ -209,7 +229,7 @@ def test_presses_are_taken_by_themselves_left_gone_on_with_and_reported(
         assert (tmp_path / "out" / name).read_bytes() == on_screen
 
 
-def test_an_unsteady_press_is_refused_with_its_reason_and_asked_for_again(
+def test_an_unsteady_press_is_refused_with_its_reason_and_requested_again(
     view: ProtocolView, camera: SceneCamera, qtbot: QtBot
 ) -> None:
     choose(view, repeats=2)
@@ -227,7 +247,7 @@ def test_an_unsteady_press_is_refused_with_its_reason_and_asked_for_again(
     assert "1 refused" in panel.counts.text()
     camera.shaking = False
     qtbot.waitUntil(lambda: run.progress.done == 1, timeout=WAIT_MS)
-    # It has to be lifted in between: one press does not count twice.
+    # It must be lifted in between: one press does not count twice.
     qtbot.waitUntil(lambda: panel.live.text().startswith("Lift"), timeout=WAIT_MS)
     panel.take_back.click()
     assert run.progress.done == 0
@@ -244,12 +264,12 @@ def test_a_camera_of_another_size_is_refused_before_anything_is_pressed(
     panel = view.pressing.panel
     qtbot.waitUntil(panel.bare.isEnabled, timeout=WAIT_MS)
     panel.bare.click()
-    said = "The camera's picture is 160x240, the calibration is for 320x240"
-    qtbot.waitUntil(lambda: said in panel.live.text(), timeout=WAIT_MS)
+    sizes = "160x240", "320x240"
+    qtbot.waitUntil(lambda: all(s in panel.live.text() for s in sizes), timeout=WAIT_MS)
     assert not panel.capture.isEnabled()
 
 
-def test_a_run_that_cannot_be_opened_says_why(
+def test_a_run_that_cannot_be_opened_shows_the_reason(
     view: ProtocolView, context: AppContext, qtbot: QtBot
 ) -> None:
     choose(view, repeats=1)

@@ -10,7 +10,7 @@ from app.measure.record_table import RecordModel, error_text
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
 
-def test_an_evaluation_has_a_line_with_its_mean_errors(qapp: QApplication) -> None:
+def test_an_evaluation_has_a_row_with_its_mean_errors(qapp: QApplication) -> None:
     quantities = Quantity("planar_error_percent", 2.0), Quantity("depth_error_percent", 4.0)
     model = RecordModel()
     model.show((MeasurementRecord("A", "A-1", "evaluation", quantities, "pass"),))

@@ -1,16 +1,16 @@
-"""What is said of the records beside the table."""
+"""The statistics next to the table of records."""
 
 from __future__ import annotations
 
 from pytestqt.qtbot import QtBot
 
+from app.context.context import AppContext
 from app.measure.record_book import RecordBook
 from app.measure.results_view import ResultsView
-from app.shell.context import AppContext
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 
 
-def test_a_true_angle_is_said_in_degrees(context: AppContext, qtbot: QtBot) -> None:
+def test_a_true_angle_is_shown_in_degrees(context: AppContext, qtbot: QtBot) -> None:
     book = RecordBook(context=context, parent=context.toasts)
     view = ResultsView(book, context=context)
     qtbot.addWidget(view)

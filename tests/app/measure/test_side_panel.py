@@ -1,4 +1,4 @@
-"""The panel beside the map uses the room that there is."""
+"""The panel next to the map uses the available space."""
 
 from __future__ import annotations
 

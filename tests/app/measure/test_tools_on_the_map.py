@@ -1,4 +1,4 @@
-"""Tools as they are placed and moved, figures as they are written, presses as they are held."""
+"""Tools that are placed and moved, figures as text, presses that are frozen."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QImage, QPainter, QTransform
+from PySide6.QtWidgets import QApplication
 
 from app.measure.figures_text import value_text
 from app.measure.grips import Point, grips_of, moved, nearest_grip
-from app.measure.placing import first_places, kinds, make_tool
+from app.measure.placing import first_points, kinds, make_tool
 from app.measure.sheet import Sheet
 from app.measure.steady import SteadyPress
+from app.measure.tool_layer import DrawnTool, _paint_text
 from gelpolight_core.measurement.tools import Distance, tool_as_dict, tool_from_dict
 
 KINDS = st.sampled_from([kind.name for kind in kinds()])
@@ -24,11 +28,11 @@ PLACES = st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))
 def test_a_grip_goes_where_it_is_dragged(
     kind: str, middle: Point, to: Point, data: st.DataObject
 ) -> None:
-    tool = make_tool(kind, first_places(kind, middle))
+    tool = make_tool(kind, first_points(kind, middle))
     grip = data.draw(st.sampled_from(grips_of(tool)))
     after = {g.name: g.at_mm for g in grips_of(moved(tool, grip.name, to))}
     if grip.name.endswith(("corner", "turn")):
-        # They keep to the rectangle: one mirrors about the centre, one only turns.
+        # They stay on the rectangle: one mirrors about the centre, one only rotates.
         assert all(map(math.isfinite, after[grip.name]))
     else:
         assert after[grip.name] == pytest.approx(to)
@@ -38,19 +42,19 @@ def test_a_grip_goes_where_it_is_dragged(
 def test_every_tool_of_the_palette_is_written_and_read_as_the_command_line_does(
     kind: str, middle: Point
 ) -> None:
-    tool = make_tool(kind, first_places(kind, middle))
+    tool = make_tool(kind, first_points(kind, middle))
     assert tool.name == kind
     assert tool_from_dict(tool_as_dict(tool)) == tool
 
 
-def test_every_tool_has_a_key_of_its_own_and_asks_for_as_many_places_as_it_needs() -> None:
+def test_every_tool_has_its_own_key_and_asks_for_all_its_points() -> None:
     keys = [kind.key for kind in kinds()]
     assert len(set(keys)) == len(keys)
     for kind in kinds():
-        assert len(first_places(kind.name, (0.0, 0.0))) == len(kind.asks)
+        assert len(first_points(kind.name, (0.0, 0.0))) == len(kind.asks)
 
 
-def test_a_grip_is_only_taken_within_reach() -> None:
+def test_a_grip_is_found_only_within_reach() -> None:
     grips = grips_of(Distance((0.0, 0.0), (3.0, 0.0)))
     near = nearest_grip(grips, (2.9, 0.1), reach_mm=0.2)
     assert near is not None
@@ -58,7 +62,7 @@ def test_a_grip_is_only_taken_within_reach() -> None:
     assert nearest_grip(grips, (1.5, 0.0), reach_mm=0.2) is None
 
 
-def test_the_sheet_keeps_a_tools_key_whatever_becomes_of_the_others() -> None:
+def test_the_sheet_keeps_a_tools_key_when_others_change() -> None:
     first, second = Distance((0.0, 0.0), (1.0, 0.0)), Distance((0.0, 0.0), (2.0, 0.0))
     sheet = Sheet().added(first).added(second)
     keys = [item.key for item in sheet.items]
@@ -89,7 +93,7 @@ def _dome(depth_mm: float) -> np.ndarray:
     return np.maximum(depth_mm * (1.0 - (x**2 + y**2) / 9.0), 0.0).astype(np.float32)
 
 
-def test_a_press_is_held_once_when_it_has_come_to_rest_and_again_after_it_moved() -> None:
+def test_a_press_is_frozen_once_when_steady_and_again_after_it_moved() -> None:
     watch = SteadyPress()
     held = [watch.update(_dome(0.1 * k), 0.03 * k) for k in range(11)]
     assert not any(held)
@@ -101,13 +105,26 @@ def test_a_press_is_held_once_when_it_has_come_to_rest_and_again_after_it_moved(
     assert again.count(True) == 1
 
 
-def test_neither_a_bare_membrane_nor_an_unfinished_picture_is_held() -> None:
+def test_neither_a_bare_membrane_nor_an_unsettled_image_is_frozen() -> None:
     watch = SteadyPress()
     assert not any(watch.update(_dome(0.01), 0.05 * k) for k in range(40))
     assert not any(watch.update(_dome(1.0), 3.0 + 0.05 * k, settled=False) for k in range(40))
 
 
-def test_what_is_let_go_is_not_held_again_before_it_moves() -> None:
+def test_a_released_press_is_not_frozen_again_before_it_moves() -> None:
     watch = SteadyPress()
     watch.hold_off()
     assert not any(watch.update(_dome(1.0), 0.05 * k) for k in range(1, 40))
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0), (99.0, 0.0), (500.0, -500.0), (-500.0, 500.0)])
+def test_a_figure_is_written_on_the_map_and_not_on_its_axes(qapp: QApplication, at: Point) -> None:
+    image = QImage(300, 200, QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    view = QRectF(30.0, 0.0, 200.0, 180.0)
+    tool = DrawnTool(1, ((at, at),), "ok", "5.032 ± 0.026 mm")
+    plates: list[QRectF] = []
+    for _ in range(2):
+        plates.append(_paint_text(painter, tool, QTransform(), view, plates))
+    painter.end()
+    assert view.contains(plates[0]) and not plates[0].intersects(plates[1])

@@ -1,4 +1,4 @@
-"""The truth that is stated follows the list of known indenters."""
+"""The true values follow the list of known indenters."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_an_indenter_that_is_corrected_in_the_list_is_corrected_where_it_is_chos
     assert form.stated == Stated(5.0, 0.75, "Rod")
 
 
-def test_what_was_typed_or_is_no_longer_listed_keeps_its_numbers_and_no_name(qtbot: QtBot) -> None:
+def test_typed_or_unlisted_values_keep_their_numbers_without_a_name(qtbot: QtBot) -> None:
     form = TruthForm()
     qtbot.addWidget(form)
     form.show_indenters((BALL, ROD))
@@ -49,3 +49,20 @@ def test_what_was_typed_or_is_no_longer_listed_keeps_its_numbers_and_no_name(qtb
     form.size.setValue(5.1)
     form.show_indenters((BALL, ROD))
     assert form.stated == Stated(5.1, 1.0)
+
+
+def test_true_values_are_used_for_the_next_press_only_if_the_user_says_so(qtbot: QtBot) -> None:
+    form = TruthForm()
+    qtbot.addWidget(form)
+    form.show_kind("cylinder", "diameter", "mm")
+    form.state(Stated(5.0, 0.56))
+    assert not form.again.isVisibleTo(form)
+    with qtbot.waitSignal(form.changed):
+        form.new_press()
+    assert form.stated == Stated()
+    form.show_kind("ball", "diameter", "mm")
+    assert not form.again.isVisibleTo(form)  # the press before was a cylinder
+    form.show_kind("cylinder", "diameter", "mm")
+    form.again.click()
+    assert form.stated == Stated(5.0, 0.56)
+    assert not form.again.isVisibleTo(form)

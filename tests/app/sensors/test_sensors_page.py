@@ -1,4 +1,4 @@
-"""The Sensors page: what a technician sees of the library, and does with it."""
+"""The Sensors page: the library as a technician sees and uses it."""
 
 from __future__ import annotations
 
@@ -8,22 +8,26 @@ from pathlib import Path
 
 import pytest
 import scene
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFileDialog,
     QLabel,
     QProgressBar,
+    QPushButton,
     QTableView,
     QToolButton,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
 
+from app.context.context import AppContext
 from app.sensors.model import cells_of
 from app.sensors.page import SensorsPage
 from app.sensors.report_writer import write_entry_report
-from app.shell.context import AppContext
-from app.shell.settings import Limits
+from app.sensors.trash_dialog import TrashDialog
+from app.services.settings import Limits
 from app.widgets.quality_table import QualityTableWidget
+from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
@@ -31,7 +35,7 @@ from gelpolight_core.calibration.file import write_calibration
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a calibration file somewhere else."""
+    """Return a calibration file outside the library."""
     path = tmp_path_factory.mktemp("elsewhere") / "made.gplcal"
     write_calibration(scene.calibration(), path)
     return path
@@ -53,13 +57,13 @@ def words(page: QWidget) -> str:
     return "\n".join(label.text() for label in page.findChildren(QLabel) if label.isVisible())
 
 
-def test_a_first_start_offers_ways_to_begin(page: SensorsPage) -> None:
+def test_a_first_start_offers_the_first_actions(page: SensorsPage) -> None:
     assert "No sensor yet" in words(page)
     buttons = [b for b in page.findChildren(QToolButton) if b.isVisible()]
     assert any(button.objectName() == "welcome.sensors.import" for button in buttons)
 
 
-def test_a_new_sensor_is_asked_for_and_not_the_page_of_another(
+def test_a_new_sensor_is_requested_instead_of_the_page_of_another(
     page: SensorsPage, context: AppContext, qtbot: QtBot
 ) -> None:
     with qtbot.waitSignal(context.requests.new_sensor):
@@ -87,13 +91,15 @@ def test_using_one_that_is_not_validated_warns(
     chosen = page.chosen()
     assert chosen is not None
     assert chosen.in_use
-    assert context.status.value.calibration == scene.calibration().identity
+    assert context.status.value.calibration == "made"
     assert context.status.value.calibration_note == "not validated"
     assert context.toasts.shown()[-1].kind == "warn"
     assert not page.use.isEnabled()
 
 
-def test_a_validated_one_says_so(page: SensorsPage, source: Path, context: AppContext) -> None:
+def test_a_validated_calibration_is_marked(
+    page: SensorsPage, source: Path, context: AppContext
+) -> None:
     page.open_path(source)
     chosen = page.chosen()
     assert chosen is not None
@@ -112,18 +118,82 @@ def test_a_validated_one_says_so(page: SensorsPage, source: Path, context: AppCo
     assert len(context.toasts.shown()) == count
 
 
-def test_a_removed_one_comes_back_by_undo(
+def answer(page: QWidget, button: str) -> None:
+    """Click a button of the question that is asked."""
+    (question,) = (q for q in page.findChildren(Question) if q.isVisible())
+    question.findChild(QPushButton, f"question.{button}").click()
+
+
+def test_removing_the_calibration_in_use_asks_first(
     page: SensorsPage, source: Path, context: AppContext
 ) -> None:
     page.open_path(source)
     page.use.trigger()
     page.remove.trigger()
+    answer(page, "cancel")
+    assert page.chosen() is not None
+    page.remove.trigger()
+    answer(page, "answer0")
     assert "No sensor yet" in words(page)
     assert context.status.value.calibration is None
     undo = context.toasts.shown()[-1].findChild(QWidget, "toast.action0")
     undo.click()
     assert page.chosen() is not None
     assert context.status.value.calibration is not None
+
+
+def test_removing_a_validated_calibration_asks_first(
+    page: SensorsPage, source: Path, context: AppContext
+) -> None:
+    page.open_path(source)
+    identity = scene.calibration().identity
+    passed = (Comparison("height", 1.02, 1.0, 8.0),)
+    trial = Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder 5 mm", passed)
+    write_validation(trial, page.chosen().path)
+    page.refresh()
+    page.remove.trigger()
+    answer(page, "cancel")
+    assert page.chosen() is not None
+
+
+def test_undo_and_redo_of_a_removal_last_longer_than_its_message(
+    page: SensorsPage, source: Path, context: AppContext
+) -> None:
+    page.open_path(source)
+    page.remove.trigger()
+    context.toasts.clear()
+    page.findChild(QAction, "sensors.undo").trigger()
+    assert page.chosen() is not None
+    page.findChild(QAction, "sensors.redo").trigger()
+    assert page.chosen() is None
+
+
+def test_the_trash_restores_what_was_removed_in_an_earlier_run(
+    page: SensorsPage, source: Path, context: AppContext, qtbot: QtBot
+) -> None:
+    page.open_path(source)
+    page.use.trigger()
+    path = page.chosen().path
+    context.workspace.remove(path)
+    page.refresh()
+    page.trash.trigger()
+    trash = page.findChild(TrashDialog)
+    row = [trash.table.sorted.index(0, column).data() for column in (0, 1)]
+    assert row == [scene.calibration().sensor.serial, "made"]
+    trash.restore_button.click()
+    assert page.chosen().path == path
+    assert page.chosen().in_use
+    assert not context.workspace.removals()
+    assert not trash.restore_button.isEnabled()
+    assert not page.trash.isEnabled()
+    trash.close()
+
+
+def test_calibrations_of_one_day_differ_in_the_table(source: Path) -> None:
+    cells = cells_of(read_entry(source), datetime.now(UTC), 90.0)
+    made = read_entry(source).created.astimezone()
+    assert f"{made:%H:%M}" in cells[2].text
+    assert cells[-1].text == "made"
 
 
 def test_a_broken_file_is_shown_with_its_reason(
@@ -141,7 +211,7 @@ def test_a_broken_file_is_shown_with_its_reason(
     assert page.remove.isEnabled()
 
 
-def test_a_broken_file_is_refused_in_a_sentence(
+def test_a_broken_file_is_refused_in_one_sentence(
     page: SensorsPage, context: AppContext, tmp_path: Path
 ) -> None:
     (tmp_path / "bad.gplcal").write_text("no calibration")
@@ -150,7 +220,7 @@ def test_a_broken_file_is_refused_in_a_sentence(
     assert "No sensor yet" in words(page)
 
 
-def test_what_was_chosen_stays_chosen(
+def test_the_selection_is_kept(
     page: SensorsPage, source: Path, context: AppContext, tmp_path: Path
 ) -> None:
     page.open_path(source)
@@ -189,7 +259,7 @@ def session_of(context: AppContext, serial: str) -> Path:
     return folder
 
 
-def test_a_session_is_gone_on_with_also_before_there_is_a_calibration(
+def test_a_session_can_be_continued_before_there_is_a_calibration(
     page: SensorsPage, context: AppContext, qtbot: QtBot
 ) -> None:
     folder = session_of(context, "S-1")
@@ -199,14 +269,14 @@ def test_a_session_is_gone_on_with_also_before_there_is_a_calibration(
     table = page.findChild(QTableView, "sensors.sessions.table")
     assert not button.isEnabled()
     table.selectRow(0)
-    page.enter()  # what was chosen stays chosen
+    page.enter()  # the selection is kept
     with qtbot.waitSignal(context.requests.session) as asked:
         button.click()
     assert asked.args == [str(folder)]
 
 
 @pytest.mark.parametrize("ending", ["html", "pdf"])
-def test_a_report_is_written_beside_the_windows_work(
+def test_a_report_is_written_in_the_background(
     page: SensorsPage, source: Path, context: AppContext, tmp_path: Path, qtbot: QtBot,
     monkeypatch: pytest.MonkeyPatch, ending: str,
 ) -> None:  # fmt: skip
@@ -223,7 +293,7 @@ def test_a_report_is_written_beside_the_windows_work(
     assert str(place) in context.toasts.shown()[-1].text
 
 
-def test_a_report_that_cannot_be_written_is_told(
+def test_a_failed_report_is_shown_to_the_user(
     page: SensorsPage, source: Path, context: AppContext, tmp_path: Path, qtbot: QtBot,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
@@ -236,7 +306,7 @@ def test_a_report_that_cannot_be_written_is_told(
     assert str(place.parent) in context.toasts.shown()[-1].text
 
 
-def test_the_report_says_what_a_trial_came_to(source: Path, tmp_path: Path) -> None:
+def test_the_report_contains_the_validation(source: Path, tmp_path: Path) -> None:
     place = tmp_path / "c.gplcal"
     place.write_bytes(source.read_bytes())
     write_entry_report(read_entry(place), tmp_path / "before.html")

@@ -1,53 +1,68 @@
-"""The documentation is found where it is."""
+"""The guide is found in all installations, and opens where it is asked for."""
 
 from __future__ import annotations
 
+from importlib.metadata import PackagePath
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QUrl
-from PySide6.QtGui import QAction, QDesktopServices
 from pytestqt.qtbot import QtBot
 
+from app.calibrate.steps import OPEN_ROUTE, steps_of
+from app.context.context import AppContext
+from app.shell import documentation
 from app.shell import main_window as main_window_module
-from app.shell.context import AppContext
 from app.shell.documentation import find_documentation
+from app.shell.guide_window import OF_PAGE, PAGES, GuideWindow
 from app.shell.main_window import MainWindow
 
 
-def write(path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("here", "utf-8")
-    return path
-
-
-def test_the_site_is_shown_before_the_pages_that_it_is_made_of(tmp_path: Path) -> None:
-    assert find_documentation(tmp_path) is None
-    page = write(tmp_path / "docs" / "index.md")
-    assert find_documentation(tmp_path) == page
-    site = write(tmp_path / "site" / "index.html")
-    assert find_documentation(tmp_path) == site
-
-
 def test_a_checkout_has_its_documentation() -> None:
-    assert find_documentation() is not None
+    folder = find_documentation()
+    assert folder is not None
+    assert all((folder / f"{name}.md").is_file() for name, _ in PAGES)
 
 
-def test_the_help_menu_opens_the_documentation(
-    context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_a_wheel_has_its_documentation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "share" / "doc" / "gelpolight-studio" / "index.md"
+    file.parent.mkdir(parents=True)
+    file.write_text("# Guide", "utf-8")
+    installed = PackagePath("share/doc/gelpolight-studio/index.md")
+    monkeypatch.setattr(PackagePath, "locate", lambda _self: file)
+    monkeypatch.setattr(documentation, "files", lambda _name: [installed])
+    assert find_documentation(tmp_path / "elsewhere") == file.parent
+
+
+def test_every_step_and_page_has_its_section(qtbot: QtBot) -> None:
+    folder = find_documentation()
+    assert folder is not None
+    window = GuideWindow(folder)
+    qtbot.addWidget(window)
+    known = {name for name, _ in PAGES}
+    assert set(OF_PAGE.values()) <= known
+    window.show_page("guide/calibrate")
+    for step in steps_of(OPEN_ROUTE):
+        page = "guide/validate" if step.key == "validation" else "guide/calibrate"
+        window.show_page(page)
+        title = "Validate" if step.key == "validation" else step.title
+        assert window.text.show_heading(title), step.title
+
+
+def test_the_help_of_a_page_opens_the_guide_there(
+    context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened: list[QUrl] = []
-    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: not opened.append(url))
     window = MainWindow(context=context)
     qtbot.addWidget(window)
-    action = window.findChild(QAction, "help.documentation")
-    assert action is not None
-    action.trigger()
-    assert Path(opened[0].toLocalFile()).name in ("index.html", "index.md")
+    window.resize(1024, 700)
+    window.show()
+    context.requests.guide.emit("guide/calibrate", "Lights")
+    guide = window._guide
+    assert guide is not None and guide.isVisible()
+    assert guide.text.textCursor().block().text().endswith("Lights")
+    assert guide.text.verticalScrollBar().value() > 0
+    assert guide.list.currentItem().text() == "Calibrate"
 
     monkeypatch.setattr(main_window_module, "find_documentation", lambda: None)
-    said: list[str] = []
-    monkeypatch.setattr(context.toasts, "show", lambda text, *_a, **_k: said.append(text))
-    action.trigger()
-    assert "without the documentation" in said[0]
+    window.show_guide()
+    assert "not installed" in context.toasts.shown()[0].text
     window.close()

@@ -1,4 +1,4 @@
-"""No fault ends the program in silence, and nobody is shown a traceback."""
+"""Every internal error is reported, and no user sees a traceback."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from PySide6.QtCore import qWarning
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
-from app.shell.context import AppContext
+from app.context.context import AppContext
+from app.services.log import CRASHES, Log
 from app.shell.faults import Faults
-from app.shell.log import CRASHES, Log
 from gelpolight_core.errors import InputError
 
 
@@ -33,7 +33,7 @@ def log_of(context: AppContext) -> str:
     return "\n".join(record.text for record in context.log.recent.since(0))
 
 
-def test_a_fault_is_told_in_one_sentence_and_the_log_has_the_rest(
+def test_an_internal_error_is_one_sentence_and_the_log_has_the_traceback(
     faults: Faults, context: AppContext
 ) -> None:
     try:
@@ -41,18 +41,18 @@ def test_a_fault_is_told_in_one_sentence_and_the_log_has_the_rest(
     except KeyError as error:
         sys.excepthook(KeyError, error, error.__traceback__)
     (toast,) = context.toasts.shown()
-    assert "fault of this program" in toast.text
+    assert "nternal error" in toast.text
     assert "Traceback" not in toast.text
     assert "Traceback" in log_of(context)
 
 
-def test_what_a_person_can_mend_is_told_as_it_is(faults: Faults, context: AppContext) -> None:
+def test_an_input_error_is_shown_unchanged(faults: Faults, context: AppContext) -> None:
     error = InputError("the picture is black", where="mirror_01.png", advice="Switch the LEDs on")
     sys.excepthook(InputError, error, None)
     assert context.toasts.shown()[0].text == str(error)
 
 
-def test_a_fault_in_a_thread_is_told_too(faults: Faults, context: AppContext, qtbot: QtBot) -> None:
+def test_an_error_in_a_thread_is_shown(faults: Faults, context: AppContext, qtbot: QtBot) -> None:
     def fail() -> None:
         raise ZeroDivisionError("in the capture thread")
 
@@ -64,9 +64,7 @@ def test_a_fault_in_a_thread_is_told_too(faults: Faults, context: AppContext, qt
     assert "capture" in log_of(context)
 
 
-def test_a_fault_while_something_is_cleaned_up_is_told_too(
-    faults: Faults, context: AppContext
-) -> None:
+def test_an_error_in_a_destructor_is_shown(faults: Faults, context: AppContext) -> None:
     class Fails:
         def __del__(self) -> None:
             raise ValueError("while it was deleted")
@@ -75,19 +73,19 @@ def test_a_fault_while_something_is_cleaned_up_is_told_too(
     assert "while it was deleted" in context.toasts.shown()[0].text
 
 
-def test_a_thousand_faults_of_a_kind_are_one_message(faults: Faults, context: AppContext) -> None:
+def test_a_thousand_equal_errors_are_one_message(faults: Faults, context: AppContext) -> None:
     for _ in range(1000):
         sys.excepthook(ValueError, ValueError("the same again"), None)
     assert len(context.toasts.shown()) == 1
 
 
-def test_what_qt_complains_of_is_in_the_log(faults: Faults, context: AppContext) -> None:
+def test_warnings_of_qt_are_in_the_log(faults: Faults, context: AppContext) -> None:
     qWarning("a complaint of Qt")
     assert "a complaint of Qt" in log_of(context)
     assert not context.toasts.shown()
 
 
-def test_the_hooks_are_given_back(context: AppContext) -> None:
+def test_the_hooks_are_restored(context: AppContext) -> None:
     before = (sys.excepthook, threading.excepthook, sys.unraisablehook)
     faults = Faults(context.toasts)
     faults.install()
@@ -115,8 +113,8 @@ def test_a_log_folder_that_cannot_be_written_is_replaced(tmp_path) -> None:
     assert (log.folder / "gelpolight.log").is_file()
 
 
-def test_steps_of_libraries_are_left_out_and_their_warnings_kept(context: AppContext) -> None:
-    """Writing one PDF would fill hundreds of lines with the making of typefaces."""
+def test_details_of_libraries_are_dropped_and_their_warnings_kept(context: AppContext) -> None:
+    """Otherwise one PDF would fill hundreds of lines with messages about fonts."""
     for name in ("fontTools.subset", "app.inspect", "gelpolight_core.report"):
         logging.getLogger(name).info("a step of %s", name)
         logging.getLogger(name).warning("trouble in %s", name)

@@ -1,4 +1,4 @@
-"""The watch of the tests' own conftest can fail, and names what was left."""
+"""The leak check of the tests' conftest can fail, and names the remaining objects."""
 
 from __future__ import annotations
 

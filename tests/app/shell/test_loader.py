@@ -14,7 +14,7 @@ from app.shell.loader import Loader
 
 @pytest.fixture
 def slow_modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return the names of two modules, the first of which waits until it is let go."""
+    """Return the names of two modules. Loading the first one waits for a signal."""
     (tmp_path / "loader_first.py").write_text(
         "import threading\nimport loader_gate\nloader_gate.begun.set()\nloader_gate.go.wait(5)\n"
     )
@@ -29,7 +29,9 @@ def slow_modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def test_modules_are_there_before_anybody_is_called(slow_modules: list[str], qtbot: QtBot) -> None:
+def test_callbacks_run_after_their_modules_are_loaded(
+    slow_modules: list[str], qtbot: QtBot
+) -> None:
     loader, called = Loader(), []
     loader.when_loaded(slow_modules, lambda: called.append(set(sys.modules)))
     assert not called
@@ -40,7 +42,9 @@ def test_modules_are_there_before_anybody_is_called(slow_modules: list[str], qtb
     assert called[1] == "at once"
 
 
-def test_half_a_module_does_not_count_as_loaded(slow_modules: list[str], qtbot: QtBot) -> None:
+def test_a_partly_loaded_module_does_not_count_as_loaded(
+    slow_modules: list[str], qtbot: QtBot
+) -> None:
     loader, called = Loader(), []
     loader.load(slow_modules)
     gate = sys.modules["loader_gate"]
@@ -52,7 +56,7 @@ def test_half_a_module_does_not_count_as_loaded(slow_modules: list[str], qtbot: 
     qtbot.waitUntil(lambda: bool(called))
 
 
-def test_what_is_asked_for_is_loaded_before_the_rest(
+def test_requested_modules_are_loaded_first(
     slow_modules: list[str], tmp_path: Path, qtbot: QtBot
 ) -> None:
     (tmp_path / "loader_third.py").write_text(
@@ -69,9 +73,7 @@ def test_what_is_asked_for_is_loaded_before_the_rest(
     del sys.modules["loader_third"]
 
 
-def test_what_is_not_begun_is_left_out_and_nobody_is_called(
-    slow_modules: list[str], qtbot: QtBot
-) -> None:
+def test_closing_skips_pending_modules_and_callbacks(slow_modules: list[str], qtbot: QtBot) -> None:
     loader, called = Loader(), []
     loader.when_loaded(slow_modules, lambda: called.append(1))
     gate = sys.modules["loader_gate"]
@@ -83,7 +85,7 @@ def test_what_is_not_begun_is_left_out_and_nobody_is_called(
     assert not called
 
 
-def test_a_module_that_cannot_be_loaded_is_told_of_and_keeps_nobody_waiting(
+def test_a_module_that_fails_to_load_is_reported_and_blocks_nothing(
     qtbot: QtBot, caplog: pytest.LogCaptureFixture
 ) -> None:
     loader, called = Loader(), []
@@ -92,5 +94,5 @@ def test_a_module_that_cannot_be_loaded_is_told_of_and_keeps_nobody_waiting(
     assert "no_such_module_anywhere" in caplog.text
 
 
-def test_one_that_was_never_started_can_be_stopped(qtbot: QtBot) -> None:
+def test_a_loader_that_was_never_started_can_be_stopped(qtbot: QtBot) -> None:
     Loader().stop()

@@ -1,4 +1,4 @@
-"""The main window: pages, shortcuts, what is remembered, what can be dropped on it."""
+"""The main window: pages, shortcuts, saved settings, dropped files."""
 
 from __future__ import annotations
 
@@ -8,9 +8,17 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QAction, QDesktopServices, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import (
+    QAction,
+    QDesktopServices,
+    QDragEnterEvent,
+    QDropEvent,
+    QUndoCommand,
+    QUndoStack,
+)
 from PySide6.QtWidgets import (
     QApplication,
+    QDialog,
     QLabel,
     QPlainTextEdit,
     QPushButton,
@@ -19,16 +27,11 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
+from app.context.context import AppContext
+from app.context.pages import PageEntry
 from app.desktop import open_files
-from app.shell.about import AboutDialog, versions
-from app.shell.context import AppContext
-from app.shell.log_window import LogWindow
-from app.shell.main_window import MainWindow
-from app.shell.pages import PageEntry, all_pages
-from app.shell.preferences import PreferencesDialog
-from app.shell.settings import Limits, Settings
-from app.shell.shortcuts import ShortcutSheet, shortcuts_of
-from app.shell.status import (
+from app.services.settings import Limits, Settings
+from app.services.status import (
     Skipped,
     Status,
     StatusLine,
@@ -36,11 +39,16 @@ from app.shell.status import (
     skipped_text,
     status_texts,
 )
+from app.shell.about import AboutDialog, versions
+from app.shell.log_window import LogWindow
+from app.shell.main_window import MainWindow
+from app.shell.preferences import PreferencesDialog
+from app.shell.shortcuts import ShortcutSheet, shortcuts_of
 from gelpolight_core.errors import InputError
 
 
 class Page(QWidget):
-    """A page that notes what happens to it."""
+    """A page that records the calls it gets."""
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
@@ -70,7 +78,7 @@ class Page(QWidget):
 
 
 class BarePage(QWidget):
-    """A page with none of the methods that a page may have."""
+    """A page without any of the optional methods."""
 
     def __init__(self, *, context: AppContext) -> None:
         super().__init__()
@@ -85,7 +93,7 @@ MakeWindow = Callable[[], MainWindow]
 
 
 def _activate(window: MainWindow, qtbot: QtBot) -> None:
-    """Have the window take the keys, and wait until it does."""
+    """Give the window the keyboard focus, and wait until it has it."""
     with qtbot.waitActive(window):
         window.activateWindow()
 
@@ -130,13 +138,13 @@ def test_the_keyboard_reaches_every_page(window: MainWindow, qtbot: QtBot) -> No
         (Qt.Key.Key_3, "bare"),
         (Qt.Key.Key_1, "sensors"),
     ):
-        # A window that is closed late, of another test, takes the keys with it.
+        # A window of another test that closes late takes the focus with it.
         _activate(window, qtbot)
         qtbot.keyClick(window, key, Qt.KeyboardModifier.ControlModifier)
         assert window.page_name == page
 
 
-def test_a_page_that_takes_long_to_load_comes_when_it_is_there(
+def test_a_slow_page_appears_when_it_is_loaded(
     window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "slow_page.py").write_text(
@@ -152,7 +160,7 @@ def test_a_page_that_takes_long_to_load_comes_when_it_is_there(
     del sys.modules["slow_page"]
 
 
-def test_a_person_who_goes_elsewhere_while_a_page_is_loaded_stays_there(
+def test_another_page_chosen_during_loading_stays_visible(
     window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "slower_page.py").write_text("import time\ntime.sleep(0.2)\nPage = None\n")
@@ -167,16 +175,7 @@ def test_a_person_who_goes_elsewhere_while_a_page_is_loaded_stays_there(
     del sys.modules["slower_page"]
 
 
-def test_every_registered_page_of_the_program_can_be_made(
-    context: AppContext, qtbot: QtBot
-) -> None:
-    for entry in all_pages():
-        page = entry.make(context)
-        qtbot.addWidget(page)
-        assert page.objectName()
-
-
-def test_a_page_that_is_not_there_is_not_offered() -> None:
+def test_a_missing_page_is_not_offered() -> None:
     assert not PageEntry("x", "X", "sensors", "app.no_such_thing.page:X").exists
     assert not PageEntry("x", "X", "sensors", "app.sensors.no_such_page:X").exists
 
@@ -201,7 +200,7 @@ def test_size_and_page_are_remembered(
     assert make_window().size().toTuple() == (1111, 777)
 
 
-def test_the_source_of_last_time_is_chosen_again(
+def test_the_source_of_the_last_run_is_selected_again(
     context: AppContext, make_window: MakeWindow, tmp_path: Path, qtbot: QtBot
 ) -> None:
     folder = tmp_path / "pictures"
@@ -209,13 +208,13 @@ def test_the_source_of_last_time_is_chosen_again(
     window = make_window()
     context.source.choose_folder(folder)
     window.close()
-    context.source.info = None  # as the program starts anew
+    context.source.info = None  # like a new start of the program
     make_window().choose_source_again()
     qtbot.waitUntil(lambda: context.source.info is not None)
     assert context.source.remembered == ("folder", folder)
 
 
-def test_a_source_that_is_gone_or_was_put_away_is_not_chosen_again(
+def test_a_missing_or_deselected_source_is_not_selected_again(
     context: AppContext, make_window: MakeWindow, tmp_path: Path
 ) -> None:
     window = make_window()
@@ -229,7 +228,7 @@ def test_a_source_that_is_gone_or_was_put_away_is_not_chosen_again(
     assert context.source.info is None
 
 
-def test_a_settings_file_of_nonsense_harms_nothing(tmp_path: Path) -> None:
+def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
     path = tmp_path / "desktop.ini"
     path.write_text(
         "[General]\ntheme=purple\nlast_page=@Variant(x)\nrecent_sessions=\n"
@@ -260,7 +259,7 @@ def test_settings_survive(tmp_path: Path) -> None:
 
 
 def drop_on(window: MainWindow, *paths: Path) -> bool:
-    """Drag files over the window and drop them there; return whether they were taken."""
+    """Drag files over the window and drop them there. Return whether they were accepted."""
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
     left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
@@ -280,7 +279,7 @@ def test_a_dropped_session_is_calibrated(window: MainWindow, session: Path) -> N
     assert window.context.settings.recent_sessions == (session,)
 
 
-def test_its_description_stands_for_the_session(window: MainWindow, session: Path) -> None:
+def test_a_dropped_description_opens_its_session(window: MainWindow, session: Path) -> None:
     assert drop_on(window, session / "session.toml")
     assert window.page("calibrate").opened == [session]
 
@@ -294,7 +293,7 @@ def test_dropped_calibrations_go_to_the_library(window: MainWindow, tmp_path: Pa
     assert window.page("sensors").opened == files
 
 
-def test_a_dropped_recording_plays_the_camera(window: MainWindow, tmp_path: Path) -> None:
+def test_a_dropped_recording_is_played_as_the_camera(window: MainWindow, tmp_path: Path) -> None:
     (tmp_path / "coin.gplrec").touch()
     assert drop_on(window, tmp_path / "coin.gplrec")
     info = window.context.source.info
@@ -303,7 +302,7 @@ def test_a_dropped_recording_plays_the_camera(window: MainWindow, tmp_path: Path
     assert "coin.gplrec" in window.context.toasts.shown()[0].text
 
 
-def test_a_calibration_that_the_desktop_hands_over_goes_to_the_library(
+def test_a_calibration_from_the_desktop_goes_to_the_library(
     window: MainWindow, tmp_path: Path, qtbot: QtBot
 ) -> None:
     file = tmp_path / "a.gplcal"
@@ -313,7 +312,7 @@ def test_a_calibration_that_the_desktop_hands_over_goes_to_the_library(
     assert window.page_name == "sensors"
 
 
-def test_a_recording_that_the_desktop_hands_over_is_played_in_inspect(
+def test_a_recording_from_the_desktop_is_played_in_inspect(
     context: AppContext, tmp_path: Path, qtbot: QtBot
 ) -> None:
     pages = (*PAGES, PageEntry("inspect", "Inspect", "inspect", f"{__name__}:BarePage"))
@@ -327,13 +326,13 @@ def test_a_recording_that_the_desktop_hands_over_is_played_in_inspect(
     assert context.source.info.file == file
 
 
-def test_other_files_are_not_taken(window: MainWindow, tmp_path: Path) -> None:
+def test_other_files_are_not_accepted(window: MainWindow, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
     assert not drop_on(window, tmp_path / "notes.txt")
     assert not drop_on(window, tmp_path)
 
 
-def test_a_folder_that_is_no_session_is_refused_in_a_sentence(
+def test_a_folder_without_a_session_is_refused_in_one_sentence(
     window: MainWindow, tmp_path: Path
 ) -> None:
     window.open_session(tmp_path)
@@ -342,24 +341,57 @@ def test_a_folder_that_is_no_session_is_refused_in_a_sentence(
     assert window.context.settings.recent_sessions == ()
 
 
-def test_what_a_page_refuses_is_told(window: MainWindow) -> None:
+def test_an_error_of_a_page_is_shown(window: MainWindow) -> None:
     window.open_path_in("calibrate", "/nowhere/bad")
     assert "it is bad" in window.context.toasts.shown()[0].text
 
 
-def test_recent_sessions_can_be_opened_and_forgotten(window: MainWindow, session: Path) -> None:
+def test_recent_sessions_can_be_opened_and_cleared(window: MainWindow, session: Path) -> None:
     window.open_session(session)
     menu = window.menus._recent
     menu.aboutToShow.emit()
     menu.actions()[0].trigger()
     assert window.page("calibrate").opened == [session, session]
-    next(a for a in menu.actions() if a.text() == "Forget these").trigger()
+    next(a for a in menu.actions() if a.text() == "Clear this list").trigger()
     assert window.context.settings.recent_sessions == ()
+
+
+def test_the_edit_menu_names_what_it_undoes(window: MainWindow) -> None:
+    page, edit = window.page("sensors"), window.menus.edit
+    edit.refresh()
+    assert not edit.undo_action.isEnabled()
+    done: list[str] = []
+    outer, tab = QUndoStack(page), QWidget(page)
+    inner = QUndoStack(tab)
+    outer.push(QUndoCommand("Remove lens_1"))
+    command = QUndoCommand("Edit a note")
+    inner.push(command)
+    inner.indexChanged.connect(lambda _: done.append("inner"))
+    edit.refresh()  # the tab is hidden
+    assert edit.undo_action.text().startswith("&Undo remove lens_1\t")
+    tab.show()
+    edit.refresh()
+    assert edit.undo_action.text().startswith("&Undo edit a note\t")
+    edit.undo_action.trigger()
+    assert done == ["inner"]
+    edit.refresh()
+    assert edit.redo_action.text().startswith("&Redo edit a note\t")
+    assert not edit.undo_action.isEnabled()
 
 
 def dialog_of(window: MainWindow, kind: type) -> QWidget:
     (dialog,) = [w for w in window.findChildren(kind) if w.isVisible()]
     return dialog
+
+
+@pytest.mark.parametrize("name", ["precision", "stability", "design"])
+def test_a_tool_opens_once_and_closes_with_the_window(window: MainWindow, name: str) -> None:
+    for _ in range(2):
+        window.findChild(QAction, f"tools.{name}").trigger()
+    dialog = dialog_of(window, QDialog)
+    assert dialog.objectName() == name
+    window.close()
+    assert not dialog.isVisible()
 
 
 def test_the_shortcut_sheet_lists_every_shortcut_once(window: MainWindow, qtbot: QtBot) -> None:
@@ -371,8 +403,8 @@ def test_the_shortcut_sheet_lists_every_shortcut_once(window: MainWindow, qtbot:
     sheet.close()
 
 
-def test_no_two_actions_in_sight_share_a_shortcut(context: AppContext, qtbot: QtBot) -> None:
-    """Qt runs neither of two actions with the same keys; those of hidden views do not count."""
+def test_no_two_visible_actions_share_a_shortcut(context: AppContext, qtbot: QtBot) -> None:
+    """Qt runs neither of two actions with the same shortcut. Those of hidden views do not count."""
     window = MainWindow(context=context)
     qtbot.addWidget(window)
     window.show()
@@ -427,6 +459,12 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     dialog._folder.editingFinished.emit()
     assert window.context.workspace.folder == tmp_path / "elsewhere"
     assert len(asked) == 2
+    dialog.recording.setValue(5.0)
+    assert window.context.settings.recording_limit_gb == 5.0
+    dialog._first.setCurrentIndex(1)
+    assert window.context.settings.first_page == window.context.settings.last_page
+    dialog._first.setCurrentIndex(0)
+    assert window.context.settings.first_page == "start"
     dialog._folder.setText("not/absolute")
     dialog._folder.editingFinished.emit()
     assert dialog._folder.text() == str(tmp_path / "elsewhere")
@@ -442,7 +480,7 @@ def test_about_names_the_parts(window: MainWindow) -> None:
     dialog.close()
 
 
-def test_about_shows_the_licences_that_a_packaged_program_brings(
+def test_about_shows_the_licences_of_a_packaged_program(
     window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
 ) -> None:
     window.show_about()
@@ -473,7 +511,7 @@ def test_everything_that_takes_the_focus_has_a_name(context: AppContext, qtbot: 
             assert widget.accessibleName(), widget
 
 
-def test_the_demo_puts_the_virtual_sensor_in_once(window: MainWindow) -> None:
+def test_the_demo_selects_the_virtual_sensor_once(window: MainWindow) -> None:
     source = window.context.source
     chosen = []
     source.changed.connect(lambda: chosen.append(source.info))
@@ -487,7 +525,7 @@ def test_the_demo_puts_the_virtual_sensor_in_once(window: MainWindow) -> None:
     assert window.page("calibrate").events == ["enter", "begin demo"]
 
 
-def test_a_new_sensor_is_begun_though_the_page_shows_another(window: MainWindow) -> None:
+def test_a_new_sensor_is_started_while_the_page_shows_another(window: MainWindow) -> None:
     window.show_page("calibrate")
     window.show_page("sensors")
     window.context.requests.new_sensor.emit()
@@ -495,17 +533,17 @@ def test_a_new_sensor_is_begun_though_the_page_shows_another(window: MainWindow)
     assert window.page("calibrate").events == ["enter", "leave", "enter", "begin"]
 
 
-def test_frames_that_are_not_looked_at_are_told_as_a_rate_of_the_last_seconds() -> None:
+def test_skipped_frames_are_shown_as_a_rate_of_the_last_seconds() -> None:
     skipped = Skipped()
     rates = [skipped.rate_hz(1000 + 20 * second, float(second)) for second in range(8)]
     assert rates[0] == 0.0 and rates[-1] == pytest.approx(20.0)
     assert skipped.rate_hz(1140, 11.0) == 0.0
     assert skipped.rate_hz(3, 12.0) == 0.0
-    assert skipped_text(20.4) == "20 a second skipped"
+    assert skipped_text(20.4) == "20 skipped per second"
     assert skipped_text(0.0) == "none skipped"
 
 
-def test_the_status_line_says_what_is_known(window: MainWindow) -> None:
+def test_the_status_line_shows_what_is_known(window: MainWindow) -> None:
     assert status_texts(Status())["camera"] == "No camera"
     window.context.status.update(
         camera="Virtual sensor",
@@ -543,7 +581,7 @@ def test_a_checkerboard_to_print_is_in_the_help_menu(
     )
 
 
-def test_numbers_of_the_status_bar_keep_their_places(qtbot: QtBot) -> None:
+def test_numbers_of_the_status_bar_keep_their_positions(qtbot: QtBot) -> None:
     """They change several times a second."""
     model = StatusModel()
     line = StatusLine(model)

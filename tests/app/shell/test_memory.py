@@ -1,4 +1,4 @@
-"""Memory goes back to the system, and threads share what is kept of it."""
+"""Freed memory returns to the system, and threads share the rest."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from pytestqt.qtbot import QtBot
 
+from app.context.context import AppContext
+from app.context.pages import PageEntry
 from app.shell import main_window
-from app.shell.context import AppContext
 from app.shell.main_window import MainWindow
 from app.shell.memory import give_back
-from app.shell.pages import PageEntry
 
 ROOT = Path(__file__).resolve().parents[3]
 PIECE, PIECES = 60_000, 3000
@@ -28,8 +28,8 @@ def resident_mb() -> float:
 @pytest.mark.skipif(
     not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="a call of the GNU C library"
 )
-def test_what_a_thread_has_given_back_goes_to_the_system() -> None:
-    """The last piece is still in use: without the call all below it would stay."""
+def test_memory_freed_by_a_thread_returns_to_the_system() -> None:
+    """The last piece is still in use: without the call all memory below it would stay."""
     library = ctypes.CDLL(None)
     library.malloc.restype = ctypes.c_void_p
     library.free.argtypes = [ctypes.c_void_p]
@@ -51,13 +51,13 @@ def test_what_a_thread_has_given_back_goes_to_the_system() -> None:
     library.free(pieces[-1])
 
 
-def test_nothing_happens_where_there_is_no_such_call(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_happens_without_the_library_call(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
     monkeypatch.setattr(ctypes, "CDLL", None)
     give_back()
 
 
-def test_the_window_does_so_when_another_page_is_shown_and_again_and_again(
+def test_the_window_releases_memory_after_a_page_change_and_regularly(
     context: AppContext, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(main_window, "TIDY_MS", 0)
@@ -104,7 +104,7 @@ print(len({place >> 26 for place in places}))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other C libraries have no such stores")
-def test_threads_share_a_few_stores_of_memory() -> None:
+def test_threads_share_few_memory_arenas() -> None:
     stores = {
         how: int(subprocess.check_output([sys.executable, "-c", HOARD, how]))
         for how in ("few", "many")
@@ -115,7 +115,7 @@ def test_threads_share_a_few_stores_of_memory() -> None:
 LARGE = """
 import ctypes, sys
 from app.shell.memory import LARGE_BYTES, keep_little
-sys.path.insert(0, "packaging")
+sys.path.insert(0, "tests/long")
 from allocated import ask_allocator
 keep_little()
 library = ctypes.CDLL(None)
@@ -132,7 +132,7 @@ print(ask_allocator().hblks - before)
 @pytest.mark.skipif(
     not hasattr(ctypes.CDLL(None), "mallinfo2"), reason="a call of the GNU C library"
 )
-def test_large_blocks_come_from_the_system_whatever_was_freed_before() -> None:
-    """Without the option none does, but for one run in hundreds: nothing to compare with."""
+def test_large_blocks_come_from_the_system_after_any_free() -> None:
+    """Without the option threads almost never share one, so no comparison is possible."""
     found = subprocess.check_output([sys.executable, "-c", LARGE], cwd=ROOT)
     assert int(found) == 1

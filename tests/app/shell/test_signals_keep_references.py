@@ -1,4 +1,4 @@
-"""A PySide6 release that loses references is caught here, not by a crash at the sensor."""
+"""Detects a PySide6 release that loses references, before it crashes at a sensor."""
 
 from __future__ import annotations
 

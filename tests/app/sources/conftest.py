@@ -10,5 +10,5 @@ from gelpolight_core.design.sensor_design import SensorDesign
 
 @pytest.fixture
 def bench() -> Bench:
-    """Return a bench whose pictures have 320 x 240 pixels."""
+    """Return a bench with images of 320 x 240 pixels."""
     return Bench(SensorDesign().scaled(0.25), seed=3)

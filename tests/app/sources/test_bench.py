@@ -1,4 +1,4 @@
-"""The bench holds what a technician lays on the sensor, within what can be laid there."""
+"""The bench holds the object on the sensor within its limits."""
 
 from __future__ import annotations
 
@@ -41,26 +41,26 @@ def test_everything_stays_within_its_range(
 def test_an_object_is_dragged_to_where_the_camera_sees_the_pointer(u: float, v: float) -> None:
     BENCH.lay("ball")
     scene = BENCH.drag_to(u, v)
-    place = np.array([scene.x_mm, scene.y_mm, 0.0])
+    position = np.array([scene.x_mm, scene.y_mm, 0.0])
     design = BENCH.design
-    back = project_through_layers(design.camera, design.layers, place)
-    inside = math.hypot(*place) < BENCH.reach_mm(scene) * (1 - 1e-9)
+    back = project_through_layers(design.camera, design.layers, position)
+    inside = math.hypot(*position) < BENCH.reach_mm(scene) * (1 - 1e-9)
     if inside:
-        # A thousandth of a pixel: the two ways through the layers share no code.
+        # A thousandth of a pixel: the two calculations through the layers share no code.
         assert back == pytest.approx([u, v], abs=1e-3)
     else:
-        assert math.hypot(*place) == pytest.approx(BENCH.reach_mm(scene))
+        assert math.hypot(*position) == pytest.approx(BENCH.reach_mm(scene))
 
 
 @given(st.floats(20.0, 300.0), st.floats(20.0, 220.0), st.integers(0, 15))
-def test_a_checkerboard_is_dragged_by_its_middle(u: float, v: float, pose: int) -> None:
+def test_a_checkerboard_is_dragged_by_its_centre(u: float, v: float, pose: int) -> None:
     BENCH.show("checkerboard", pose)
     scene = BENCH.drag_to(u, v)
     held = POSES[pose].centre_mm + np.array([scene.x_mm, scene.y_mm, 0.0])
     assert project_to_pixels(BENCH.design.camera, held) == pytest.approx([u, v], abs=1e-3)
 
 
-def test_the_mirror_the_whiteboard_and_the_bare_membrane_lie_where_they_lie() -> None:
+def test_mirror_whiteboard_and_bare_membrane_cannot_be_moved() -> None:
     for item in ("mirror", "whiteboard", "bare"):
         before = BENCH.lay(item)
         assert BENCH.drag_to(100.0, 100.0) == before
@@ -71,7 +71,7 @@ def test_dragging_beyond_what_the_lens_sees_of_the_layers_changes_nothing() -> N
     assert BENCH.drag_to(math.nan, 0.0) == before
 
 
-def test_every_picture_of_a_session_can_be_laid_in_turn() -> None:
+def test_every_image_of_a_session_can_be_arranged() -> None:
     counts = {stage: BENCH.steps(stage) for stage in STAGES}
     assert counts == {
         "checkerboard": 16,
@@ -89,14 +89,14 @@ def test_every_picture_of_a_session_can_be_laid_in_turn() -> None:
         BENCH.show("balls", 10)
 
 
-def test_a_ball_of_the_session_is_laid_as_the_design_says() -> None:
+def test_a_ball_of_the_session_is_arranged_as_designed() -> None:
     ball = BENCH.design.balls[1]
     assert BENCH.show("balls", 1) == Scene(
         "ball", 0, ball.x_mm, ball.y_mm, 0.0, 2.0 * ball.radius_mm, ball.depth_mm
     )
 
 
-def test_a_membrane_that_was_left_on_hides_the_mirror_alone() -> None:
+def test_a_mounted_membrane_hides_only_the_mirror() -> None:
     bench = Bench(BENCH.design)
     bench.switch("membrane_on", True)
     bench.lay("mirror")
@@ -108,7 +108,7 @@ def test_a_membrane_that_was_left_on_hides_the_mirror_alone() -> None:
     assert bench.seen.item == "mirror"
 
 
-def test_watchers_hear_of_every_change_until_they_leave() -> None:
+def test_watchers_are_notified_until_they_are_removed() -> None:
     bench = Bench(BENCH.design)
     heard: list[Scene] = []
     leave = bench.watch(lambda: heard.append(bench.scene))
@@ -122,7 +122,7 @@ def test_watchers_hear_of_every_change_until_they_leave() -> None:
     assert len(heard) == 4
 
 
-def test_nonsense_is_refused() -> None:
+def test_invalid_values_are_rejected() -> None:
     bench = Bench(BENCH.design)
     with pytest.raises(ValueError, match="'spoon'"):
         bench.lay("spoon")

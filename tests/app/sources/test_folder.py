@@ -1,4 +1,4 @@
-"""A folder of pictures is replayed in the order of its names."""
+"""A folder of images is replayed in the order of the file names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from app.sources.bench import Bench
 from app.sources.folder import FolderSource
-from app.sources.listing import list_sources, picture_folders, virtual_sensor
+from app.sources.listing import image_folders, list_sources, virtual_sensor
 from app.sources.source import Frame, SourceLost
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
@@ -19,10 +19,8 @@ from gelpolight_core.errors import InputError
 WAIT_S = 60.0
 
 
-def picture(
-    number: int, *, kind: type = np.uint8, size: tuple[int, int] = (320, 240)
-) -> np.ndarray:
-    """Return a picture that tells its number."""
+def image(number: int, *, kind: type = np.uint8, size: tuple[int, int] = (320, 240)) -> np.ndarray:
+    """Return an image that encodes its number."""
     rng = np.random.default_rng(number)
     return rng.integers(0, np.iinfo(kind).max, (size[1], size[0], 3), kind, endpoint=True)
 
@@ -39,27 +37,27 @@ def following(source: FolderSource) -> Frame:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Return a folder with three pictures and a file that is none."""
+    """Return a folder with three images and another file."""
     for number, name in enumerate(["a.png", "b.TIFF", "c.png"]):
-        write(tmp_path / name, picture(number))
+        write(tmp_path / name, image(number))
     (tmp_path / "notes.txt").write_text("not a picture")
     return tmp_path
 
 
-def test_pictures_come_in_the_order_of_their_names_again_and_again(folder: Path) -> None:
+def test_images_repeat_in_the_order_of_their_names(folder: Path) -> None:
     source = FolderSource(folder, rate_hz=60.0)
     source.open()
     assert source.size == (320, 240)
     for number in range(5):
         frame = following(source)
         assert frame.number == number
-        assert np.array_equal(frame.rgb, picture(number % 3))
+        assert np.array_equal(frame.rgb, image(number % 3))
     source.close()
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif"])
-def test_sixteen_bit_pictures_keep_every_value(tmp_path: Path, suffix: str) -> None:
-    rgb = picture(0, kind=np.uint16)
+def test_sixteen_bit_images_keep_every_value(tmp_path: Path, suffix: str) -> None:
+    rgb = image(0, kind=np.uint16)
     write(tmp_path / f"deep{suffix}", rgb)
     source = FolderSource(tmp_path)
     source.open()
@@ -68,10 +66,10 @@ def test_sixteen_bit_pictures_keep_every_value(tmp_path: Path, suffix: str) -> N
     assert np.array_equal(frame.rgb, rgb)
 
 
-def test_without_looping_the_last_picture_is_the_end(folder: Path) -> None:
+def test_without_looping_the_source_ends_after_the_last_image(folder: Path) -> None:
     stream = Stream(FolderSource(folder, loop=False, rate_hz=60.0))
     stream.start()
-    with pytest.raises(SourceLost, match="last picture"):
+    with pytest.raises(SourceLost, match="last image"):
         stream.capture(4).result(WAIT_S)
     assert stream.figures().made == 3
     stream.reopen()
@@ -79,24 +77,24 @@ def test_without_looping_the_last_picture_is_the_end(folder: Path) -> None:
     stream.stop()
 
 
-def test_a_picture_of_another_size_is_refused_by_its_name(folder: Path) -> None:
-    write(folder / "d.png", picture(3, size=(160, 120)))
+def test_an_image_of_another_size_is_rejected_by_name(folder: Path) -> None:
+    write(folder / "d.png", image(3, size=(160, 120)))
     source = FolderSource(folder, rate_hz=60.0)
     source.open()
     for _ in range(3):
         following(source)
-    with pytest.raises(InputError, match=r"d\.png: the picture is 160x120 pixels"):
+    with pytest.raises(InputError, match=r"d\.png: the image has 160x120 pixels"):
         source.frame(1.0)
 
 
-def test_a_damaged_picture_is_refused_by_its_name(folder: Path) -> None:
+def test_a_damaged_image_is_rejected_by_name(folder: Path) -> None:
     (folder / "a.png").write_bytes((folder / "a.png").read_bytes()[:200])
     with pytest.raises(InputError, match=r"a\.png"):
         FolderSource(folder).open()
 
 
 @pytest.mark.parametrize("name", ["empty", "missing"])
-def test_a_folder_without_pictures_is_refused(tmp_path: Path, name: str) -> None:
+def test_a_folder_without_images_is_rejected(tmp_path: Path, name: str) -> None:
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="no PNG or TIFF"):
         FolderSource(tmp_path / name).open()
@@ -118,9 +116,9 @@ def test_the_rate_is_kept_and_read_back(folder: Path) -> None:
         source.frame(0.0)
 
 
-def test_the_list_names_the_virtual_sensor_and_the_folders_that_are_there(folder: Path) -> None:
+def test_the_list_contains_the_virtual_sensor_and_existing_folders(folder: Path) -> None:
     bench = Bench()
-    found = list_sources([virtual_sensor(bench), picture_folders([folder, folder / "gone"])])
+    found = list_sources([virtual_sensor(bench), image_folders([folder, folder / "gone"])])
     assert [(info.kind, info.name) for info in found] == [
         ("virtual", "Virtual sensor virtual-1"),
         ("folder", folder.name),

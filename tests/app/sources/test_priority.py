@@ -1,4 +1,4 @@
-"""Threads that give way to the window."""
+"""Threads with a lower priority than the window."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import threading
 
 import pytest
 
-from app.sources.priority import PROCESSING, give_way
+from app.sources.priority import PROCESSING, lower_priority
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads have a priority of their own on Linux")
-def test_a_thread_that_gives_way_leaves_the_others_as_they_are() -> None:
+def test_lower_priority_affects_only_its_own_thread() -> None:
     def niceness() -> int:
         return os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
 
     seen: list[int] = []
 
     def work() -> None:
-        give_way(PROCESSING)
+        lower_priority(PROCESSING)
         seen.append(niceness())
 
     before = niceness()

@@ -1,4 +1,4 @@
-"""A processor works on the newest frame; failures are results like others."""
+"""A processor works on the newest frame; failures are ordinary results."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Line:
         self.processor = Processor(self.inbox, number_of, self.outbox)
 
     def result(self, number: int) -> Outcome[int] | Failure:
-        """Have a frame processed."""
+        """Process a frame."""
         self.inbox.put(frame(number))
         item = self.outbox.take(WAIT_S)
         assert item is not None
@@ -50,7 +50,7 @@ def line() -> Iterator[Line]:
     line.processor.stop()
 
 
-def test_the_last_picture_is_not_kept(line: Line) -> None:
+def test_the_last_image_is_not_kept(line: Line) -> None:
     kept = weakref.ref(line.result(1).frame.rgb)
     end = time.monotonic() + WAIT_S
     while kept() is not None and time.monotonic() < end:
@@ -88,7 +88,7 @@ def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line: Lin
     assert line.outbox.take() is None
 
 
-def test_what_a_person_can_mend_is_told_and_the_thread_goes_on(line: Line) -> None:
+def test_an_input_error_is_reported_and_the_thread_continues(line: Line) -> None:
     def refuse(item: Frame) -> int:
         raise InputError("it is dark", where="picture", advice="Switch the LEDs on")
 
@@ -100,7 +100,7 @@ def test_what_a_person_can_mend_is_told_and_the_thread_goes_on(line: Line) -> No
     assert isinstance(line.result(1), Outcome)
 
 
-def test_a_fault_is_logged_once_and_told_each_time(
+def test_an_internal_error_is_logged_once_and_reported_each_time(
     line: Line, caplog: pytest.LogCaptureFixture
 ) -> None:
     line.processor.replace(lambda item: item.number // 0)
@@ -111,12 +111,14 @@ def test_a_fault_is_logged_once_and_told_each_time(
     assert caplog.text.count("Traceback") == 1
 
 
-def test_times_are_kept(line: Line) -> None:
+def test_processing_times_are_measured(line: Line) -> None:
     for number in range(4):
         line.result(number)
     figures = line.processor.figures()
     assert figures.rate_hz > 0.0
     assert figures.last_ms >= 0.0 and figures.median_ms >= 0.0
+    line.processor.replace(number_of)
+    assert line.processor.figures().rate_hz == 0.0, "they are those of the function in use"
 
 
 def test_it_can_be_stopped_and_started_again(line: Line) -> None:

@@ -1,4 +1,4 @@
-"""Every frame of a stream is in the recording, or is counted as lost."""
+"""Every frame of a stream is in the recording or counted as lost."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WAIT_S = 60.0
 
 
 class Silent:
-    """A source that makes nothing: the tests hand the frames on themselves."""
+    """A source without frames: the tests pass the frames on themselves."""
 
     kind, name, size = "virtual", "silent", (32, 24)
 
@@ -52,7 +52,7 @@ class HandedOn(Stream):
         super().__init__(Silent())
 
     def hand_on(self, number: int, rgb: Rgb | None = None) -> None:
-        """Give a frame to the readers, as the capture thread does."""
+        """Pass a frame to the readers, as the capture thread does."""
         self._hand_on(Frame(noisy(number) if rgb is None else rgb, number, 50.0 + 0.1 * number))
 
 
@@ -62,7 +62,7 @@ def stream() -> HandedOn:
 
 
 def ended(recorder: Recorder) -> RecorderFigures:
-    """Wait until a recording has ended by itself."""
+    """Wait until a recording has stopped by itself."""
     limit = time.monotonic() + WAIT_S
     while not recorder.figures().finished and time.monotonic() < limit:
         time.sleep(0.005)
@@ -88,7 +88,7 @@ def test_every_frame_is_written_and_the_figures_say_so(stream: HandedOn, tmp_pat
         assert all(np.array_equal(recording.frame(k).rgb, noisy(k + 3)) for k in range(20))
 
 
-def test_frames_that_the_source_lost_are_counted(stream: HandedOn, tmp_path: Path) -> None:
+def test_frames_lost_by_the_source_are_counted(stream: HandedOn, tmp_path: Path) -> None:
     recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
     recorder.start()
     for number in (0, 1, 5, 6):
@@ -99,7 +99,7 @@ def test_frames_that_the_source_lost_are_counted(stream: HandedOn, tmp_path: Pat
         assert recording.lost == 3
 
 
-def test_a_disk_that_is_too_slow_loses_frames_and_says_how_many(
+def test_a_slow_disk_loses_frames_and_reports_how_many(
     stream: HandedOn,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -129,7 +129,7 @@ def test_a_disk_that_is_too_slow_loses_frames_and_says_how_many(
         assert (len(recording), recording.lost) == (LEAST_QUEUE, 20 - LEAST_QUEUE)
 
 
-def test_a_source_that_is_opened_anew_goes_on_in_the_same_recording(
+def test_a_reopened_source_continues_in_the_same_recording(
     stream: HandedOn, tmp_path: Path
 ) -> None:
     recorder = Recorder(stream, tmp_path / "a.gplrec", RecordingHeader())
@@ -150,13 +150,13 @@ def test_a_camera_that_changes_its_size_ends_the_recording(
     stream.hand_on(1, noisy(1, (12, 16)))
     figures = ended(recorder)
     assert figures.failure is not None
-    assert "the size or the depth of the pictures has changed" in figures.failure
+    assert "the size or bit depth of the images has changed" in figures.failure
     assert figures.frames == 1
     stream.hand_on(2)
     assert recorder.stop().frames == 1
 
 
-def test_a_full_disk_is_one_sentence_and_what_came_before_is_kept(
+def test_a_full_disk_gives_one_sentence_and_keeps_earlier_frames(
     stream: HandedOn, tmp_path: Path
 ) -> None:
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -179,16 +179,16 @@ def test_a_full_disk_is_one_sentence_and_what_came_before_is_kept(
         assert np.array_equal(recording.frame(last).rgb, noisy(last))
 
 
-def test_a_place_that_cannot_be_written_is_one_sentence(stream: HandedOn, tmp_path: Path) -> None:
+def test_an_unwritable_folder_gives_one_sentence(stream: HandedOn, tmp_path: Path) -> None:
     recorder = Recorder(stream, tmp_path / "gone" / "a.gplrec", RecordingHeader())
     recorder.start()
     failure = ended(recorder).failure
     assert failure is not None
-    assert "the folder does not exist" in failure
+    assert "The folder does not exist" in failure
     recorder.stop()
 
 
-def test_a_recording_says_what_it_is_of() -> None:
+def test_a_recording_describes_its_source() -> None:
     header = header_for(Silent(), serial="A", calibration_id="c1", note="warm")
     assert (header.source, header.kind) == ("silent", "virtual")
     assert header.settings == {"exposure_ms": 4.0}

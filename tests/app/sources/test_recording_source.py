@@ -1,4 +1,4 @@
-"""A recording plays in its own time, stands still, goes anywhere, and passes over damage."""
+"""A recording plays at its own speed, pauses, seeks, and skips damaged frames."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from recorded import noisy, write_recording
 
+from app.inspect.export import frame_name
 from app.sources.listing import recordings
 from app.sources.recording import RecordingSource
 from app.sources.source import Frame, SourceLost
@@ -19,7 +20,7 @@ WAIT_S = 60.0
 
 
 class Clock:
-    """A clock that goes on only while somebody waits."""
+    """A clock that advances only while somebody waits."""
 
     def __init__(self) -> None:
         self.now_s = 1000.0
@@ -31,7 +32,7 @@ class Clock:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
-    """Have the source look at a clock of the test's."""
+    """Make the source use the test's clock."""
     clock = Clock()
     monkeypatch.setattr("app.sources.recording.time", clock)
     return clock
@@ -44,7 +45,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def watch(source: RecordingSource, clock: Clock, seconds: float) -> list[tuple[float, int]]:
-    """Return what comes within some time: when, and which picture of the recording."""
+    """Return the frames that arrive within some time: when, and which image."""
     began_s, seen = clock.now_s, []
     for tick in range(round(seconds / 0.01) + 1):
         clock.now_s = began_s + 0.01 * tick
@@ -54,16 +55,16 @@ def watch(source: RecordingSource, clock: Clock, seconds: float) -> list[tuple[f
 
 
 def shown(frame: Frame) -> int:
-    """Return which picture a frame is."""
+    """Return the image number of a frame."""
     return next(k for k in range(6) if np.array_equal(frame.rgb, noisy(k)))
 
 
-def new_pictures(seen: list[tuple[float, int]]) -> list[tuple[float, int]]:
-    """Leave out what came again while the picture stood."""
+def new_images(seen: list[tuple[float, int]]) -> list[tuple[float, int]]:
+    """Drop the repeated frames of a pause."""
     return [item for k, item in enumerate(seen) if k == 0 or item[1] != seen[k - 1][1]]
 
 
-def test_it_plays_in_its_own_time_and_begins_again(path: Path, clock: Clock) -> None:
+def test_it_plays_at_its_own_speed_and_restarts(path: Path, clock: Clock) -> None:
     source = RecordingSource(path)
     source.open()
     assert source.size == (32, 24)
@@ -74,16 +75,16 @@ def test_it_plays_in_its_own_time_and_begins_again(path: Path, clock: Clock) -> 
 
 
 @pytest.mark.parametrize(("speed", "count"), [(0.5, 4), (0.1, 1), (1.0, 7)])
-def test_slower_than_life_every_frame_is_shown_longer(
+def test_at_low_speed_every_frame_is_shown_longer(
     path: Path, clock: Clock, speed: float, count: int
 ) -> None:
     source = RecordingSource(path, speed=speed)
     source.open()
-    assert len(new_pictures(watch(source, clock, 0.65))) == count
+    assert len(new_images(watch(source, clock, 0.65))) == count
     source.close()
 
 
-def test_hurried_and_late_it_passes_over_frames_and_counts_them(path: Path, clock: Clock) -> None:
+def test_at_high_speed_late_frames_are_skipped_and_counted(path: Path, clock: Clock) -> None:
     source = RecordingSource(path, speed=4.0)
     source.open()
     assert source.frame(0.0).number == 0
@@ -93,7 +94,7 @@ def test_hurried_and_late_it_passes_over_frames_and_counts_them(path: Path, cloc
     source.close()
 
 
-def test_in_its_own_time_no_frame_is_passed_over_however_late(path: Path, clock: Clock) -> None:
+def test_at_original_speed_no_frame_is_skipped(path: Path, clock: Clock) -> None:
     source = RecordingSource(path)
     source.open()
     seen = []
@@ -105,12 +106,10 @@ def test_in_its_own_time_no_frame_is_passed_over_however_late(path: Path, clock:
     source.close()
 
 
-def test_without_looping_it_stands_on_the_last_frame_until_it_is_played_again(
-    path: Path, clock: Clock
-) -> None:
+def test_without_looping_it_pauses_at_the_last_frame(path: Path, clock: Clock) -> None:
     source = RecordingSource(path, loop=False)
     source.open()
-    assert [k for _, k in new_pictures(watch(source, clock, 2.0))] == [0, 1, 2, 3, 4, 5]
+    assert [k for _, k in new_images(watch(source, clock, 2.0))] == [0, 1, 2, 3, 4, 5]
     assert not source.playback().playing
     assert source.playback().position == 5
     source.play()
@@ -118,8 +117,8 @@ def test_without_looping_it_stands_on_the_last_frame_until_it_is_played_again(
     source.close()
 
 
-def test_standing_still_the_very_same_picture_comes_again(path: Path, clock: Clock) -> None:
-    """So that captures and views go on, and the stream is not taken for lost."""
+def test_a_pause_repeats_the_same_image(path: Path, clock: Clock) -> None:
+    """Captures and views continue, and the stream does not count as lost."""
     source = RecordingSource(path, playing=False)
     source.open()
     first = source.frame(0.0)
@@ -132,7 +131,7 @@ def test_standing_still_the_very_same_picture_comes_again(path: Path, clock: Clo
     source.close()
 
 
-def test_it_goes_to_any_frame_and_steps(path: Path, clock: Clock) -> None:
+def test_it_seeks_to_any_frame_and_steps(path: Path, clock: Clock) -> None:
     source = RecordingSource(path)
     source.open()
     source.seek(4)
@@ -155,7 +154,7 @@ def test_it_goes_to_any_frame_and_steps(path: Path, clock: Clock) -> None:
 
 
 @pytest.mark.parametrize("frames", [1, 2])
-def test_a_short_recording_is_played_without_haste(
+def test_a_short_recording_is_not_played_too_fast(
     tmp_path: Path, clock: Clock, frames: int
 ) -> None:
     write_recording(tmp_path / "a.gplrec", frames=frames, rate_hz=10.0)
@@ -170,7 +169,7 @@ def test_the_speed_is_kept_within_its_range_and_read_back(path: Path) -> None:
     assert source.set("speed", 9.0) == 4.0
     assert source.set("speed", 0.0) == 0.1
     assert source.settings()[0].value == 0.1
-    with pytest.raises(InputError, match="it has no setting exposure_ms"):
+    with pytest.raises(InputError, match="no setting exposure_ms"):
         source.set("exposure_ms", 1.0)
 
 
@@ -186,7 +185,7 @@ def spoil(path: Path, frame: int) -> None:
     path.write_bytes(content)
 
 
-def test_a_damaged_frame_is_passed_over_and_counted(path: Path, clock: Clock) -> None:
+def test_a_damaged_frame_is_skipped_and_counted(path: Path, clock: Clock) -> None:
     spoil(path, 2)
     source = RecordingSource(path)
     source.open()
@@ -202,20 +201,20 @@ def test_a_damaged_frame_is_passed_over_and_counted(path: Path, clock: Clock) ->
     source.close()
 
 
-def test_a_recording_of_which_nothing_is_left_is_refused(tmp_path: Path) -> None:
+def test_a_completely_damaged_recording_is_rejected(tmp_path: Path) -> None:
     write_recording(tmp_path / "a.gplrec", frames=2)
     for frame in range(2):
         spoil(tmp_path / "a.gplrec", frame)
     stream = Stream(RecordingSource(tmp_path / "a.gplrec"))
     stream.start()
-    with pytest.raises(InputError, match="frame 1 is damaged"):
+    with pytest.raises(InputError, match="Frame 1 is damaged"):
         stream.capture(1).result(WAIT_S)
     stream.stop()
 
 
-def test_a_recording_without_frames_is_refused(tmp_path: Path) -> None:
+def test_a_recording_without_frames_is_rejected(tmp_path: Path) -> None:
     write_recording(tmp_path / "a.gplrec", frames=0)
-    with pytest.raises(InputError, match="the recording holds no frames"):
+    with pytest.raises(InputError, match="the recording contains no frames"):
         RecordingSource(tmp_path / "a.gplrec").open()
 
 
@@ -223,14 +222,14 @@ def test_a_closed_recording_gives_no_frames_and_can_be_opened_again(path: Path) 
     source = RecordingSource(path)
     source.open()
     source.close()
-    with pytest.raises(SourceLost, match="it is closed"):
+    with pytest.raises(SourceLost, match="is closed"):
         source.frame(0.0)
     source.open()
     assert shown(source.frame(0.0)) == 0
     source.close()
 
 
-def test_a_stream_takes_frames_of_a_recording_that_stands_still(path: Path) -> None:
+def test_a_stream_receives_frames_of_a_paused_recording(path: Path) -> None:
     stream = Stream(RecordingSource(path, playing=False))
     stream.start()
     frames = stream.capture(2).result(WAIT_S)
@@ -238,8 +237,24 @@ def test_a_stream_takes_frames_of_a_recording_that_stands_still(path: Path) -> N
     assert [shown(frame) for frame in frames] == [0, 0]
 
 
-def test_the_list_names_the_recordings_that_are_there(path: Path) -> None:
+def test_the_list_contains_existing_recordings(path: Path) -> None:
     (info,) = recordings([path, path.with_name("gone.gplrec")])()
     assert (info.kind, info.name, info.detail) == ("recording", "press", str(path.parent))
     source = info.open()
     assert (source.kind, source.name) == (info.kind, info.name)
+
+
+def test_an_exported_frame_is_named_after_its_place_in_the_recording_also_in_a_loop(
+    path: Path, clock: Clock
+) -> None:
+    source = RecordingSource(path)
+    source.open()
+    names = []
+    for tick in range(86):
+        clock.now_s += 0.01 * bool(tick)
+        while (frame := source.frame(0.0)) is not None:
+            assert frame.index == shown(frame)
+            names.append(frame_name(frame, source))
+    source.close()
+    assert len(names) > 6  # it began again
+    assert names[6:8] == ["press-00000.png", "press-00001.png"]

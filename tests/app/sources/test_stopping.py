@@ -1,4 +1,4 @@
-"""Threads end before the program does, also those that are inside a library's long call."""
+"""Threads end before the program, even inside a library's long call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frames reach their readers, losses are counted, and threads end when they are told to."""
+"""Frames reach their readers, losses are counted, and threads stop on request."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from app.sources.source import Frame, Setting, SourceLost
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
 
-WAIT_S = 60.0  # far more than a loaded machine takes; only a failing test waits so long
+WAIT_S = 60.0  # much longer than a busy machine needs; only a failing test waits so long
 
 
 def frame(number: int, *, settled: bool = True, time_s: float | None = None) -> Frame:
-    """Return a tiny frame that was made just now."""
+    """Return a tiny frame that was just made."""
     return Frame(
         np.zeros((2, 3, 3), np.uint8),
         number,
@@ -32,7 +32,7 @@ def frame(number: int, *, settled: bool = True, time_s: float | None = None) -> 
 
 
 class ByHand:
-    """A source whose frames the test hands out; an exception in their place is raised."""
+    """A source whose frames come from the test; an exception instead of a frame is raised."""
 
     kind, name, size = "virtual", "by hand", (3, 2)
 
@@ -41,11 +41,11 @@ class ByHand:
         self.calls: list[str] = []
 
     def open(self) -> None:
-        """Note the call."""
+        """Record the call."""
         self.calls.append("open")
 
     def frame(self, timeout_s: float) -> Frame | None:
-        """Return what the test put there."""
+        """Return the item of the test."""
         try:
             item = self.next.get(timeout=min(timeout_s, 0.02))
         except queue.Empty:
@@ -63,7 +63,7 @@ class ByHand:
         return value
 
     def close(self) -> None:
-        """Note the call."""
+        """Record the call."""
         self.calls.append("close")
 
 
@@ -90,7 +90,7 @@ def lost_sentence(stream: Stream) -> str:
     raise AssertionError("the stream was not lost")
 
 
-def test_a_mailbox_holds_the_newest_and_says_what_was_lost() -> None:
+def test_a_mailbox_holds_the_newest_and_reports_losses() -> None:
     box: Mailbox[str] = Mailbox()
     assert box.take() is None
     assert not box.put("old")
@@ -107,13 +107,13 @@ def test_a_mailbox_wakes_its_reader() -> None:
     writer.join()
 
 
-def test_the_newest_frame_is_at_hand(source: ByHand, stream: Stream) -> None:
+def test_the_newest_frame_is_available(source: ByHand, stream: Stream) -> None:
     source.next.put(frame(0))
     got = stream.newest.take(WAIT_S)
     assert got is not None and got.number == 0
 
 
-def test_frames_that_never_came_are_counted(source: ByHand, stream: Stream) -> None:
+def test_missing_frames_are_counted(source: ByHand, stream: Stream) -> None:
     numbers = [0, 1, 4, 5, 9]
     capture = stream.capture(len(numbers))
     for number in numbers:
@@ -121,10 +121,10 @@ def test_frames_that_never_came_are_counted(source: ByHand, stream: Stream) -> N
     capture.result(WAIT_S)
     figures = stream.figures()
     assert (figures.made, figures.dropped) == (10, 5)
-    assert figures.unseen == 4  # nobody looked, and the mailbox holds the last one
+    assert figures.unseen == 4  # nobody read it, and the mailbox holds the last one
 
 
-def test_a_capture_holds_only_settled_frames_made_after_the_call(
+def test_a_capture_contains_only_settled_frames_after_the_call(
     source: ByHand, stream: Stream
 ) -> None:
     early = time.monotonic()
@@ -136,7 +136,7 @@ def test_a_capture_holds_only_settled_frames_made_after_the_call(
     assert [f.number for f in capture.result(WAIT_S)] == [2, 3]
 
 
-def test_a_capture_can_be_given_up(source: ByHand, stream: Stream) -> None:
+def test_a_capture_can_be_cancelled(source: ByHand, stream: Stream) -> None:
     given_up, other = stream.capture(3), stream.capture(2)
     assert given_up.cancel()
     source.next.put(frame(0))
@@ -146,7 +146,7 @@ def test_a_capture_can_be_given_up(source: ByHand, stream: Stream) -> None:
         given_up.result(0)
 
 
-def test_a_capture_of_a_stream_that_is_stopped_says_so(source: ByHand) -> None:
+def test_a_capture_fails_when_the_stream_is_stopped(source: ByHand) -> None:
     stream = Stream(source)
     with pytest.raises(SourceLost, match="stopped"):
         stream.capture(1).result(WAIT_S)
@@ -159,7 +159,7 @@ def test_a_capture_of_a_stream_that_is_stopped_says_so(source: ByHand) -> None:
         stream.capture(1).result(WAIT_S)
 
 
-def test_a_lost_source_says_why_and_can_be_opened_again(source: ByHand, stream: Stream) -> None:
+def test_a_lost_source_reports_why_and_can_be_reopened(source: ByHand, stream: Stream) -> None:
     waiting = stream.capture(16)
     source.next.put(frame(0))
     source.next.put(SourceLost("it was unplugged", where="camera", advice="Plug it in"))
@@ -177,7 +177,7 @@ def test_a_lost_source_says_why_and_can_be_opened_again(source: ByHand, stream: 
     assert source.calls == ["open", "close", "open", "close"]
 
 
-def test_a_source_that_cannot_be_opened_says_why(source: ByHand) -> None:
+def test_a_source_that_cannot_be_opened_reports_why(source: ByHand) -> None:
     def refuse() -> None:
         raise InputError("it is in use", where="camera", advice="Close the other program")
 
@@ -192,12 +192,12 @@ def test_a_silent_source_is_lost(source: ByHand) -> None:
     stream = Stream(source, silence_s=0.05)
     stream.start()
     source.next.put(frame(0))
-    assert "no picture has come" in lost_sentence(stream)
+    assert "no image has arrived" in lost_sentence(stream)
     stream.stop()
 
 
-def test_a_stream_that_was_lost_is_let_go_with_its_last_picture(source: ByHand) -> None:
-    """Not only when Python looks for what refers to itself."""
+def test_a_lost_stream_is_freed_with_its_last_image(source: ByHand) -> None:
+    """Not only when Python runs its garbage collector."""
     gc.disable()
     try:
         stream = Stream(source, silence_s=0.05)
@@ -212,11 +212,11 @@ def test_a_stream_that_was_lost_is_let_go_with_its_last_picture(source: ByHand) 
         gc.enable()
 
 
-def test_a_fault_of_a_source_is_logged_and_told(
+def test_an_internal_error_of_a_source_is_logged_and_reported(
     source: ByHand, stream: Stream, caplog: pytest.LogCaptureFixture
 ) -> None:
     source.next.put(ZeroDivisionError())
-    assert "fault of this program" in lost_sentence(stream)
+    assert "internal error" in lost_sentence(stream)
     assert "ZeroDivisionError" in caplog.text
 
 
@@ -255,7 +255,7 @@ def test_a_stream_can_be_stopped_at_any_time_and_is_not_started_twice(stream: St
     stream.stop()
 
 
-def test_the_memory_of_a_frame_is_locked() -> None:
+def test_the_memory_of_a_frame_is_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         frame(0).rgb[0, 0, 0] = 1
 
@@ -263,12 +263,12 @@ def test_the_memory_of_a_frame_is_locked() -> None:
 @pytest.mark.parametrize(
     "rgb", [np.zeros((2, 3), np.uint8), np.zeros((2, 3, 3), np.float32)], ids=["grey", "float"]
 )
-def test_a_frame_is_a_colour_picture_of_whole_numbers(rgb: np.ndarray) -> None:
+def test_a_frame_is_a_colour_image_of_integers(rgb: np.ndarray) -> None:
     with pytest.raises(ValueError, match="a frame"):
         Frame(rgb, 0, 0.0)
 
 
-def test_a_setting_takes_the_nearest_value_in_its_range() -> None:
+def test_a_setting_uses_the_nearest_value_in_its_range() -> None:
     setting = Setting("exposure_ms", "Exposure", "ms", 0.1, 100.0, 0.1, 10.0)
     assert setting.nearest(0.7000001) == 0.7
     assert setting.nearest(1e9) == 100.0

@@ -1,4 +1,4 @@
-"""The virtual sensor delivers what a camera would: every state, with the camera's noise."""
+"""The virtual sensor delivers every state like a camera, with the camera's noise."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def design_without_noise(design: SensorDesign) -> SensorDesign:
 
 
 def settled(source: VirtualSource) -> Frame:
-    """Return the first frame that shows what lies on the bench."""
+    """Return the first frame that shows the scene on the bench."""
     limit = time.monotonic() + WAIT_S
     while time.monotonic() < limit:
         frame = source.frame(0.2)
@@ -47,7 +47,7 @@ def source(bench: Bench) -> Iterator[VirtualSource]:
 
 
 @pytest.mark.parametrize("item", ITEMS)
-def test_without_noise_each_state_is_the_virtual_sensors_picture(
+def test_without_noise_each_state_equals_the_virtual_sensor_image(
     source: VirtualSource, item: str
 ) -> None:
     bench = source.bench
@@ -60,7 +60,7 @@ def test_without_noise_each_state_is_the_virtual_sensors_picture(
     assert np.array_equal(got.rgb, expected)
 
 
-def test_a_stage_shows_what_a_simulated_session_holds(source: VirtualSource) -> None:
+def test_a_stage_shows_the_images_of_a_simulated_session(source: VirtualSource) -> None:
     bench = source.bench
     bench.adjust(noise=0.0)
     bench.show("whiteboard")
@@ -68,7 +68,7 @@ def test_a_stage_shows_what_a_simulated_session_holds(source: VirtualSource) -> 
     assert np.array_equal(settled(source).rgb, sensor.frame(Whiteboard()))
 
 
-def test_a_coarse_picture_comes_first_and_is_not_called_settled() -> None:
+def test_a_coarse_image_comes_first_and_is_not_settled() -> None:
     bench = Bench(SensorDesign().scaled(0.5))
     source = VirtualSource(bench)
     bench.lay("ball")
@@ -82,14 +82,14 @@ def test_a_coarse_picture_comes_first_and_is_not_called_settled() -> None:
     source.close()
     assert first is not None and not first.settled
     assert first.rgb.shape == last.rgb.shape == (480, 640, 3)
-    # What is pressed is already in its place: the two differ at edges and fine pattern alone.
+    # The press is already at its position: the two differ only at edges and in fine pattern.
     difference = np.abs(first.rgb.astype(int) - last.rgb)
     assert np.median(difference) <= 1
     assert np.mean(difference > 20) < 0.02
 
 
 @pytest.mark.parametrize("bit_depth", [8, 16])
-def test_mean_and_spread_are_those_of_the_virtual_sensors_noise(bit_depth: int) -> None:
+def test_mean_and_spread_match_the_virtual_sensor_noise(bit_depth: int) -> None:
     design = SensorDesign().scaled(0.25)
     # Noise of several counts, so that rounding does not hide it.
     camera = replace(design.camera, bit_depth=bit_depth, shot_variance=4e-4, read_sd=0.01)
@@ -126,7 +126,9 @@ def test_noise_does_not_repeat_and_has_no_pattern() -> None:
     one, two = (
         noisy(level, noise, seed=seed, bit_depth=8).astype(float) - 100.0 for seed in (1, 2)
     )
-    limit = 5.0 / np.sqrt(one.size)  # five standard deviations of a correlation of nothing
+    limit = 5.0 / np.sqrt(
+        one.size
+    )  # five standard deviations of the correlation of independent values
 
     def correlation(a: np.ndarray, b: np.ndarray) -> float:
         return abs(float(np.corrcoef(a.ravel(), b.ravel())[0, 1]))
@@ -135,7 +137,7 @@ def test_noise_does_not_repeat_and_has_no_pattern() -> None:
     assert correlation(one[:, 1:], one[:, :-1]) < limit
     assert correlation(one[1:], one[:-1]) < limit
     assert correlation(one[..., 0], one[..., 1]) < 2.0 * limit
-    # Over many frames no row and no column stands out.
+    # Averaged over many frames, no row or column is conspicuous.
     mean = np.mean([noisy(level, noise, seed=s, bit_depth=8) for s in range(40)], axis=0) - 100.0
     assert np.abs(mean.mean(axis=(1, 2))).max() < 5.0 * 3.0 / np.sqrt(40 * 900)
     assert np.abs(mean.mean(axis=(0, 2))).max() < 5.0 * 3.0 / np.sqrt(40 * 600)
@@ -145,8 +147,8 @@ def test_no_two_captures_are_alike_even_after_opening_again(source: VirtualSourc
     first = settled(source)
     source.close()
     source.open()
-    pictures = [first.rgb, settled(source).rgb, settled(source).rgb]
-    assert len({picture.tobytes() for picture in pictures}) == 3
+    images = [first.rgb, settled(source).rgb, settled(source).rgb]
+    assert len({image.tobytes() for image in images}) == 3
 
 
 def test_a_board_is_grey_with_one_noise(source: VirtualSource) -> None:
@@ -179,7 +181,7 @@ def test_gain_amplifies_noise_and_exposure_does_not() -> None:
     assert amplified.shot == pytest.approx(4.0 * usual.shot)
 
 
-def test_settings_are_read_back_and_unknown_ones_refused(source: VirtualSource) -> None:
+def test_settings_are_read_back_and_unknown_ones_rejected(source: VirtualSource) -> None:
     source.set("rate_hz", 1e9)
     values = {setting.key: setting.value for setting in source.settings()}
     assert values == {"exposure_ms": 10.0, "gain_db": 0.0, "rate_hz": 60.0}
@@ -187,7 +189,7 @@ def test_settings_are_read_back_and_unknown_ones_refused(source: VirtualSource) 
         source.set("focus", 1.0)
 
 
-def test_room_light_lifts_the_dark(source: VirtualSource) -> None:
+def test_room_light_brightens_dark_areas(source: VirtualSource) -> None:
     source.bench.adjust(noise=0.0)
     dark = settled(source).rgb[:4, :4].mean(axis=(0, 1))
     source.bench.switch("room_light", True)
@@ -195,7 +197,7 @@ def test_room_light_lifts_the_dark(source: VirtualSource) -> None:
     assert lit - dark == pytest.approx(255.0 * np.array(ROOM_LIGHT), abs=1.0)
 
 
-def test_a_membrane_left_on_shows_in_the_place_of_the_mirror(source: VirtualSource) -> None:
+def test_a_mounted_membrane_is_shown_instead_of_the_mirror(source: VirtualSource) -> None:
     source.bench.adjust(noise=0.0)
     bare = settled(source).rgb
     source.bench.switch("membrane_on", True)
@@ -209,11 +211,11 @@ def test_too_much_light_saturates(source: VirtualSource) -> None:
     assert (settled(source).rgb == 255).any(axis=2).mean() > 0.1
 
 
-def test_frames_nobody_came_for_are_counted_as_made(source: VirtualSource) -> None:
+def test_unread_frames_are_counted_as_made(source: VirtualSource) -> None:
     first = settled(source)
     time.sleep(0.2)
     later = settled(source)
-    # 60 Hz for 0.2 s; a frame may wait at either end.
+    # 60 Hz for 0.2 s; one frame may be missing or extra.
     assert later.number - first.number >= 10
     assert later.time_s - first.time_s >= 0.2
 
@@ -225,7 +227,7 @@ def test_a_long_exposure_slows_the_camera(source: VirtualSource) -> None:
     assert second.time_s - first.time_s > 0.09
 
 
-def test_a_camera_that_stops_is_told_and_can_be_opened_again(bench: Bench) -> None:
+def test_a_stopped_camera_is_reported_and_can_be_reopened(bench: Bench) -> None:
     stream = Stream(VirtualSource(bench))
     stream.start()
     assert len(stream.capture(2).result(WAIT_S)) == 2
@@ -240,18 +242,18 @@ def test_a_camera_that_stops_is_told_and_can_be_opened_again(bench: Bench) -> No
     stream.stop()
 
 
-def test_closing_waits_for_no_picture_even_while_a_dear_picture_is_made() -> None:
+def test_closing_does_not_wait_for_a_slow_image() -> None:
     source = VirtualSource(Bench())
     source.bench.lay("coin")
     source.open()
-    # The small preview is there and the coin of the full size is being pressed.
+    # The small preview is there, and the full-size coin press is being computed.
     while source.frame(0.2) is None:
         pass
     source.close()  # waits for a second, and leaves behind what has not ended then
     assert not any(thread.name == "virtual sensor" for thread in threading.enumerate())
 
 
-def test_twenty_rounds_of_opening_and_closing_leave_nothing() -> None:
+def test_opening_and_closing_twenty_times_leaves_nothing() -> None:
     stream = Stream(VirtualSource(Bench(SensorDesign().scaled(0.1))))
     before = threading.active_count()
     for _ in range(20):
@@ -261,7 +263,7 @@ def test_twenty_rounds_of_opening_and_closing_leave_nothing() -> None:
     assert threading.active_count() == before
 
 
-def test_a_fault_while_rendering_is_told_by_the_stream(
+def test_an_error_while_rendering_is_reported_by_the_stream(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     def broken(*_: object, **__: object) -> None:
@@ -270,12 +272,12 @@ def test_a_fault_while_rendering_is_told_by_the_stream(
     monkeypatch.setattr(VirtualSensor, "brightness", broken)
     stream = Stream(VirtualSource(bench))
     stream.start()
-    with pytest.raises(SourceLost, match="fault of this program"):
+    with pytest.raises(SourceLost, match="internal error"):
         stream.capture(1).result(WAIT_S)
     stream.stop()
 
 
-def test_a_closed_source_says_so(bench: Bench) -> None:
+def test_a_closed_source_reports_that(bench: Bench) -> None:
     source = VirtualSource(bench)
     with pytest.raises(SourceLost, match="closed"):
         source.frame(0.0)

@@ -1,4 +1,4 @@
-"""Looking for objects leaves nothing behind."""
+"""Searching for objects leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def file_dialog(window: QWidget) -> QFileDialog:
 
 
 def scroll_bars() -> int:
-    """Return how many scroll bars Python knows, gone ones among them."""
+    """Return how many scroll bars Python knows, including deleted ones."""
     gc.collect()
     return sum(isinstance(thing, QScrollBar) for thing in gc.get_objects())
 
@@ -36,7 +36,7 @@ def test_it_finds_what_qt_finds(qtbot) -> None:
     assert line is window.findChild(QLineEdit, "fileNameEdit")
 
 
-def test_what_was_found_goes_with_its_dialog(qtbot) -> None:
+def test_found_objects_are_deleted_with_their_dialog(qtbot) -> None:
     window = QMainWindow()
     qtbot.addWidget(window)
     before = scroll_bars()

@@ -1,4 +1,4 @@
-"""The quality table: verdict in words and signs, advice where it is needed, no jumping."""
+"""The quality table: verdict as text and icon, advice where it is needed, no jumping rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.shell import theme
+from app.theme import theme
 from app.widgets.quality_table import QualityTableWidget, limit_text, value_text
 from gelpolight_core.quality import Figure, QualityTable, judge
 
@@ -35,7 +35,7 @@ def widget(qtbot: QtBot) -> QualityTableWidget:
     return made
 
 
-def test_what_passes_needs_no_advice(widget: QualityTableWidget) -> None:
+def test_passing_figures_have_no_advice(widget: QualityTableWidget) -> None:
     widget.set_table(table(0.0182, 16))
     assert widget.texts() == [
         ["Pass", "Reprojection error", "0.0182 px", "≤ 0.3 px"],
@@ -43,7 +43,7 @@ def test_what_passes_needs_no_advice(widget: QualityTableWidget) -> None:
     ]
 
 
-def test_what_does_not_pass_says_what_to_do(widget: QualityTableWidget) -> None:
+def test_failing_figures_show_advice(widget: QualityTableWidget) -> None:
     widget.set_table(table(0.5, 2))
     assert [row[:2] for row in widget.texts()] == [
         ["Warning", "Reprojection error"],
@@ -53,7 +53,7 @@ def test_what_does_not_pass_says_what_to_do(widget: QualityTableWidget) -> None:
     ]
 
 
-def test_verdicts_have_a_sign_beside_the_word(widget: QualityTableWidget) -> None:
+def test_verdicts_have_an_icon_next_to_the_word(widget: QualityTableWidget) -> None:
     widget.set_table(table(0.5, 2))
     assert not widget._grid.item(0, 0).icon().isNull()
     assert widget._grid.item(0, 0).foreground().color() == theme.colour("warn")
@@ -126,7 +126,7 @@ def figure(value: float, **limits: object) -> Figure:
         (figure(0.00483, unit="%"), "0.00483 %"),
     ],
 )
-def test_values_read_as_a_person_writes_them(shown: Figure, said: str) -> None:
+def test_values_are_written_as_people_write_them(shown: Figure, said: str) -> None:
     assert value_text(shown) == said
 
 
@@ -141,5 +141,5 @@ def test_values_read_as_a_person_writes_them(shown: Figure, said: str) -> None:
         (figure(2.0, warn=2.0), "≤ 2"),
     ],
 )
-def test_limits_say_on_which_side_is_good(shown: Figure, said: str) -> None:
+def test_limits_show_which_side_passes(shown: Figure, said: str) -> None:
     assert limit_text(shown) == said

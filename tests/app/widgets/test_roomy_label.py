@@ -1,4 +1,4 @@
-"""What is below a label of several lines stays where it is when its text changes."""
+"""Widgets below a label of several lines do not move when its text changes."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from app.widgets.roomy_label import RoomyLabel
 
 
 @pytest.mark.parametrize("text", ["One line.", "One line.\nAnd another."])
-def test_nothing_moves_when_there_is_something_to_say(text: str, qtbot: QtBot) -> None:
-    """The button that was just pressed is not under another place of the pointer then."""
+def test_nothing_moves_when_a_text_appears(text: str, qtbot: QtBot) -> None:
+    """Otherwise the pointer would be over another part after a click on a button."""
     around = QWidget()
     qtbot.addWidget(around)
     column = QVBoxLayout(around)

@@ -24,7 +24,7 @@ def test_a_new_workspace_knows_the_papers_indenters(tmp_path: Path) -> None:
         assert {(3.0, 1.0), (7.0, 1.0), (5.0, 0.5), (5.0, 1.5)} <= sizes
 
 
-def test_an_edited_list_is_still_there_the_next_time(tmp_path: Path) -> None:
+def test_an_edited_list_is_saved(tmp_path: Path) -> None:
     wanted = (Indenter("Gauge block", "cuboid", 4.0, 6.0, 1.25), Indenter("Marble", "ball", 16.0))
     write_indenters(wanted, tmp_path)
     assert read_indenters(tmp_path) == wanted
@@ -39,10 +39,10 @@ def test_a_length_of_zero_or_less_is_refused(length: float) -> None:
         Indenter("Pin", "cylinder", 3.0, height_mm=length)
 
 
-def test_two_indenters_of_one_name_are_refused_and_the_old_list_stays(tmp_path: Path) -> None:
+def test_equal_indenter_names_are_refused_and_the_old_list_stays(tmp_path: Path) -> None:
     write_indenters((Indenter("Pin", "cylinder", 3.0),), tmp_path)
     twins = (Indenter("Pin", "cylinder", 3.0), Indenter("Pin", "ball", 4.0))
-    with pytest.raises(InputError, match="called Pin"):
+    with pytest.raises(InputError, match="the name Pin"):
         write_indenters(twins, tmp_path)
     assert len(read_indenters(tmp_path)) == 1
 

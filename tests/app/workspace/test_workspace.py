@@ -1,4 +1,4 @@
-"""The workspace: nothing is lost, nothing broken is hidden, nothing untried counts as validated."""
+"""The workspace: nothing is lost, broken files are shown, only tested ones count as validated."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ BAD = Comparison("diameter", 5.6, 5.0, 5.0)
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a calibration file somewhere else."""
+    """Return a calibration file outside the library."""
     path = tmp_path_factory.mktemp("elsewhere") / "made here.gplcal"
     write_calibration(scene.calibration(), path)
     return path
@@ -68,7 +68,7 @@ def test_the_same_calibration_is_kept_once(workspace: Workspace, source: Path) -
     assert len(workspace.entries()) == 1
 
 
-def test_another_of_the_same_name_takes_no_place(
+def test_another_file_of_the_same_name_overwrites_nothing(
     workspace: Workspace, source: Path, tmp_path: Path
 ) -> None:
     first = workspace.import_calibration(source)
@@ -102,7 +102,7 @@ def test_a_broken_file_is_not_imported(workspace: Workspace, source: Path, tmp_p
     assert workspace.entries() == ()
 
 
-def test_a_removed_calibration_can_be_had_back(workspace: Workspace, source: Path) -> None:
+def test_a_removed_calibration_can_be_restored(workspace: Workspace, source: Path) -> None:
     place = workspace.import_calibration(source)
     write_validation(trial(place, GOOD), place)
     workspace.use(place)
@@ -116,13 +116,11 @@ def test_a_removed_calibration_can_be_had_back(workspace: Workspace, source: Pat
     assert not list((workspace.folder / "trash").iterdir())
 
 
-def test_a_place_that_was_taken_meanwhile_is_not_overwritten(
-    workspace: Workspace, source: Path
-) -> None:
+def test_restoring_does_not_overwrite_a_new_file(workspace: Workspace, source: Path) -> None:
     place = workspace.import_calibration(source)
     removal = workspace.remove(place)
     place.write_text("something new")
-    with pytest.raises(InputError, match="taken its place"):
+    with pytest.raises(InputError, match="has the same name"):
         workspace.restore(removal)
     assert place.read_text() == "something new"
 
@@ -135,7 +133,7 @@ def test_only_files_of_the_library_are_used_or_removed(workspace: Workspace, sou
     assert source.is_file()
 
 
-def test_the_choice_is_forgotten_with_its_file(workspace: Workspace, source: Path) -> None:
+def test_the_selection_ends_with_its_file(workspace: Workspace, source: Path) -> None:
     place = workspace.import_calibration(source)
     workspace.use(place)
     assert [entry.in_use for entry in workspace.entries()] == [True]
@@ -145,7 +143,7 @@ def test_the_choice_is_forgotten_with_its_file(workspace: Workspace, source: Pat
 
 
 @pytest.mark.parametrize("text", ["", "nonsense", "[]", '{"in_use": 7}', '{"in_use": null}'])
-def test_a_damaged_choice_is_no_choice(workspace: Workspace, text: str) -> None:
+def test_a_damaged_selection_counts_as_none(workspace: Workspace, text: str) -> None:
     workspace.folder.mkdir()
     (workspace.folder / "workspace.json").write_text(text)
     assert workspace.in_use is None
@@ -172,7 +170,7 @@ def test_every_serial_has_a_folder_of_its_own_inside(serial: str) -> None:
     assert Path("a") / name != Path("a")
 
 
-def test_a_new_calibration_takes_a_free_place(workspace: Workspace) -> None:
+def test_a_new_calibration_gets_an_unused_name(workspace: Workspace) -> None:
     first = workspace.calibration_path("A/001", "calibrated today")
     assert first.parent.is_dir()
     first.touch()
@@ -186,7 +184,9 @@ def test_a_passed_trial_validates(workspace: Workspace, source: Path) -> None:
     assert read_entry(place).validated
 
 
-def test_a_trial_comes_along_on_import(workspace: Workspace, source: Path, tmp_path: Path) -> None:
+def test_a_validation_is_imported_with_its_calibration(
+    workspace: Workspace, source: Path, tmp_path: Path
+) -> None:
     copy = tmp_path / "copy.gplcal"
     shutil.copy(source, copy)
     write_validation(trial(copy, GOOD), copy)
@@ -220,18 +220,18 @@ def forge_passed(path: Path) -> None:
     path.write_text(json.dumps(content))
 
 
-def test_a_verdict_that_its_lengths_do_not_bear_out_is_refused(
+def test_a_verdict_that_does_not_match_its_lengths_is_refused(
     workspace: Workspace, source: Path
 ) -> None:
     place = workspace.import_calibration(source)
     write_validation(trial(place, BAD), place)
     forge_passed(validation_path(place))
-    with pytest.raises(InputError, match="does not agree"):
+    with pytest.raises(InputError, match="does not match"):
         read_validation(place)
     entry = read_entry(place)
     assert not entry.validated
     assert not entry.broken
-    assert "does not agree" in entry.validation_note
+    assert "does not match" in entry.validation_note
 
 
 @pytest.mark.parametrize(
@@ -280,7 +280,7 @@ def test_times_without_a_zone_are_utc_and_nonsense_is_unknown() -> None:
     assert parse_time("yesterday") is None
 
 
-def test_sessions_are_listed_by_sensor_the_last_worked_at_first(workspace: Workspace) -> None:
+def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace: Workspace) -> None:
     for number, (serial, name) in enumerate((("B-1", "old"), ("B-1", "new"), ("A-1", "x"))):
         folder = workspace.sessions_folder(serial) / name
         (folder / "mirror").mkdir(parents=True)
@@ -291,7 +291,7 @@ def test_sessions_are_listed_by_sensor_the_last_worked_at_first(workspace: Works
         for path in (folder / "session.toml", folder / "mirror"):
             os.utime(path, (number, number))
     found = workspace.sessions()
-    assert [(e.serial, e.folder.name, e.pictures) for e in found] == [
+    assert [(e.serial, e.folder.name, e.images) for e in found] == [
         ("A-1", "x", 2),
         ("B-1", "new", 1),
         ("B-1", "old", 0),
@@ -305,7 +305,7 @@ def test_a_session_that_cannot_be_read_is_listed_under_its_folder(workspace: Wor
     assert [e.serial for e in workspace.sessions()] == ["C-1"]
 
 
-def test_a_workspace_that_is_not_there_has_no_sessions(workspace: Workspace) -> None:
+def test_a_missing_workspace_has_no_sessions(workspace: Workspace) -> None:
     assert workspace.sessions() == ()
 
 
@@ -313,7 +313,7 @@ def measured(serial: str) -> MeasurementRecord:
     return MeasurementRecord(serial, "c", "ball", (Quantity("diameter_mm", 5.0),))
 
 
-def test_the_records_are_begun_when_they_are_asked_for(workspace: Workspace) -> None:
+def test_the_records_are_created_at_first_use(workspace: Workspace) -> None:
     assert not workspace.folder.exists()
     workspace.records.add(measured("A"))
     assert workspace.records is workspace.records
@@ -322,14 +322,14 @@ def test_the_records_are_begun_when_they_are_asked_for(workspace: Workspace) -> 
     workspace.close()
 
 
-def test_another_folder_has_records_of_its_own(workspace: Workspace, tmp_path: Path) -> None:
+def test_another_folder_has_its_own_records(workspace: Workspace, tmp_path: Path) -> None:
     workspace.records.add(measured("A"))
     workspace.folder = tmp_path / "other"
     assert workspace.records.measurements() == ()
     workspace.close()
 
 
-def test_every_recording_has_a_place_of_its_own(workspace: Workspace) -> None:
+def test_every_recording_has_its_own_path(workspace: Workspace) -> None:
     paths = set()
     for _ in range(3):
         path = workspace.recording_path("A/1")
@@ -340,7 +340,7 @@ def test_every_recording_has_a_place_of_its_own(workspace: Workspace) -> None:
     assert {path.suffix for path in paths} == {".gplrec"}
 
 
-def test_a_calibration_whose_validation_cannot_be_copied_is_not_imported_in_half(
+def test_a_calibration_is_not_imported_without_its_validation(
     workspace: Workspace, source: Path, tmp_path: Path
 ) -> None:
     copied = tmp_path / source.name
@@ -350,7 +350,7 @@ def test_a_calibration_whose_validation_cannot_be_copied_is_not_imported_in_half
     place = workspace.sensor_folder(serial) / f"{folder_name(copied.stem)}.gplcal"
     in_the_way = validation_path(place)
     in_the_way.mkdir(parents=True)
-    with pytest.raises(InputError, match="a folder stands where the file should be"):
+    with pytest.raises(InputError, match="A folder has the name of the file"):
         workspace.import_calibration(copied)
     assert workspace.entries() == ()
     in_the_way.rmdir()

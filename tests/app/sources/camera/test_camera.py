@@ -1,4 +1,4 @@
-"""A camera is opened slowly, set, lost and found again, and never holds anybody up."""
+"""A camera is opened slowly, set, lost and found again, and never blocks its users."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def values(camera: Camera) -> dict[str, float]:
     return {control.key: control.value for control in camera.state.controls}
 
 
-def test_pictures_come_in_the_best_format_with_their_times(camera: Camera, stream: Stream) -> None:
+def test_images_arrive_in_the_best_format_with_their_times(camera: Camera, stream: Stream) -> None:
     frames = stream.capture(3).result(20.0)
     assert frames[0].rgb.shape == (96, 128, 3)
     assert frames[0].time_s < frames[1].time_s < frames[2].time_s <= time.monotonic()
@@ -59,7 +59,7 @@ def test_pictures_come_in_the_best_format_with_their_times(camera: Camera, strea
     assert stream.source.size == (128, 96)
 
 
-def test_stored_settings_are_set_when_it_is_opened_and_read_back(
+def test_stored_settings_are_applied_on_opening_and_read_back(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     stream.stop()
@@ -75,7 +75,7 @@ def test_stored_settings_are_set_when_it_is_opened_and_read_back(
     assert keys.index("white_balance_auto") < keys.index("white_balance_k")
 
 
-def test_what_a_camera_ignores_refuses_or_has_not_is_said(
+def test_ignored_rejected_and_missing_settings_are_reported(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     stream.capture(1).result(20.0)
@@ -91,7 +91,7 @@ def test_what_a_camera_ignores_refuses_or_has_not_is_said(
     assert applied["sharpness"].read == 9.0
 
 
-def test_pictures_from_before_a_change_are_not_captured(camera: Camera, stream: Stream) -> None:
+def test_images_from_before_a_change_are_not_captured(camera: Camera, stream: Stream) -> None:
     stream.capture(1).result(20.0)
     camera.change({"exposure_auto": 0.0, "exposure_ms": 10.0}).result(20.0)
     frames = stream.capture(2).result(20.0)
@@ -99,7 +99,7 @@ def test_pictures_from_before_a_change_are_not_captured(camera: Camera, stream: 
     assert frames[0].rgb[..., 0].mean() == pytest.approx(30.0, abs=2.0)
 
 
-def test_an_unplugged_camera_is_said_to_be_gone_and_goes_on_with_its_settings(
+def test_an_unplugged_camera_is_reported_and_returns_with_its_settings(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     camera.want(STORED)
@@ -122,7 +122,7 @@ def test_an_unplugged_camera_is_said_to_be_gone_and_goes_on_with_its_settings(
     assert fake.opened == 2
 
 
-def test_a_camera_that_comes_back_at_another_socket_goes_on(
+def test_a_camera_reconnected_to_another_port_continues(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     stream.capture(1).result(20.0)
@@ -133,18 +133,16 @@ def test_a_camera_that_comes_back_at_another_socket_goes_on(
     eventually(lambda: stream.figures().lost is None)
 
 
-def test_a_camera_that_goes_silent_is_opened_anew(
-    camera: Camera, stream: Stream, fake: FakeCamera
-) -> None:
+def test_a_silent_camera_is_reopened(camera: Camera, stream: Stream, fake: FakeCamera) -> None:
     fake.stops_after = 20
-    eventually(lambda: "no picture has come" in (stream.figures().lost or ""))
+    eventually(lambda: "no image has arrived" in (stream.figures().lost or ""))
     eventually(lambda: fake.opened >= 2)
     fake.stops_after = None
     eventually(lambda: stream.figures().lost is None)
     eventually(lambda: fake.closed == fake.opened - 1)
 
 
-def test_a_camera_that_another_program_uses_is_waited_for(
+def test_a_camera_used_by_another_program_is_waited_for(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     eventually(lambda: camera.state.phase == "live")
@@ -156,14 +154,14 @@ def test_a_camera_that_another_program_uses_is_waited_for(
     eventually(lambda: stream.figures().lost is None)
 
 
-def test_closing_while_it_is_being_opened_holds_nobody_up(fake: FakeCamera, camera: Camera) -> None:
+def test_closing_during_opening_does_not_block(fake: FakeCamera, camera: Camera) -> None:
     fake.hangs = threading.Event()
     stream = Stream(CameraSource(camera))
     stream.start()
     eventually(lambda: camera.state.phase == "opening")
     stream.stop()
     assert [thread.name for thread in threading.enumerate()].count(f"capture {C310.name}") == 0
-    stream.start()  # the driver still hangs in the first opening
+    stream.start()  # the driver still hangs in the first open call
     fake.hangs.set()
     assert len(stream.capture(1).result(20.0)) == 1
     stream.stop()
@@ -185,7 +183,7 @@ def test_two_users_share_a_camera_and_the_last_one_closes_it(
     assert (fake.opened, fake.closed) == (1, 1)
 
 
-def test_another_format_opens_the_camera_anew(
+def test_another_format_reopens_the_camera(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     stream.capture(1).result(20.0)
@@ -194,19 +192,21 @@ def test_another_format_opens_the_camera_anew(
     eventually(lambda: values(camera).items() >= LOCKED.items())
     camera.want(replace(STORED, controls={**LOCKED, "gain": 99.0}))
     eventually(lambda: values(camera)["gain"] == 99.0)
-    assert fake.opened == 2  # a setting alone needs no new opening
+    assert fake.opened == 2  # changing only a setting does not reopen the camera
 
 
-def test_settings_go_through_the_source_as_of_any_other(camera: Camera, stream: Stream) -> None:
+def test_settings_work_through_the_source(camera: Camera, stream: Stream) -> None:
     stream.capture(1).result(20.0)
     assert stream.source.set("exposure_auto", 0.0) == 0.0
-    assert stream.source.set("exposure_ms", 12.34) == 12.3  # the nearest that it can make
+    assert (
+        stream.source.set("exposure_ms", 12.34) == 12.3
+    )  # the nearest value that the camera supports
     assert "gain" in {setting.key for setting in stream.source.settings()}
     with pytest.raises(InputError, match="no setting focus"):
         stream.source.set("focus", 1.0)
 
 
-def test_a_lock_fixes_what_the_camera_has_come_to_by_then(
+def test_a_lock_fixes_the_present_automatic_values(
     camera: Camera, stream: Stream, fake: FakeCamera
 ) -> None:
     stream.capture(1).result(20.0)
@@ -219,15 +219,15 @@ def test_a_lock_fixes_what_the_camera_has_come_to_by_then(
     assert camera.wanted.size == (128, 96)
 
 
-def test_what_another_program_sets_is_noticed(fake: FakeCamera) -> None:
-    told = threading.Event()
-    camera = Camera(FakeDriver(fake), C310, told=told.set, check_s=0.02)
+def test_changes_by_another_program_are_detected(fake: FakeCamera) -> None:
+    reported = threading.Event()
+    camera = Camera(FakeDriver(fake), C310, on_change=reported.set, check_s=0.02)
     stream = Stream(CameraSource(camera))
     stream.start()
     stream.capture(1).result(20.0)
-    told.clear()
+    reported.clear()
     fake.settings["gain"] = replace(fake.settings["gain"], value=3.0)
-    assert told.wait(20.0)
+    assert reported.wait(20.0)
     assert values(camera)["gain"] == 3.0
     stream.stop()
 
@@ -241,31 +241,31 @@ def test_a_camera_without_settings_or_formats_still_delivers() -> None:
     stream.stop()
 
 
-def test_a_fault_in_a_driver_is_logged_and_tried_again(
+def test_a_driver_error_is_logged_and_retried(
     camera: Camera, stream: Stream, fake: FakeCamera, caplog: pytest.LogCaptureFixture
 ) -> None:
     stream.capture(1).result(20.0)
     real, fake.light = fake.light, lambda number: 1 // 0
-    assert "fault of this program" in eventually(lambda: stream.figures().lost)
+    assert "internal error" in eventually(lambda: stream.figures().lost)
     fake.light = real
     eventually(lambda: stream.figures().lost is None)
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_what_is_not_as_it_was_stored_is_told(camera: Camera, stream: Stream) -> None:
+def test_differences_from_stored_settings_are_reported(camera: Camera, stream: Stream) -> None:
     stream.capture(1).result(20.0)
     state = camera.state
     assert differences(camera.settings_now(), state.format, state.controls) == ()
     stored = replace(STORED, pixel_format="MJPG", controls={"gain": 10.0, "exposure_auto": 0.0})
     assert differences(stored, state.format, state.controls) == (
-        "the pictures are 128x96, not 64x48 pixels",
+        "the image size is 128x96, not 64x48 pixels",
         "the format is YUYV, not MJPG",
-        "Exposure by the camera is on, not off",
+        "Automatic exposure is on, not off",
         "Gain is 64, not 10",
     )
 
 
-def test_a_slow_new_opening_does_not_end_a_stream(
+def test_a_slow_reopening_does_not_end_a_stream(
     camera: Camera, fake: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.sources.camera.camera.SLOW_REOPEN_S", 0.05)
@@ -274,7 +274,7 @@ def test_a_slow_new_opening_does_not_end_a_stream(
     stream.capture(1).result(20.0)
     fake.hangs = threading.Event()
     camera.want(STORED)
-    eventually(lambda: "being opened anew" in (stream.figures().lost or ""))
+    eventually(lambda: "being reopened" in (stream.figures().lost or ""))
     time.sleep(0.7)  # longer than a stream may be silent
     assert camera.trouble() == ""
     fake.hangs.set()
@@ -283,7 +283,7 @@ def test_a_slow_new_opening_does_not_end_a_stream(
     stream.stop()
 
 
-def test_a_slow_first_opening_is_no_loss(
+def test_a_slow_first_opening_is_not_a_loss(
     camera: Camera, fake: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.sources.camera.camera.SLOW_REOPEN_S", 0.0)

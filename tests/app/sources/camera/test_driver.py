@@ -1,4 +1,4 @@
-"""Which camera was meant, and which of its formats is the best to calibrate with."""
+"""Which camera is meant, and which of its formats is best for calibration."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from app.sources.camera.driver import (
 )
 
 
-def test_uncompressed_pictures_are_preferred_at_the_largest_size_that_still_flows() -> None:
+def test_the_largest_uncompressed_format_with_enough_rate_is_preferred() -> None:
     assert best_format(FORMATS) == Format("YUYV", 128, 96, 7.5)
 
 
@@ -28,12 +28,12 @@ def test_the_calibrations_size_decides_before_anything_else() -> None:
     assert best_format(only, (320, 240)) == Format("MJPG", 320, 240, 30.0)
 
 
-def test_compressed_pictures_are_taken_where_there_is_nothing_else_and_warned_of() -> None:
+def test_compressed_formats_are_a_last_resort_with_a_warning() -> None:
     compressed = tuple(f for f in FORMATS if f.compressed)
     chosen = best_format(compressed)
     assert chosen == Format("MJPG", 128, 96, 30.0)
-    assert "has compressed pictures only (MJPG)" in compression_warning(chosen, compressed)
-    assert "choose an uncompressed format" in compression_warning(chosen, FORMATS)
+    assert "has only compressed images (MJPG)" in compression_warning(chosen, compressed)
+    assert "Choose an uncompressed format" in compression_warning(chosen, FORMATS)
     assert compression_warning(Format("YUYV", 64, 48, 30.0), FORMATS) == ""
     assert best_format(()) is None
     assert best_format((Format("H264", 1920, 1080, 30.0),)) is None
@@ -55,7 +55,7 @@ def test_the_choice_does_not_depend_on_the_order_of_the_list(listed: list[Format
         assert chosen is not None and not chosen.compressed
 
 
-def test_a_camera_is_found_again_at_another_socket_where_no_other_is_of_its_make() -> None:
+def test_a_camera_is_found_at_another_port_if_it_is_the_only_one_of_its_model() -> None:
     moved = Device("046d:081b@1-4:1.0", C310.name, C310.model, "/dev/video2")
     twin = Device("046d:081b@1-5:1.0", C310.name, C310.model, "/dev/video4")
     other = Device("1234:5678@x", "Other", "1234:5678", "/dev/video6")

@@ -1,4 +1,4 @@
-"""Pictures through OpenCV: from a file as from a camera, with what OpenCV is known to do wrong."""
+"""Images through OpenCV, from a file as from a camera, with OpenCV's known errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SIZE = (64, 48)
 
 @pytest.fixture
 def film(tmp_path: Path) -> Device:
-    """Return a film of five pictures as a device: red at the left, blue at the right."""
+    """Return a film of five images as a device: red on the left, blue on the right."""
     path = tmp_path / "film.avi"
     writer = cv2.VideoWriter(
         str(path), cv2.CAP_OPENCV_MJPEG, cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE
@@ -47,24 +47,24 @@ def test_a_film_is_read_as_from_a_camera_in_red_green_blue(film: Device) -> None
     assert driver.formats(film) == ()
     camera = driver.open(film, None)
     before = time.monotonic()
-    pictures = [camera.read() for _ in range(5)]
+    images = [camera.read() for _ in range(5)]
     got = camera.format
     assert (got.code, got.width, got.height, got.rate_hz) == ("MJPG", 64, 48, 25.0)
     assert got.compressed
-    for number, (rgb, came_s) in enumerate(filter(None, pictures)):
+    for number, (rgb, came_s) in enumerate(filter(None, images)):
         assert before <= came_s <= time.monotonic()
         left, right = rgb[:, 4:28].mean(axis=(0, 1)), rgb[:, 36:60].mean(axis=(0, 1))
         assert left == pytest.approx([200 - 10 * number, 0, 0], abs=6)
         assert right == pytest.approx([0, 0, 200], abs=6)
-    with pytest.raises(CameraGone, match="no more pictures"):
+    with pytest.raises(CameraGone, match="no more images"):
         camera.read()
     assert camera.controls() == ()
-    with pytest.raises(InputError, match="does not take Gain"):
+    with pytest.raises(InputError, match="does not accept Gain"):
         camera.set("gain", 1.0)
     camera.close()
 
 
-def test_a_film_plays_the_camera_and_begins_again_where_it_ends(film: Device) -> None:
+def test_a_film_acts_as_a_camera_and_restarts_at_its_end(film: Device) -> None:
     class Films(OpenCvDriver):
         def devices(self) -> tuple[Device, ...]:
             return (film,)
@@ -74,7 +74,7 @@ def test_a_film_plays_the_camera_and_begins_again_where_it_ends(film: Device) ->
     seen: list[Frame] = []
     stream.add_tap(seen.append)
     stream.start()
-    assert "gives no more pictures" in eventually(lambda: stream.figures().lost)
+    assert "delivers no more images" in eventually(lambda: stream.figures().lost)
     last = seen[-1].rgb[:, 4:28].mean(axis=(0, 1))
     assert last == pytest.approx([160, 0, 0], abs=6)
     count = len(seen)
@@ -84,17 +84,17 @@ def test_a_film_plays_the_camera_and_begins_again_where_it_ends(film: Device) ->
     assert camera.state.format.code == "MJPG"
 
 
-def test_a_film_that_is_not_there_cannot_be_opened(tmp_path: Path) -> None:
+def test_a_missing_film_cannot_be_opened(tmp_path: Path) -> None:
     absent = Device("film", "absent.avi", "", str(tmp_path / "absent.avi"))
     with pytest.raises(CameraGone, match="cannot be opened"):
         OpenCvDriver(interface=cv2.CAP_FFMPEG).open(absent, None)
 
 
 class Capture:
-    """A VideoCapture of Windows: takes everything, does what it likes."""
+    """A VideoCapture as on Windows: accepts every value, but sets others."""
 
-    def __init__(self, place: Any, interface: int) -> None:
-        self.place, self.interface = place, interface
+    def __init__(self, address: Any, interface: int) -> None:
+        self.address, self.interface = address, interface
         self.asked: list[tuple[int, float]] = []
         self.values = {cv2.CAP_PROP_EXPOSURE: -6.0, cv2.CAP_PROP_GAIN: 10.0}
         self.answers: list[Any] = []
@@ -121,17 +121,17 @@ class Capture:
         self.values.clear()
 
 
-def test_a_format_is_asked_for_in_the_order_that_drivers_need() -> None:
+def test_a_format_is_requested_in_the_order_that_drivers_need() -> None:
     made: list[Capture] = []
 
-    def capture(place: Any, interface: int) -> Capture:
-        made.append(Capture(place, interface))
+    def capture(address: Any, interface: int) -> Capture:
+        made.append(Capture(address, interface))
         return made[0]
 
     device = Device("046d:081b@usb", "C310", "046d:081b", "2")
     driver = OpenCvDriver(capture, interface=cv2.CAP_DSHOW)
     camera = driver.open(device, Format("YUYV", 1280, 960, 7.5))
-    assert (made[0].place, made[0].interface) == (2, cv2.CAP_DSHOW)
+    assert (made[0].address, made[0].interface) == (2, cv2.CAP_DSHOW)
     assert [number for number, _ in made[0].asked] == [
         cv2.CAP_PROP_FOURCC,
         cv2.CAP_PROP_FRAME_WIDTH,
@@ -145,7 +145,7 @@ def test_a_format_is_asked_for_in_the_order_that_drivers_need() -> None:
     assert made[0].asked[-1] == (cv2.CAP_PROP_EXPOSURE, -7.0)
 
 
-def test_the_picture_that_a_timeout_repeats_is_not_taken_for_a_new_one(
+def test_an_image_repeated_after_a_timeout_is_dropped(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(opencv, "SLOW_READ_S", 0.02)
@@ -163,7 +163,7 @@ def test_the_picture_that_a_timeout_repeats_is_not_taken_for_a_new_one(
         camera.read()
 
 
-def test_cameras_are_told_apart_by_what_they_are_not_by_their_number(
+def test_cameras_are_identified_by_their_identity_not_their_number(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     port = tmp_path / "devices" / "usb1" / "1-2" / "1-2:1.0"
@@ -173,7 +173,7 @@ def test_cameras_are_told_apart_by_what_they_are_not_by_their_number(
     assert opencv._linux_port("/dev/video3", tmp_path) == "1-2:1.0"
     (port.parent / "serial").write_text("5A1F33B0\n")
     assert opencv._linux_port("/dev/video3", tmp_path) == "5A1F33B0/1.0"
-    (port.parent / "serial").write_text("00000000\n")  # what cheap cameras all have
+    (port.parent / "serial").write_text("00000000\n")  # common to all cheap cameras
     assert opencv._linux_port("/dev/video3", tmp_path) == "1-2:1.0"
     assert opencv._linux_port("/dev/video9", tmp_path) == "/dev/video9"
 

@@ -1,4 +1,4 @@
-"""What Linux tells of a camera, and what is asked of it, in the kernel's own structures."""
+"""Camera formats and settings on Linux, in the kernel's own structures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def code_of(letters: str) -> int:
 
 
 class Kernel:
-    """Answers as the driver of a UVC camera does: a menu of two ways of exposure, 100 us units."""
+    """Behaves like the driver of a UVC camera: two exposure modes in a menu, units of 100 us."""
 
     def __init__(self) -> None:
         self.values = {EXPOSURE_AUTO: 3, EXPOSURE: 156, FRAME_RATE: 1, WHITE_AUTO: 1}
@@ -121,8 +121,8 @@ def values(camera: V4l2) -> dict[str, float]:
     return {setting.key: setting.value for setting in camera.controls()}
 
 
-def test_the_requests_are_those_of_the_kernels_header() -> None:
-    """Size and direction are parts of the numbers, so a wrong structure would not fit its own."""
+def test_the_requests_match_the_kernel_header() -> None:
+    """Size and direction are part of the numbers, so a wrong structure gives another number."""
     for request, structure in (
         (kernel_side.VIDIOC_QUERYCAP, kernel_side.Capability),
         (kernel_side.VIDIOC_ENUM_FMT, kernel_side.FormatDescription),
@@ -148,42 +148,42 @@ def test_every_format_size_and_rate_is_listed(camera: V4l2) -> None:
     )
 
 
-def test_settings_are_told_in_units_that_people_know(camera: V4l2) -> None:
+def test_settings_have_common_units(camera: V4l2) -> None:
     found = {setting.key: setting for setting in camera.controls()}
     exposure = found["exposure_ms"]
     assert (exposure.value, exposure.low, exposure.high, exposure.step) == (15.6, 0.1, 1000.0, 0.1)
-    assert not exposure.writable  # the camera exposes by itself
+    assert not exposure.writable  # automatic exposure
     assert found["exposure_auto"].value == 1.0
     assert found["power_line_hz"].value == 60.0
     assert "focus" not in found
 
 
-def test_exposure_is_set_once_the_camera_leaves_it_alone(camera: V4l2, kernel: Kernel) -> None:
+def test_exposure_is_set_after_automatic_exposure_is_off(camera: V4l2, kernel: Kernel) -> None:
     camera.set("exposure_auto", 0.0)
     camera.set("exposure_ms", 9.5)
     camera.set("white_balance_auto", 0.0)
     camera.set("white_balance_k", 5000.0)
     camera.set("power_line_hz", 50.0)
-    assert kernel.values[EXPOSURE_AUTO] == 1  # manual, where folk says 0.25
+    assert kernel.values[EXPOSURE_AUTO] == 1  # manual; many guides say 0.25
     assert kernel.values[EXPOSURE] == 95
     assert values(camera) | {"exposure_ms": 9.5, "white_balance_k": 5000.0} == values(camera)
     assert {s.key: s.writable for s in camera.controls()}["exposure_ms"]
     assert kernel.values[MAINS] == 1
 
 
-def test_automatic_exposure_is_the_kind_that_the_camera_has(camera: V4l2, kernel: Kernel) -> None:
+def test_automatic_exposure_uses_the_camera_s_mode(camera: V4l2, kernel: Kernel) -> None:
     camera.set("exposure_auto", 0.0)
     camera.set("exposure_auto", 1.0)
     assert kernel.values[EXPOSURE_AUTO] == 3
 
 
-def test_a_value_out_of_range_is_taken_into_it(camera: V4l2, kernel: Kernel) -> None:
+def test_a_value_out_of_range_is_clipped(camera: V4l2, kernel: Kernel) -> None:
     camera.set("gain", 1e6)
     assert kernel.values[GAIN] == 255
 
 
-def test_what_the_camera_has_not_or_refuses_is_said(camera: V4l2, kernel: Kernel) -> None:
-    with pytest.raises(InputError, match="the camera has no Focus"):
+def test_missing_and_rejected_settings_are_reported(camera: V4l2, kernel: Kernel) -> None:
+    with pytest.raises(InputError, match="no setting Focus"):
         camera.set("focus", 1.0)
     kernel.ranges[EXPOSURE_AUTO] = (0, 0, 1)
     kernel._menu = lambda a: _at([], a.index)  # type: ignore[method-assign]
@@ -192,13 +192,13 @@ def test_what_the_camera_has_not_or_refuses_is_said(camera: V4l2, kernel: Kernel
         raise OSError(errno.EIO, "Input/output error")
 
     kernel._set = refuse  # type: ignore[method-assign]
-    with pytest.raises(InputError, match=r"refuses Gain 3 \(Input/output error\)"):
+    with pytest.raises(InputError, match=r"rejects Gain 3 \(Input/output error\)"):
         camera.set("gain", 3.0)
 
 
-def test_an_unplugged_camera_is_gone_not_without_settings(camera: V4l2, kernel: Kernel) -> None:
+def test_an_unplugged_camera_raises_camera_gone(camera: V4l2, kernel: Kernel) -> None:
     kernel.error = errno.ENODEV
-    with pytest.raises(CameraGone, match="not there"):
+    with pytest.raises(CameraGone, match="not found"):
         camera.controls()
     with pytest.raises(CameraGone):
         camera.set("gain", 1.0)
@@ -216,12 +216,16 @@ def test_a_range_of_sizes_offers_the_usual_ones(camera: V4l2, kernel: Kernel) ->
 
 @pytest.mark.parametrize(
     ("number", "words"),
-    [(errno.ENOENT, "not there"), (errno.EBUSY, "another program"), (errno.EACCES, "group video")],
+    [
+        (errno.ENOENT, "not found"),
+        (errno.EBUSY, "another program"),
+        (errno.EACCES, 'group "video"'),
+    ],
 )
-def test_why_a_camera_cannot_be_used_is_said(number: int, words: str) -> None:
+def test_the_reason_for_an_unusable_camera_is_reported(number: int, words: str) -> None:
     assert words in str(v4l2.gone("/dev/video9", OSError(number, "no")))
 
 
-def test_a_device_that_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_a_missing_device_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(CameraGone, match="Plug it in"):
         V4l2(str(tmp_path / "video7"))

@@ -1,0 +1,1 @@
+"""The step `background` of the wizard."""

@@ -1,0 +1,46 @@
+"""Live check of the bare membrane, with the limits of the stage itself."""
+
+from __future__ import annotations
+
+from app.calibrate.detection import Detection, judged, or_refusal
+from app.calibrate.light_checks import enlarged, marked, refuse_grey
+from app.calibrate.marks import working_rim
+from app.live.image_checks import Rgb, saturated
+from app.live.overlay import Overlay
+from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.translation import tr
+
+
+def detect_background(
+    rgb: Rgb, *, table: ResamplingTable | None = None, whiteboard: Rgb | None = None
+) -> Detection:
+    """Check the bare membrane: well lit, not saturated, no contact.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    table : ResamplingTable, optional
+        As for :func:`~app.calibrate.radiance.detector.detect_whiteboard`.
+    whiteboard : (rows, columns, 3), optional
+        Image of the whiteboard stage; a press differs from it. Without it, contact is not checked.
+    """
+    rim = Overlay(lines=() if table is None else (working_rim(table),))
+
+    def detect() -> Detection:
+        refuse_grey(rgb)
+        found = check_bare_membrane(rgb, table=table, whiteboard=whiteboard)
+        compared = whiteboard is not None and whiteboard.shape == rgb.shape
+        good = tr("The membrane is well lit and nothing touches it.")
+        if not compared:
+            good = tr(
+                "The membrane is well lit. Contact can be checked once the whiteboard has been "
+                "captured."
+            )
+        marks = Overlay(
+            lines=rim.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
+        )
+        return judged(marks, found.quality.figures, good)
+
+    return or_refusal(detect, marks=rim)

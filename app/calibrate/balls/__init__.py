@@ -1,0 +1,1 @@
+"""The step `balls` of the wizard."""

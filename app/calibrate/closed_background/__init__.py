@@ -1,0 +1,1 @@
+"""The background step of a closed sensor."""

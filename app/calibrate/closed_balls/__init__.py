@@ -1,0 +1,1 @@
+"""The step of the ball presses on a closed sensor."""

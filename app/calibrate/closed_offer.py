@@ -1,0 +1,57 @@
+"""A folder without the images of an open sensor, as the start of a closed sensor's session."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from app.calibrate.closed_setup.form import new_closed_session
+from gelpolight_core.calibration.closed_project import ClosedProject
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.closed import IN_PLACE, STAGES, ClosedSession
+from gelpolight_core.session.missing import missing_stages
+from gelpolight_core.session.session import parse_radii, read_description
+from gelpolight_core.session.table import Table
+
+
+def closed_offer(folder: Path) -> ClosedSession | None:
+    """Return what a folder states for a closed sensor's session, with the folder of its images.
+
+    None if it has no background and ball presses, if nothing of an open sensor is missing, or if
+    its description is damaged or already that of a closed sensor.
+    """
+    missing, path = missing_stages(folder, ()), folder / "session.toml"
+    if not missing or any(stage in missing for stage in STAGES):
+        return None
+    offer = replace(new_closed_session(), folder=folder)
+    try:
+        content = read_description(folder) if path.exists() else {}
+    except InputError:
+        return None
+    if IN_PLACE in content:
+        return None
+    try:
+        top = Table(content, "", path)
+        serial = top.table("sensor").text("serial")
+        radii, default = parse_radii(top.table("balls"))
+    except InputError:
+        return offer  # the form asks for what the folder does not state
+    usual = default or offer.ball_default_radius_mm
+    return replace(offer, serial=serial, ball_radii_mm=radii, ball_default_radius_mm=usual)
+
+
+def copy_images(offer: ClosedSession, project: ClosedProject) -> None:
+    """Copy background and ball presses of an offer, with their radii, into a new session.
+
+    Raises
+    ------
+    InputError
+        If an image cannot be used.
+    """
+    project.import_files(Stage.BACKGROUND, offer.found("background"))
+    by_radius: dict[float, list[Path]] = {}
+    for path in offer.found("balls"):
+        by_radius.setdefault(offer.ball_radius_mm(path.name), []).append(path)
+    for radius_mm, files in by_radius.items():
+        project.import_files(Stage.BALLS, files, radius_mm=radius_mm)

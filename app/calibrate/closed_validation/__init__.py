@@ -1,0 +1,1 @@
+"""The validation step of a closed sensor."""

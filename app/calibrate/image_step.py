@@ -1,0 +1,265 @@
+"""A step that captures images: live detection, captures, and corrections by hand."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from app.calibrate.detection import Detection, Detector, read_raw
+from app.calibrate.film_strip import Capture
+from app.calibrate.step import Parts, StepPresenter, no_camera
+from app.live.live_detection import Seen
+from app.live.overlay import Overlay
+from app.services.jobs import Job
+from app.sources.processor import Failure, Outcome
+from app.sources.source import Frame
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.status import StageState
+from gelpolight_core.session.images import SessionImages
+from gelpolight_core.translation import tr
+
+# After an automatic capture the technician has this long to arrange the next view.
+PAUSE_S = 1.5
+
+Judgement = tuple[str, str, str]
+"""State of a capture, message about it, and a short text below its name."""
+WAITING: Judgement = ("waiting", "", "")
+
+
+class ImageStep(StepPresenter):
+    """A step with images of its own. A step supplies its detection and its judgement of a capture.
+
+    Parameters
+    ----------
+    parts : Parts
+        What all steps share.
+    """
+
+    uses_camera = True
+    judges_focus = False
+
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts)
+        self._armed: tuple[Any, ...] = ()
+        self._paused_until = 0.0
+
+    # Supplied by the step
+
+    def detector(self, name: str) -> Detector:
+        """Return the detection for a capture, or for the live image if `name` is empty."""
+        raise NotImplementedError
+
+    def depends_on(self) -> tuple[Any, ...]:
+        """Return what the detection depends on, beside decisions and results."""
+        return ()
+
+    def judge(self, path: Path) -> Judgement:
+        """Return how a capture was judged: by default as its stage."""
+        status = self.model.statuses[self.stage]
+        if status.state in (StageState.STALE, StageState.WAITING, StageState.EMPTY):
+            return WAITING
+        return status.state.value, status.sentence, ""
+
+    @property
+    def radius_mm(self) -> float | None:
+        """Radius of the ball of the next press; None in steps without one."""
+        return None
+
+    @property
+    def typing(self) -> bool:
+        """Whether a value is being typed that the next capture needs."""
+        return False
+
+    # What is shown
+
+    @property
+    def stage(self) -> Stage:
+        """The stage of the images."""
+        return self.step.stages[0]
+
+    def focus(self) -> QWidget:
+        """Return the button that the user needs next."""
+        panel = self.panel
+        if panel.finished:
+            return panel.next
+        return panel.capture if panel.capture.isEnabled() else panel.import_files
+
+    def captures(self) -> tuple[Capture, ...]:
+        """Return the images of the step with their states."""
+        return captures_of(self.model.project.session, self.step.folder, self.judge)
+
+    def enter(self) -> None:
+        """Show the live image of the step."""
+        # Turning the lens after the lens step makes a new calibration necessary.
+        self.area.view.judge_focus(self.judges_focus)
+        self.model.live_detection.forget_movement()
+        super().enter()
+
+    def refresh(self) -> None:
+        """Update to changed results and corrections, also after undo."""
+        super().refresh()
+        self._point_to_captures()
+        self.arm()
+
+    def live(self) -> None:
+        """Show the live image with the detection in it."""
+        super().live()
+        there = self.model.live.stream is not None
+        self.panel.show_live("" if there else no_camera(), ready=there)
+        self.panel.capture.setEnabled(there)
+        self._point_to_captures()
+        self.arm(force=True)
+
+    def _point_to_captures(self) -> None:
+        """Without a camera, say how to show a capture."""
+        there = self.model.live.stream is not None or self.model.shown
+        if not there and self.model.project.session.found(self.step.folder):
+            self.area.view.say(no_camera() + "\n" + tr("Click an image below to show it."))
+
+    def camera_changed(self) -> None:
+        """Show the images of another camera, unless a capture is shown."""
+        if self.model.shown:
+            self.panel.capture.setEnabled(self.model.live.stream is not None)
+        else:
+            self.live()
+
+    def show_capture(self, name: str) -> None:
+        """Show a capture with its detection."""
+        self.area.show_capture(name, read_raw(self._path(name)))
+        self.model.show(name)
+        self.panel.show_live("", ready=True)
+        self.arm(force=True)
+
+    def _path(self, name: str) -> Path:
+        return self.model.project.session.folder / self.step.folder / name
+
+    # Detection
+
+    def arm(self, *, force: bool = False) -> None:
+        """Set the detection that the step needs, based on the present results."""
+        project, name = self.model.project, self.model.shown
+        armed = (name, self.depends_on(), project.session.decisions, project.results)
+        if not force and _same(armed, self._armed):
+            return
+        self._armed = armed
+        self.model.live_detection.set_detector(None if name else self.detector(""))
+        if name:
+            self._detect_again(name)
+
+    def _detect_again(self, name: str) -> None:
+        """Run the detection on the shown capture; only the newest result is shown."""
+        detector, path, armed = self.detector(name), self._path(name), self._armed
+
+        def done(found: Detection) -> None:
+            if self._armed is armed:
+                self._show(found)
+
+        def failed(sentence: str) -> None:
+            if self._armed is armed:
+                self.panel.show_live(sentence, ready=False)
+
+        title = tr("Analysing the image")
+        self.model.short_jobs.submit(
+            Job(title, lambda _tell: detector(read_raw(path)), done, failed)
+        )
+
+    def _show(self, found: Detection) -> None:
+        self.area.view.set_overlay(found.overlay)
+        self.panel.show_live(found.sentence, ready=found.ready and not found.warns)
+
+    def detected(self, item: Outcome | Failure) -> None:
+        """Show what was detected in a live image, and capture a good one if that is wanted."""
+        if self.model.shown:
+            return
+        if isinstance(item, Failure):
+            self.area.view.set_overlay(Overlay())
+            self.panel.show_live(item.sentence, ready=False)
+        elif isinstance(item.value, Seen):
+            if item.frame.settled:
+                self._show(item.value.detection)
+            else:
+                self.area.view.set_overlay(Overlay())
+                self.panel.show_live(tr("The image is changing."), ready=False)
+            if self._is_good(item.frame, item.value):
+                self.capture_by_itself()
+
+    def _is_good(self, frame: Frame, seen: Seen) -> bool:
+        """Return whether the image can be captured automatically: never the same view twice."""
+        enough = self.step.wanted == 1 and self.model.project.session.found(self.step.folder)
+        ready = seen.still and seen.detection.ready and frame.settled and seen.moved
+        waiting = self.model.busy_with_images or time.monotonic() < self._paused_until
+        return ready and not enough and not waiting
+
+    # Images
+
+    def capture(self) -> None:
+        """Capture an image; if a capture is shown, return to the live image instead."""
+        if self.model.shown:
+            self.live()
+            return
+        self.panel.show_notice("", "pass")
+        radius_mm = self.radius_mm
+        self.model.live_detection.forget_movement()  # before the next automatic capture
+        self._paused_until = time.monotonic() + PAUSE_S
+        self.arm(force=True)
+        self.model.capture(self.stage, frames=self.step.frames, radius_mm=radius_mm)
+
+    def capture_by_itself(self) -> None:
+        """Capture the image, if automatic capture is on."""
+        if not self.panel.automatic.isChecked():
+            return
+        if self.typing:  # a partly typed number is not valid
+            text = tr("Press Enter after the diameter. Automatic capture waits for it.")
+            self.panel.show_notice(text, "warn")
+            return
+        self.capture()
+
+    def choose_files(self) -> None:
+        """Let the user choose image files to import."""
+        settings = self.context.settings
+        files, _ = QFileDialog.getOpenFileNames(
+            self.area,
+            tr("Import images"),
+            str(settings.folder("images")),
+            tr("Images (*.png *.tif *.tiff)"),
+        )
+        if files:
+            settings.keep_folder("images", Path(files[0]).parent)
+            self.import_files([Path(file) for file in files])
+
+    def import_files(self, files: list[Path]) -> None:
+        """Import image files into the step."""
+        self.panel.show_notice("", "pass")
+        self.model.import_files(self.stage, files, radius_mm=self.radius_mm)
+
+
+def captures_of(
+    session: SessionImages, folder: str, judge: Callable[[Path], Judgement]
+) -> tuple[Capture, ...]:
+    """Return all captures of a stage with their states, including the excluded ones.
+
+    Parameters
+    ----------
+    session : Session or ClosedSession
+        The session.
+    folder : str
+        Folder of the stage.
+    judge : callable
+        Judges an image that is not excluded.
+    """
+    used = {path.name for path in session.found(folder)}
+    return tuple(
+        Capture(path, *judge(path))
+        if path.name in used
+        else Capture(path, "excluded", tr("Excluded."), tr("excluded"))
+        for path in session.captured(folder)
+    )
+
+
+def _same(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:
+    """Return whether nothing has changed; results are compared by identity."""
+    return bool(other) and one[:-1] == other[:-1] and one[-1] is other[-1]

@@ -1,0 +1,1 @@
+"""The step `lens` of the wizard."""

@@ -1,0 +1,1 @@
+"""The step `lights` of the wizard."""

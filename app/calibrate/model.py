@@ -1,0 +1,258 @@
+"""The observable model of the wizard: session, history, work, and what is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QUndoStack
+
+from app.calibrate.commands import Correction
+from app.calibrate.states import StepState
+from app.context.context import AppContext
+from app.live.live_detection import LiveDetection
+from app.live.session import LiveSession
+from app.services.jobs import Job, Jobs
+from gelpolight_core.calibration.closed_project import ClosedProject
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.translation import tr
+
+
+class WizardModel(QObject):
+    """What the steps of one wizard share; it has no widget of its own.
+
+    Captures are written by a separate thread, so that they never wait for a computation.
+
+    Attributes
+    ----------
+    live : LiveSession
+        The camera.
+    live_detection : LiveDetection
+        The detection of the open step on its images.
+    undo : QUndoStack
+        Every capture and manual correction, in one history.
+    jobs, short_jobs : Jobs
+        The computations, and the short jobs that run next to them.
+    shown : str
+        Name of the shown capture; empty for the live image.
+    statuses : dict of Stage to StageStatus
+        Status of every stage, as of the last :meth:`update`.
+    states : dict of str to (state, message)
+        State of every step by its key, as the list of steps shows it.
+
+    Signals
+    -------
+    changed()
+        Captures, decisions or results changed.
+    shown_changed()
+        Another capture, or the live image, is shown.
+    captured(str, str)
+        Stage and name of a new image.
+    photographed(str)
+        Stage of a new image from the camera; not sent for imported images.
+    progressed(str, float)
+        Title of the running computation (empty: none) and the share that is done.
+    refused(str)
+        An error message for the user.
+    capture_aborted(str)
+        An error message: the camera was released during a capture.
+    saved_as(str)
+        Path of a calibration that was just saved.
+    """
+
+    changed = Signal()
+    shown_changed = Signal()
+    captured = Signal(str, str)
+    photographed = Signal(str)
+    progressed = Signal(str, float)
+    refused = Signal(str)
+    capture_aborted = Signal(str)
+    saved_as = Signal(str)
+
+    def __init__(
+        self, project: CalibrationProject | ClosedProject, *, context: AppContext, parent: QObject
+    ) -> None:
+        super().__init__(parent)
+        self.project = project
+        self.undo = QUndoStack(self)
+        self.live = LiveSession(context=context, name="detection", parent=self)
+        self.live.use(False)  # until a step needs images
+        self.live_detection = LiveDetection(self.live)
+        self.jobs, self.short_jobs = Jobs("computing", self), Jobs("short jobs", self)
+        self.jobs.progressed.connect(self.progressed)
+        for jobs in (self.jobs, self.short_jobs):
+            jobs.refused.connect(self.refused)
+        # Returns why the present camera must not be used for this session; the session camera sets
+        # it.
+        self.camera_fault: Callable[[], str] = lambda: ""
+        self.shown = ""
+        self._saved = self._saved_inputs = ""
+        self.states: dict[str, StepState] = {}
+        self._running: Stage | None = None
+        self.update()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a capture, a save, a detection or a computation is in progress."""
+        return self.live.capturing or self.short_jobs.busy or self.jobs.busy
+
+    @property
+    def busy_with_images(self) -> bool:
+        """Whether an image is being captured or saved."""
+        return self.live.capturing or self.short_jobs.busy
+
+    def update(self) -> None:
+        """Look at the files again and judge every stage."""
+        self.statuses = self.project.statuses()
+
+    @property
+    def saved(self) -> str:
+        """Name of the saved calibration, if it belongs to the present captures."""
+        return self._saved if self._saved_inputs == self.project.all_inputs else ""
+
+    def use_saved(self, name: str, inputs: str) -> None:
+        """Remember a saved calibration and the text of its inputs."""
+        self._saved, self._saved_inputs = name, inputs
+
+    # Images
+
+    def show(self, name: str) -> None:
+        """Show a capture by its name, or the live image."""
+        self.shown = name
+        self.shown_changed.emit()
+
+    def capture(self, stage: Stage, *, frames: int, radius_mm: float | None = None) -> None:
+        """Capture an image for a stage, averaged over frames; for a ball, with its radius.
+
+        The image is on disk when :attr:`captured` is sent.
+        """
+        fault = self.camera_fault()
+        if fault:
+            self.refused.emit(fault)
+            return
+
+        def keep(frames: list[Any]) -> None:
+            def work(_tell: Callable[[float], None]) -> tuple[str, ...]:
+                return (self.project.add_capture(stage, frames, radius_mm=radius_mm),)
+
+            saved = partial(self._on_saved, stage, by_camera=True)
+            self.short_jobs.submit(Job(tr("Saving the image"), work, saved, must=True))
+
+        self.live.capture(frames, keep, self.refused.emit, aborted=self.capture_aborted.emit)
+
+    def import_files(
+        self, stage: Stage, files: Sequence[Path], *, radius_mm: float | None = None
+    ) -> None:
+        """Copy image files into a stage: all of them, or none if one is not valid."""
+
+        def work(_tell: Callable[[float], None]) -> tuple[str, ...]:
+            return self.project.import_files(stage, files, radius_mm=radius_mm)
+
+        saved = partial(self._on_saved, stage)
+        self.short_jobs.submit(Job(tr("Importing images"), work, saved, must=True))
+
+    def _on_saved(self, stage: Stage, names: tuple[str, ...], *, by_camera: bool = False) -> None:
+        text = tr("Import {n} images").format(n=len(names))
+        if len(names) == 1:
+            text = tr("Add {name}").format(name=names[0])
+        restore = partial(self.project.take_again, stage, names)
+        revert = partial(self.project.take_back, stage, names)
+        self.undo.push(self._command(text, restore, revert, stage, is_done=True))
+        self.changed.emit()
+        for name in names:
+            self.captured.emit(stage.value, name)
+        if by_camera:
+            self.photographed.emit(stage.value)
+        self.compute(stage)
+
+    # Manual corrections
+
+    def exclude(self, stage: Stage, name: str, excluded: bool) -> None:
+        """Exclude an image, or include it again; can be undone."""
+        text = tr("Exclude {name}") if excluded else tr("Include {name}")
+        act = partial(self.project.exclude, stage, name)
+        self.correct(text.format(name=name), partial(act, excluded), partial(act, not excluded),
+                     stage)  # fmt: skip
+
+    def correct(
+        self,
+        text: str,
+        act: Callable[[], None],
+        revert: Callable[[], None],
+        stage: Stage | None,
+    ) -> None:
+        """Run a command that can be undone, then compute the stage that it affects.
+
+        Parameters
+        ----------
+        text : str
+            Text in the history.
+        act, revert : callable
+            Written to disk before they return; raise InputError on failure.
+        stage : Stage or None
+            Stage to compute afterwards, with all stages that it depends on; None: all stages.
+        """
+        self.undo.push(self._command(text, act, revert, stage))
+
+    def _command(
+        self,
+        text: str,
+        act: Callable[[], None],
+        revert: Callable[[], None],
+        stage: Stage | None,
+        *,
+        is_done: bool = False,
+    ) -> Correction:
+        def done() -> None:
+            self.changed.emit()
+            self.compute(stage)
+
+        refused = self.refused.emit
+        return Correction(text, act, revert, done=done, refused=refused, is_done=is_done)
+
+    def reload(self) -> None:
+        """Read the session files again and start a new history.
+
+        Raises
+        ------
+        InputError
+            If the files cannot be used; then nothing changes.
+        """
+        self.project.reload()
+        self.undo.clear()
+        self.changed.emit()
+        self.compute()
+
+    # Background work
+
+    @property
+    def running(self) -> Stage | None:
+        """The stage that is being computed."""
+        return self._running
+
+    def compute(self, upto: Stage | None = None) -> None:
+        """Compute the outdated stages, up to one stage or all of them."""
+
+        def work(tell: Callable[[float], None]) -> None:
+            while stale := self.project.stale(upto=upto):
+                tell(0.0)
+                self._running = stale[0]
+                try:
+                    self.project.compute(stale[0], tell)
+                finally:
+                    self._running = None
+
+        if self.project.stale(upto=upto):
+            self.jobs.submit(Job(tr("Computing"), work, lambda _nothing: self.changed.emit()))
+            self.changed.emit()
+
+    def close(self) -> None:
+        """Stop all work and release the camera; captured images are written first."""
+        self.live.finish()
+        self.short_jobs.close()
+        self.jobs.close()
+        self.undo.clear()

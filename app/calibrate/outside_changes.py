@@ -1,0 +1,92 @@
+"""Warns that another program changed the files of the open session, and offers what to do."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
+
+from app.calibrate.model import WizardModel
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.naming import named
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+CHECK_MS = 1000
+
+
+class OutsideBar(QWidget):
+    """A bar with two buttons, visible only if files were changed.
+
+    Parameters
+    ----------
+    model : WizardModel
+        Model of the wizard.
+    """
+
+    def __init__(self, model: WizardModel) -> None:
+        super().__init__()
+        named(self, "calibrate.outside", tr("Changed by another program"))
+        self._model = model
+        self._refusal = ""
+        self.sentence = named(PlainLabel(), "calibrate.outside.sentence", tr("What was changed"))
+        self.sentence.setWordWrap(True)
+        show_meaning(self.sentence, "warn")
+        make_bold(self.sentence)
+        self.sentence.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+        self.reload = named(
+            QPushButton(tr("Re&load")),
+            "calibrate.outside.reload",
+            tr("Reload"),
+            tr("Read the changed files; this clears the history of corrections"),
+        )
+        self.overwrite = named(
+            QPushButton(tr("&Keep mine")),
+            "calibrate.outside.overwrite",
+            tr("Keep mine"),
+            tr("Overwrite the changed files with the state of this page"),
+        )
+        self.reload.clicked.connect(self._reload)
+        self.overwrite.clicked.connect(self._overwrite)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 4, 8, 4)
+        row.addWidget(self.sentence, 1)
+        row.addWidget(self.reload)
+        row.addWidget(self.overwrite)
+        self._timer = QTimer(self)
+        self._timer.setInterval(CHECK_MS)
+        self._timer.timeout.connect(self.check)
+        self.hide()
+
+    def watch(self, on: bool) -> None:
+        """Check regularly while the page is shown."""
+        if on:
+            self._timer.start()
+            self.check()
+        else:
+            self._timer.stop()
+
+    def check(self) -> None:
+        """Check whether files were changed, and say so."""
+        changed = self._model.project.changed_outside()
+        if not changed:
+            self._refusal = ""
+        text = tr("Another program changed {names} while this session is open.").format(
+            names=tr(" and ").join(path.name for path in changed)
+        )
+        self.sentence.setText(self._refusal or text)
+        self.setVisible(bool(changed))
+
+    def _reload(self) -> None:
+        try:
+            self._model.reload()
+        except InputError as error:
+            self._refusal = str(error)
+        self.check()
+
+    def _overwrite(self) -> None:
+        try:
+            self._model.project.overwrite()
+        except InputError as error:
+            self._refusal = str(error)
+        self.check()

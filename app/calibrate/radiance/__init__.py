@@ -1,0 +1,1 @@
+"""The step `radiance` of the wizard."""

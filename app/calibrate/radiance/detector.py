@@ -1,0 +1,110 @@
+"""Live check of the whiteboard: well lit, even, and not the membrane.
+
+It uses the raw image at a quarter of its size and the limits of the core. Specks and saturated
+areas are marked in the image.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.calibrate.detection import Detection, judged, or_refusal, share
+from app.calibrate.light_checks import enlarged, marked, refuse_grey
+from app.calibrate.marks import working_rim
+from app.live.image_checks import Rgb, saturated
+from app.live.overlay import Overlay
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.bare_membrane import (
+    CHANGE,
+    area_of,
+    brightness_figure,
+    is_same,
+    local_change,
+    saturated_percent,
+    shrunk,
+)
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import judge
+from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
+from gelpolight_core.translation import tr
+
+Float = NDArray[np.float32]
+Mask2 = NDArray[np.bool_]
+
+# Specks and squares change the brightness within a fiftieth of the image; light does not.
+SPECK_OF_WIDTH = 0.02
+
+
+def detect_whiteboard(
+    rgb: Rgb, *, table: ResamplingTable | None = None, background: Rgb | None = None
+) -> Detection:
+    """Check the light on the whiteboard.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3)
+        The frame.
+    table : ResamplingTable, optional
+        Gives the working area; without it the whole image is checked.
+    background : (rows, columns, 3), optional
+        Image of the background stage, if captured; it shows whether the membrane is still mounted.
+    """
+    rim = Overlay(lines=() if table is None else (working_rim(table),))
+
+    def detect() -> Detection:
+        refuse_grey(rgb)
+        area, small = area_of(rgb.shape, table), shrunk(rgb)
+        if background is not None and background.shape == rgb.shape:
+            _refuse_membrane(small, shrunk(background), area)
+        unlit = area & (small.min(axis=2) < LEAST_LIGHT)
+        lit = area & ~unlit
+        inner = _without_rim(lit)
+        change = local_change(small, inner, SPECK_OF_WIDTH * small.shape[1])
+        specks = inner & (change > CHANGE)
+        full = saturated(rgb) > 0
+        marks = Overlay(
+            lines=rim.lines,
+            masks=marked(full, enlarged(specks, rgb)),
+        )
+        figures = (
+            brightness_figure(small, area),
+            judge("saturated", tr("Saturated share"), saturated_percent(rgb, area), "%",
+                  warn=0.1, fail=10.0,
+                  advice=tr("Shorten the exposure until nothing is saturated")),
+            judge("unlit", tr("Unlit share"), 100.0 * share(unlit, area), "%", warn=10.0, fail=40.0,
+                  advice=tr("Press the board flat onto the surface, or lengthen the exposure")),
+            judge("specks", tr("Specks and edges"), 100.0 * share(specks, area), "%",
+                  warn=3.0, fail=20.0,
+                  advice=tr("Use a white board without pattern; clean it and the elastomer")),
+            judge("light_range", tr("Ratio of brightest to darkest area"), _light_range(small, lit),
+                  warn=40.0, advice=tr("Dim or move the LEDs to get more even light")),
+        )  # fmt: skip
+        return judged(marks, figures, tr("The whiteboard is well lit."))
+
+    return or_refusal(detect, marks=rim)
+
+
+def _without_rim(lit: Mask2) -> Mask2:
+    """Return the lit area without the mixed pixels at the rim of the board; specks stay in it."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    whole = cv2.morphologyEx(lit.astype(np.uint8), cv2.MORPH_CLOSE, disc)
+    return np.asarray(cv2.erode(whole, disc, borderType=cv2.BORDER_REPLICATE)) > 0
+
+
+def _light_range(small: Float, lit: Mask2) -> float:
+    if not lit.any():
+        return float("inf")
+    inside = small[lit]
+    return float((inside.max(axis=0) / np.percentile(inside, 1.0, axis=0)).max())
+
+
+def _refuse_membrane(small: Float, background: Float, area: Mask2) -> None:
+    """Raise InputError if the image shows the known bare membrane instead of the whiteboard."""
+    if is_same(small, background, area):
+        raise InputError(
+            tr("the image looks the same as the background image"),
+            where=tr("Image"),
+            advice=tr("Remove the membrane and press the white board onto the elastomer"),
+        )

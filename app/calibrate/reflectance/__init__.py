@@ -1,0 +1,1 @@
+"""The step `reflectance` of the wizard."""

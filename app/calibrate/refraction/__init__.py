@@ -1,0 +1,1 @@
+"""The step `refraction` of the wizard."""

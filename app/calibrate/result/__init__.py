@@ -1,0 +1,1 @@
+"""The step `result` of the wizard."""

@@ -1,0 +1,221 @@
+"""The overview of a calibration: every stage with its figures, and the Save button."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QPushButton,
+    QScrollArea,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.calibrate.states import RUNNING, is_done, state_icon, state_meaning, state_word
+from app.calibrate.step_data import Step
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import make_bold, show_meaning
+from app.widgets.naming import named
+from app.widgets.quality_table import QualityTableWidget
+from app.widgets.roomy_label import RoomyLabel
+from app.widgets.sign import Sign
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.status import StageState, StageStatus
+from gelpolight_core.quality import QualityTable
+from gelpolight_core.session.missing import OPEN_STAGES
+from gelpolight_core.translation import tr
+
+
+class ResultView(QWidget):
+    """Shows all stages and the buttons to save the calibration and its report.
+
+    Signals
+    -------
+    save_wanted(), report_wanted()
+        The buttons.
+    step_wanted(str)
+        Key of a step to go to.
+    """
+
+    save_wanted = Signal()
+    report_wanted = Signal()
+    step_wanted = Signal(str)
+
+    def __init__(self, steps: Sequence[Step], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "result", tr("Calibration"))
+        self._rows: dict[Stage, _StageRow] = {}
+        column = QVBoxLayout(self)
+        self.headline = named(PlainLabel(), "result.headline", tr("Verdict"))
+        self.headline.setWordWrap(True)
+        make_bold(self.headline, size=1.2)
+        column.addWidget(self.headline)
+        scroll = named(QScrollArea(), "result.scroll", tr("All stages"))
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        inside = QWidget()
+        rows = QVBoxLayout(inside)
+        for step in steps:
+            for stage in step.stages:
+                if stage not in self._rows:
+                    self._rows[stage] = _StageRow(step)
+                    self._rows[stage].step_wanted.connect(self.step_wanted)
+                    rows.addWidget(self._rows[stage])
+        rows.addStretch(1)
+        scroll.setWidget(inside)
+        column.addWidget(scroll, 1)
+        buttons = QHBoxLayout()
+        self.save = named(
+            QPushButton(tr("&Save the calibration")), "result.save", tr("Save the calibration")
+        )
+        self.report = named(
+            QPushButton(tr("Write the &report…")), "result.report", tr("Write the report")
+        )
+        for button, signal in ((self.save, self.save_wanted), (self.report, self.report_wanted)):
+            button.setMinimumHeight(38)
+            button.clicked.connect(signal)
+            buttons.addWidget(button)
+        column.addLayout(buttons)
+        self.saved = named(RoomyLabel("\n"), "result.saved", tr("Where it was saved"))
+        self.saved.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        column.addWidget(self.saved)
+
+    def show_saved(self, sentence: str, role: str = "pass") -> None:
+        """Show where the calibration or its report was saved, or why it was not."""
+        self.saved.setText(sentence)
+        show_meaning(self.saved, role)
+
+    def show_states(
+        self,
+        states: Mapping[str, tuple[str, str]],
+        statuses: Mapping[Stage, StageStatus],
+        *,
+        busy: bool,
+        saved: str = "",
+    ) -> None:
+        """Show the state of every stage.
+
+        Parameters
+        ----------
+        states : mapping
+            State and sentence by the step's key, as the list of steps shows them.
+        statuses : mapping
+            Status of every stage.
+        busy : bool
+            Whether a stage is being computed or waits for it.
+        saved : str, optional
+            Name of the saved calibration that belongs to the present captures.
+        """
+        for stage, row in self._rows.items():
+            row.show_state(*states[row.step.key], statuses[stage].quality)
+        done = all(is_done(statuses[stage].state.value) for stage in self._rows)
+        made = all(
+            is_done(statuses[stage].state.value) or statuses[stage].state is StageState.FAIL
+            for stage in self._rows
+        )
+        open_steps = [s for s in statuses.values() if not is_done(s.state.value)]
+        if done:
+            warned = sum(s.state is StageState.WARN for s in statuses.values())
+            text = tr("All stages are complete. Save the calibration, then validate it.")
+            if saved:
+                text = tr(
+                    "All stages are complete and saved as {name}. Validate the calibration next."
+                )
+                text = text.format(name=saved)
+            elif warned:
+                text = tr(
+                    "All stages are complete, {n} with a warning. Read the advice, then save."
+                ).format(n=warned)
+        elif busy and saved:
+            text = tr(
+                "Saved as {name}. You can validate it now; the stages are being recomputed in the "
+                "background."
+            ).format(name=saved)
+        elif busy:
+            text = tr("Computing. Please wait.")
+        else:
+            text = self._missing_sentence(statuses)
+            if any(s.state is StageState.STALE for s in open_steps):
+                text = tr(
+                    "Outdated stages: {n}. The captures have changed since they were computed. "
+                    "Click Recompute."
+                )
+            text = text.format(n=len(open_steps))
+        self.headline.setText(text)
+        running = any(states[row.step.key][0] == RUNNING for row in self._rows.values())
+        self.save.setEnabled(done or (made and not running))
+        self.save.setStyleSheet("font-weight: bold;" if done else "")
+        # The report waits for the stages by itself.
+        self.report.setEnabled(self.save.isEnabled() or bool(busy and saved))
+
+    def _missing_sentence(self, statuses: Mapping[Stage, StageStatus]) -> str:
+        """Return the incomplete stages, and which of them need the sensor open."""
+        text = tr("Incomplete stages: {n}. Complete them from top to bottom.")
+        closed = [
+            row.step.title
+            for stage, row in self._rows.items()
+            if FOLDERS.get(stage) in OPEN_STAGES and statuses[stage].state is StageState.EMPTY
+        ]
+        if closed:
+            text += " " + tr(
+                "{titles} need the open sensor. If it cannot be opened, start a new calibration "
+                "and answer that the membrane is bonded."
+            ).format(titles=", ".join(closed))
+        return text
+
+
+class _StageRow(QWidget):
+    """One stage: icon, state, sentence, and its figures on demand."""
+
+    step_wanted = Signal(str)
+
+    def __init__(self, step: Step) -> None:
+        super().__init__()
+        self.step = step
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 2, 0, 2)
+        row = QHBoxLayout()
+        self._sign, self._word, self._sentence = Sign(), PlainLabel(), PlainLabel()
+        self._sentence.setWordWrap(True)
+        self._word.setMinimumWidth(96)
+        make_bold(self._word)
+        self.more = named(
+            QToolButton(),
+            f"result.{step.key}.more",
+            tr("Figures of {title}").format(title=step.title),
+        )
+        self.more.setText(tr("Figures"))
+        self.more.setCheckable(True)
+        title = named(
+            QPushButton(step.title),
+            f"result.{step.key}",
+            tr("Go to {title}").format(title=step.title),
+        )
+        title.setFlat(True)
+        title.setMinimumWidth(130)
+        title.setStyleSheet("text-align: left;")
+        title.clicked.connect(lambda: self.step_wanted.emit(step.key))
+        row.addWidget(self._sign)
+        row.addWidget(title)
+        row.addWidget(self._word)
+        row.addWidget(self._sentence, 1)
+        row.addWidget(self.more)
+        column.addLayout(row)
+        self.table = QualityTableWidget(
+            f"result.{step.key}.quality", tr("Figures of {title}").format(title=step.title)
+        )
+        self.table.hide()
+        self.more.toggled.connect(self.table.setVisible)
+        column.addWidget(self.table)
+
+    def show_state(self, state: str, sentence: str, quality: QualityTable) -> None:
+        self._sign.show_icon(state_icon(state))
+        self._word.setText(state_word(state).capitalize())
+        show_meaning(self._word, state_meaning(state))
+        self._sentence.setText(sentence)
+        self.table.set_table(quality)
+        self.more.setVisible(bool(quality.figures))

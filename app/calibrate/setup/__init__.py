@@ -1,0 +1,1 @@
+"""The step `setup` of the wizard."""

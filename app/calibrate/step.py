@@ -1,0 +1,223 @@
+"""What a step of the wizard is: its data, and the presenter that each step's folder supplies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QApplication, QWidget
+
+from app.calibrate.film_strip import Capture
+from app.calibrate.image_area import RESULT, ImageArea
+from app.calibrate.maps import Panel
+from app.calibrate.model import WizardModel
+from app.calibrate.states import RUNNING, StepState, is_done, step_state
+from app.calibrate.step_data import Step
+from app.calibrate.step_panel import StepPanel
+from app.context.context import AppContext
+from app.sources.bench import Scene
+from app.sources.processor import Failure, Outcome
+from gelpolight_core.calibration.status import StageState
+from gelpolight_core.quality import QualityTable
+from gelpolight_core.translation import tr
+
+UNUSED = ("excluded", StageState.FAIL.value)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What all steps of one wizard share.
+
+    Attributes
+    ----------
+    model : WizardModel
+        The session, its history and its work.
+    context : AppContext
+        Context of the application.
+    area : ImageArea
+        Live image or capture, results, and film strip.
+    panel : StepPanel
+        The side panel of most steps.
+    steps : tuple of Step
+        All steps of the wizard.
+    """
+
+    model: WizardModel
+    context: AppContext
+    area: ImageArea
+    panel: StepPanel
+    steps: tuple[Step, ...]
+
+
+class StepPresenter(QObject):
+    """One step. The wizard calls it while it is open, and knows nothing else of it.
+
+    Parameters
+    ----------
+    parts : Parts
+        What all steps share.
+
+    Signals
+    -------
+    step_wanted(str)
+        Key of a step to go to.
+    lay_wanted()
+        Place the object of the step on the virtual bench.
+    """
+
+    step_wanted = Signal(str)
+    lay_wanted = Signal()
+    uses_camera = False
+    has_image_tab = True
+    opens_slowly = False
+    """Whether the widget in the middle is created when the step is first opened."""
+
+    def __init__(self, parts: Parts) -> None:
+        super().__init__(parts.area)
+        self.step = self.describe()
+        self.model, self.context = parts.model, parts.context
+        self.area, self.panel = parts.area, parts.panel
+
+    @staticmethod
+    def describe() -> Step:
+        """Return the data of the step."""
+        raise NotImplementedError
+
+    # What is shown
+
+    @property
+    def centre(self) -> QWidget:
+        """The widget in the middle."""
+        return self.area
+
+    @property
+    def side(self) -> QWidget:
+        """The widget at the right."""
+        return self.panel
+
+    def focus(self) -> QWidget:
+        """Return the widget that the user needs first."""
+        return self.panel.next
+
+    def captures(self) -> tuple[Capture, ...]:
+        """Return the images of the step with their states, including the excluded ones."""
+        return ()
+
+    def state(self) -> StepState:
+        """Return the state of the step, and the message about it."""
+        statuses, running = self.model.statuses, self.model.running
+        return step_state(self.step, statuses, running, count=self.count())
+
+    def count(self) -> int:
+        """Return the number of usable images."""
+        return sum(capture.state not in UNUSED for capture in self.captures())
+
+    def is_finished(self, state: str) -> bool:
+        """Return whether nothing is left to do in the step."""
+        return is_done(state) and self.count() >= self.step.wanted
+
+    def tables(self) -> Sequence[QualityTable]:
+        """Return the quality tables of the step."""
+        return [self.model.statuses[stage].quality for stage in self.step.stages]
+
+    def result_panels(self) -> tuple[Panel, ...]:
+        """Return the images of the step's result."""
+        return ()
+
+    # Called by the wizard
+
+    def start(self) -> None:
+        """Begin, once all steps exist."""
+
+    def enter(self) -> None:
+        """Show the step."""
+        self.area.show_step(strip=self.step.stage is not None, image=self.has_image_tab)
+        self.live()
+
+    def leave(self) -> None:
+        """Show another step instead."""
+
+    def close(self) -> None:
+        """Stop all work of the step."""
+
+    def refresh(self) -> None:
+        """Show the present state of the session."""
+        self.area.strip.show_captures(self.captures())
+        self.show_state(*self.model.states[self.step.key])
+        self.show_result()
+
+    def show_result(self) -> None:
+        """Show the images of the result, if there are any."""
+        panels = self.result_panels()
+        self.area.maps.show_panels(panels)
+        self.area.show_tab(RESULT, bool(panels))
+
+    def show_state(self, state: str, sentence: str) -> None:
+        """Show the state in the side panel."""
+        panel, stages, count = self.panel, self.step.stages, self.count()
+        panel.show_count(count)
+        if state == RUNNING:
+            panel.show_running()
+            return
+        stale = bool(stages) and state in (StageState.STALE.value, StageState.WAITING.value)
+        offer = stale and not self.model.jobs.busy and self.model.project.stale(upto=stages[-1])
+        finished = self.is_finished(state)
+        advance = finished and not panel.finished
+        panel.show_state(state, sentence, self.tables(), recompute=bool(offer), finished=finished)
+        # Only if the focus is on the last pressed button: never interrupt a person who is typing.
+        if advance and QApplication.focusWidget() in (None, panel.capture):
+            panel.next.setFocus()
+
+    def live(self) -> None:
+        """Show the live image."""
+        self.model.show("")
+        stream = self.model.live.stream
+        self.area.show_stream(stream)
+        if stream is None:
+            self.area.view.say(no_camera())
+        self.model.live_detection.set_detector(None)
+
+    def camera_changed(self) -> None:
+        """Show the images of another camera."""
+        self.live()
+
+    def show_capture(self, name: str) -> None:
+        """Show a capture.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read.
+        """
+
+    def capture(self) -> None:
+        """Capture an image; if a capture is shown, return to the live image instead."""
+        if self.model.shown:
+            self.live()
+
+    def choose_files(self) -> None:
+        """Let the user choose image files to import."""
+
+    def exclude(self, name: str, excluded: bool) -> None:
+        """Exclude an image, or include it again."""
+        if self.step.stage is not None:
+            self.model.exclude(self.step.stage, name, excluded)
+
+    def detected(self, item: Outcome | Failure) -> None:
+        """Show the detection in a live image."""
+
+    def moved(self, handle: str, u: float, v: float, radius_px: float) -> None:
+        """Correct a detection: the user has dragged a handle."""
+
+    def show_bench(self, there: bool) -> None:
+        """Offer the virtual bench if there is one."""
+        self.panel.lay.setVisible(there)
+
+    def on_bench(self, scene: Scene) -> None:
+        """Use the known size of an object that was placed on the virtual bench."""
+
+
+def no_camera() -> str:
+    """Return the message that no camera is selected."""
+    return tr("No camera. Select one in the bar above, or import images.")

@@ -1,0 +1,1 @@
+"""The step `validation` of the wizard."""

@@ -1,0 +1,283 @@
+"""Validate a saved calibration on an object of known size, and record the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QFileDialog
+
+from app.calibrate.detection import read_raw
+from app.calibrate.maps import Panel
+from app.calibrate.model import WizardModel
+from app.calibrate.validation.panel import ValidationPanel
+from app.calibrate.validation.trial import KnownObject, Trial, run_trial
+from app.context.context import AppContext
+from app.services.jobs import Job, Jobs
+from app.workspace.entries import read_entry
+from app.workspace.validation import Validation, read_validation, write_validation
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.user import user_name
+from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.translation import tr
+
+FRAMES = 4
+TRUTH = "truth.csv"
+
+
+class Validating(QObject):
+    """Measures presses with the saved calibration, and records the result.
+
+    Parameters
+    ----------
+    model : WizardModel
+        Model of the wizard.
+    panel : ValidationPanel
+        Asks for the object, and shows the result.
+    context : AppContext
+        Context with the library.
+
+    Signals
+    -------
+    tried(object)
+        A Panel with the shaded depth map of a press.
+    """
+
+    tried = Signal(object)
+
+    def __init__(self, model: WizardModel, panel: ValidationPanel, *, context: AppContext) -> None:
+        super().__init__(panel)
+        self._model, self._panel, self._context = model, panel, context
+        self._path: Path | None = None
+        # Separate jobs: a press can be measured while the stages are recomputed.
+        self.jobs = Jobs("validating", self)
+        self.jobs.progressed.connect(lambda title, share: panel.show_work(share if title else None))
+        self.jobs.refused.connect(model.refused)
+        self._reconstructor: Reconstructor | None = None
+        self._trial: tuple[Trial, str] | None = None
+        self._asked = object()  # identifies the newest trial; results of older ones are dropped
+        limits = context.settings.limits
+        panel.size_limit.setValue(limits.size_percent)
+        panel.height_limit.setValue(limits.height_percent)
+        panel.trial_wanted.connect(self.measure)
+        panel.import_wanted.connect(self.choose_press)
+        panel.keep_wanted.connect(self.keep)
+        self._show_calibration()
+        self._find_earlier()
+        model.changed.connect(self._show_calibration)
+        model.saved_as.connect(self.use_calibration)
+
+    @property
+    def state(self) -> tuple[str, str]:
+        """State of the step, and the message about it."""
+        found = self._recorded()
+        if found is None:
+            return "empty", tr("Not validated yet")
+        if not self._model.saved:
+            return "stale", tr("The captures or corrections have changed since the validation")
+        if found.passed:
+            return "pass", tr("Validated")
+        return "fail", tr("The last validation failed")
+
+    def use_calibration(self, path: str) -> None:
+        """Use this saved calibration for the next trials."""
+        self._path, self._reconstructor = Path(path), None
+        summary = read_entry(self._path).summary
+        self._model.use_saved(self._path.stem, "" if summary is None else summary.inputs)
+        self._show_calibration()
+        self._drop_trial()
+        self._show_verdict()
+
+    def _drop_trial(self) -> None:
+        """Drop the shown trial, and one that is still running."""
+        self._asked, self._trial = object(), None
+        self._panel.show_trial(None)
+
+    def _find_earlier(self) -> None:
+        """Select the calibration of the present captures, or the newest one of the session."""
+        project = self._model.project
+        session, present = project.session, project.all_inputs
+        try:
+            entries = self._context.workspace.entries()
+        except InputError as error:
+            self._context.toasts.show(str(error), "warn")
+            return
+        found = [
+            (entry.summary.inputs != present, entry.path)
+            for entry in entries
+            if entry.summary is not None
+            and entry.summary.session == session.folder.name
+            and entry.serial == session.serial
+        ]
+        if found:
+            self.use_calibration(str(min(found, key=lambda one: one[0])[1]))
+
+    def _show_calibration(self) -> None:
+        name = "" if self._path is None else self._path.stem
+        self._panel.show_calibration(name, present=bool(self._model.saved))
+
+    def refresh(self) -> None:
+        """Update to the present camera."""
+        self._panel.show_camera(self._model.live.stream is not None)
+
+    def close(self) -> None:
+        """Stop the work and wait for nothing."""
+        self.jobs.close()
+
+    def measure(self) -> None:
+        """Capture the press, then measure it."""
+        live = self._model.live
+        if live.stream is not None and not live.capturing and self._path is not None:
+            self._drop_trial()
+            self._panel.say(tr("Capturing: hold the object still."))
+            self._panel.show_work(0.0)
+            live.capture(FRAMES, self._measure, self._refuse)
+
+    def choose_press(self) -> None:
+        """Let the user choose the image of a press, and measure it."""
+        presses = self._model.project.session.folder / "presses"
+        settings = self._context.settings
+        folder = presses if presses.is_dir() else settings.folder("press")
+        chosen, _ = QFileDialog.getOpenFileName(
+            self._panel,
+            tr("Import an image of a press"),
+            str(folder),
+            tr("Images (*.png *.tif *.tiff)"),
+        )
+        if chosen:
+            settings.keep_folder("press", Path(chosen).parent)
+            self.import_press(Path(chosen))
+
+    def import_press(self, path: Path) -> None:
+        """Measure a press from an image file, with the true size from its folder, if given."""
+        self._panel.show_work(0.0)
+        try:
+            frame = read_raw(path)
+            known = _known_in_folder(path)
+        except InputError as error:
+            self._refuse(str(error))
+            return
+        if known is not None:
+            self._panel.show_known(known)
+        self._measure([frame])
+
+    def _measure(self, frames: list[NDArray[Any]]) -> None:
+        self._drop_trial()
+        panel, asked = self._panel, self._asked
+        known, path, present = panel.known(), self._path, self._reconstructor
+        if path is None:
+            return
+        size_limit, height_limit = panel.size_limit.value(), panel.height_limit.value()
+
+        def work(tell: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
+            reconstructor = present or Reconstructor(read_calibration(path))
+            trial = run_trial(
+                frames,
+                reconstructor,
+                known,
+                size_limit_percent=size_limit,
+                height_limit_percent=height_limit,
+                tell=tell,
+            )
+            return reconstructor, trial
+
+        text = tr("{shape}, {size:g} mm").format(
+            shape=panel.shape.currentText(), size=known.size_mm
+        )
+
+        def done(found: tuple[Reconstructor, Trial]) -> None:
+            if self._asked is asked:
+                self._show(*found, text)
+
+        def failed(sentence: str) -> None:
+            if self._asked is asked:
+                self._refuse(sentence)
+
+        self._panel.say(tr("Measuring."))
+        self.jobs.submit(Job(tr("Measuring the press"), work, done, failed))
+
+    def _show(self, reconstructor: Reconstructor, trial: Trial, text: str) -> None:
+        self._reconstructor, self._trial = reconstructor, (trial, text)
+        self._panel.show_work(None)
+        self._panel.show_trial(trial)
+        self.tried.emit(Panel(tr("Measured depth"), trial.shaded))
+
+    def _refuse(self, sentence: str) -> None:
+        self._trial = None
+        self._panel.show_work(None)
+        self._panel.show_trial(None)
+        self._panel.say(sentence, "warn")
+
+    def keep(self) -> None:
+        """Store the trial as the validation of the calibration."""
+        if self._trial is None or self._path is None or self._reconstructor is None:
+            return
+        trial, text = self._trial
+        validation = Validation(
+            self._reconstructor.calibration.identity,
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            user_name(),
+            text,
+            trial.comparisons,
+        )
+        try:
+            write_validation(validation, self._path)
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+            return
+        self._context.requests.calibrations_changed.emit()
+        self._show_verdict()
+        self._model.changed.emit()
+
+    def _recorded(self) -> Validation | None:
+        if self._path is None:
+            return None
+        try:
+            found = read_validation(self._path)
+            if found is not None and found.identity != read_summary(self._path).identity:
+                return None  # it belongs to another calibration
+        except InputError as error:
+            self._context.toasts.show(str(error), "warn")
+            return None
+        return found
+
+    def _show_verdict(self) -> None:
+        found = self._recorded()
+        if found is None:
+            self._panel.show_verdict(tr("Not validated."), passed=False)
+        elif found.passed:
+            self._panel.show_verdict(
+                tr(
+                    "This calibration is validated. You can use it on the Inspect and Measure "
+                    "pages."
+                ),
+                passed=True,
+            )
+        else:
+            self._panel.show_verdict(
+                tr("Not validated: the errors of the recorded trial are beyond the limits."),
+                passed=False,
+            )
+
+
+def _known_in_folder(path: Path) -> KnownObject | None:
+    """Return the object given for a press image in the truth.csv of its folder, or None.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used.
+    """
+    if not (path.parent / TRUTH).is_file():
+        return None
+    for row in read_truth(path.parent).rows:
+        if row.file == path.name:
+            return KnownObject(row.truth.shape, row.truth.size_mm, row.truth.height_mm)
+    return None

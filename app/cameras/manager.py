@@ -1,0 +1,253 @@
+"""The cameras of this computer: shared by all pages, set as for the calibration, and monitored."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
+from PySide6.QtCore import QObject, Signal
+
+from app.services.settings import Settings
+from app.services.status import StatusModel
+from app.services.toasts import Toasts
+from app.sources.camera.applying import differences, is_locked
+from app.sources.camera.camera import Camera
+from app.sources.camera.camera_source import CameraSource
+from app.sources.camera.camera_state import CameraState
+from app.sources.camera.driver import (
+    CameraDriver,
+    Device,
+    Format,
+    compression_warning,
+)
+from app.sources.source import SourceInfo
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
+from gelpolight_core.translation import tr
+
+_LOG = logging.getLogger(__name__)
+
+
+class CameraManager(QObject):
+    """Manages the cameras and reports their changes to the user.
+
+    Parameters
+    ----------
+    settings : Settings
+        Stores how each camera was set.
+    status : StatusModel
+        Shows the state of the camera in a few words.
+    toasts : Toasts
+        Shows changes.
+
+    Attributes
+    ----------
+    driver : CameraDriver
+        Finds and opens cameras; tests replace it.
+
+    Signals
+    -------
+    changed()
+        A camera was connected, removed or set, or the reference settings changed.
+    """
+
+    changed = Signal()
+    _woken = Signal()
+
+    def __init__(self, *, settings: Settings, status: StatusModel, toasts: Toasts) -> None:
+        super().__init__()
+        self._settings, self._status, self._toasts = settings, status, toasts
+        self._driver: CameraDriver | None = None
+        self._devices: dict[str, Device] = {}
+        self._cameras: dict[str, Camera] = {}
+        self._known: dict[str, CameraState] = {}
+        self._kept: dict[str, CameraSettings] = {}
+        self._shown: dict[str, tuple[str, ...]] = {}
+        self._reference: tuple[str, CameraSettings] | None = None
+        # Sent from the cameras' threads to this thread; it carries no data.
+        self._woken.connect(self._update)
+
+    @property
+    def driver(self) -> CameraDriver:
+        """What finds and opens cameras."""
+        if self._driver is None:
+            from app.sources.camera.opencv import OpenCvDriver  # slow to import
+
+            self._driver = OpenCvDriver()
+        return self._driver
+
+    @driver.setter
+    def driver(self, driver: CameraDriver) -> None:
+        self._driver = driver
+        self._cameras.clear()
+
+    # Connected cameras
+
+    def infos(self) -> tuple[SourceInfo, ...]:
+        """Return the connected cameras as sources."""
+        try:
+            devices = self.driver.devices()
+        except (InputError, OSError) as error:
+            _LOG.warning("The cameras cannot be listed: %s", error)
+            return ()
+        self._devices |= {device.identity: device for device in devices}
+        names = [device.name for device in devices]
+        return tuple(
+            SourceInfo(
+                "camera",
+                d.name if names.count(d.name) == 1 else f"{d.name} ({d.place})",
+                d.identity,
+                partial(self._source, d.identity),
+            )
+            for d in devices
+        )
+
+    def of(self, info: SourceInfo | None) -> Camera | None:
+        """Return the camera of a source; None if it is not a camera."""
+        if info is None or info.kind != "camera" or info.detail not in self._devices:
+            return None
+        return self._camera(info.detail)
+
+    def _camera(self, identity: str) -> Camera:
+        if identity not in self._cameras:
+            device = self._devices[identity]
+            camera = Camera(self.driver, device, on_change=self._woken.emit)
+            camera.want(self._stored_for(device))
+            self._cameras[identity] = camera
+        return self._cameras[identity]
+
+    def _source(self, identity: str) -> CameraSource:
+        return CameraSource(self._camera(identity))
+
+    def _stored_for(self, device: Device) -> CameraSettings | None:
+        """Return the settings for a camera: as for the calibration, or as it was last used."""
+        reference = None if self._reference is None else self._reference[1]
+        if reference is not None and reference.is_of(device.identity, device.model):
+            return reference
+        return settings_of_texts(self._settings.camera(device.identity))
+
+    # Changing settings
+
+    def refer(self, what: str, stored: CameraSettings | None) -> None:
+        """Make stored settings the reference, and apply them.
+
+        Parameters
+        ----------
+        what : str
+            What the settings belong to, such as "the calibration".
+        stored : CameraSettings or None
+            The reference settings; None: no reference.
+        """
+        reference = None if stored is None else (what, stored)
+        if reference == self._reference:
+            return
+        self._reference = reference
+        if stored is not None:
+            for camera in self._cameras.values():
+                if stored.is_of(camera.device.identity, camera.device.model):
+                    camera.want(stored)
+        self._update()
+
+    def set(self, camera: Camera, values: Mapping[str, float]) -> None:
+        """Change some settings of a camera, now and whenever it is opened."""
+        now = camera.wanted or camera.settings_now()
+        self._want(camera, replace(now, controls={**now.controls, **values}))
+
+    def choose_format(self, camera: Camera, chosen: Format) -> None:
+        """Use another image format, now and whenever the camera is opened."""
+        now = camera.wanted or camera.settings_now()
+        size = chosen.width, chosen.height
+        self._want(
+            camera, replace(now, pixel_format=chosen.code, size=size, rate_hz=chosen.rate_hz)
+        )
+
+    def lock(self, camera: Camera) -> None:
+        """Fix everything that a camera sets automatically, at its present value."""
+        camera.lock()
+
+    def restore(self, camera: Camera) -> None:
+        """Set a camera as it was for the calibration or session."""
+        if self._reference is not None and self.can_restore(camera):
+            self._want(camera, self._reference[1])
+            camera.change(self._reference[1].controls)
+
+    def _want(self, camera: Camera, settings: CameraSettings) -> None:
+        own = replace(
+            settings,
+            name=camera.device.name,
+            identity=camera.device.identity,
+            model=camera.device.model,
+        )
+        camera.want(own)
+        self._keep(camera)
+
+    def _keep(self, camera: Camera) -> None:
+        """Store how a camera is set, if this is new."""
+        wanted, identity = camera.wanted, camera.device.identity
+        if wanted is not None and wanted != self._kept.get(identity):
+            self._kept[identity] = wanted
+            self._settings.keep_camera(identity, wanted.as_texts())
+
+    def differs(self, camera: Camera) -> tuple[str, tuple[str, ...]]:
+        """Return the reference of a camera, and a clause for every difference from it."""
+        if self._reference is None:
+            return "", ()
+        what, stored = self._reference
+        state = camera.state
+        if state.phase != "live":
+            return what, ()
+        if not self.can_restore(camera):
+            return what, (tr("it is another camera than {name}").format(name=stored.name),)
+        return what, differences(stored, state.format, state.controls)
+
+    def can_restore(self, camera: Camera) -> bool:
+        """Return whether a camera is the one of the calibration or session, or the same model."""
+        if self._reference is None:
+            return False
+        return self._reference[1].is_of(camera.device.identity, camera.device.model)
+
+    # Messages
+
+    def _update(self) -> None:
+        """Show a toast if something has changed."""
+        notes = []
+        for identity, camera in self._cameras.items():
+            before, now = self._known.get(identity), camera.state
+            self._known[identity] = now
+            if now.phase != "live" or camera.settling:
+                continue
+            self._keep(camera)
+            if before is not None and before.phase == "away":
+                self._toasts.show(
+                    tr("{name} is connected again.").format(name=camera.device.name), "pass"
+                )
+            what, clauses = self.differs(camera)
+            self._show_once(identity, self._sentences(camera, what, clauses))
+            if clauses:
+                notes.append(tr("not set as for {what}").format(what=what))
+            elif now.controls and not is_locked(now.controls):
+                notes.append(tr("not locked"))
+        self._status.update(camera_note=", ".join(dict.fromkeys(notes)))
+        self.changed.emit()
+
+    def _sentences(self, camera: Camera, what: str, clauses: tuple[str, ...]) -> tuple[str, ...]:
+        state, sentences = camera.state, []
+        if clauses:
+            text = tr(
+                "The settings of {name} differ from those for {what}: {how}. Open the camera "
+                "settings."
+            )
+            sentences.append(
+                text.format(name=camera.device.name, what=what, how="; ".join(clauses))
+            )
+        if state.format is not None and state.format.compressed:
+            sentences.append(compression_warning(state.format, state.offered))
+        return tuple(sentences)
+
+    def _show_once(self, identity: str, sentences: tuple[str, ...]) -> None:
+        for sentence in sentences:
+            if sentence not in self._shown.get(identity, ()):
+                self._toasts.show(sentence, "warn")
+        self._shown[identity] = sentences

@@ -1,0 +1,81 @@
+"""Parts that the reconstructing commands share: arguments, the reconstructor, its trace."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.trace import EFFORTS, Trace
+from gelpolight_core.sensor_calibration import MODELS
+from gelpolight_core.session.images import read_picture, require_colour
+from gelpolight_core.translation import tr
+
+
+def add_model(parser: argparse.ArgumentParser, *, default: str | None = None) -> None:
+    """Add ``--model``. By default a calibration's own model is used."""
+    parser.add_argument(
+        "--model",
+        choices=(*MODELS, IN_PLACE),
+        default=default,
+        help=tr(
+            "paper: lights fixed at the flat membrane, direct integration; full: near "
+            "light, gloss, interreflection, shadows, along the rays; in-place: a closed sensor, "
+            "from background and balls alone (default: the calibration's model)"
+        ),
+    )
+
+
+def add_despite_faults(parser: argparse.ArgumentParser) -> None:
+    """Add ``--despite-faults``."""
+    parser.add_argument(
+        "--despite-faults",
+        action="store_true",
+        help=tr(
+            "also use images whose depth is meaningless, such as one of another sensor or with an "
+            "LED off; by default they are refused"
+        ),
+    )
+
+
+def add_effort(parser: argparse.ArgumentParser) -> None:
+    """Add ``--effort``."""
+    parser.add_argument(
+        "--effort",
+        choices=EFFORTS,
+        default=EFFORTS[-1],
+        help=tr(
+            "effort of the full model: best solves the whole field at full scale "
+            "(default); balanced does what the image needs, at half scale; fast at "
+            "quarter scale"
+        ),
+    )
+
+
+def load_reconstructor(
+    path: Path, *, model: str | None = None, effort: str = EFFORTS[-1]
+) -> Reconstructor:
+    """Read a calibration and prepare its reconstructor, for its own model or another one."""
+    return Reconstructor(read_calibration(path), model=model, effort=effort)
+
+
+def read_frame(path: Path, reconstructor: Reconstructor) -> NDArray[np.float32]:
+    """Read a colour image as linear light, for a reconstructor's camera."""
+    picture = read_picture(path, response=reconstructor.calibration.response)
+    require_colour(picture, where=str(path))
+    return picture.rgb
+
+
+def trace_lines(trace: Trace) -> list[str]:
+    """Return the trace of a frame as lines of text."""
+    lines = []
+    for step in trace.steps:
+        took = "" if step.milliseconds is None else f"{step.milliseconds:8.1f} ms"
+        mark = tr("done") if step.done else tr("left out")
+        lines.append(f"  {mark:<10}{step.name:<28}{took:<12} {step.reason}".rstrip())
+    return lines

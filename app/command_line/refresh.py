@@ -1,0 +1,80 @@
+"""``gelpolight refresh``: a closed sensor's calibration after its gel was changed."""
+
+from __future__ import annotations
+
+import argparse
+from datetime import UTC, datetime
+from pathlib import Path
+
+from app.command_line.common import quality_lines, refuse_overwriting
+from app.command_line.terminal import say
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.in_place_refresh import repaired, with_background
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import refuse_unwritable
+from gelpolight_core.io.user import user_name
+from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
+from gelpolight_core.session.closed import ClosedSession, read_any_session
+from gelpolight_core.session.images import average, read_picture, require_colour
+from gelpolight_core.translation import tr
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command, and what runs it."""
+    parser.add_argument("calibration", type=Path, metavar="CALIBRATION")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="CALIBRATION")
+    given = parser.add_mutually_exclusive_group(required=True)
+    given.add_argument(
+        "--background",
+        type=Path,
+        nargs="+",
+        metavar="IMAGE",
+        help=tr("images of the new gel, untouched; slopes stay as calibrated"),
+    )
+    given.add_argument(
+        "--session",
+        type=Path,
+        metavar="SESSION",
+        help=tr("background and three or more ball presses of the new gel, which correct them"),
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the refreshed calibration and print its quality."""
+    refuse_overwriting([options.output], [options.calibration, *(options.background or [])])
+    refuse_unwritable(options.output)
+    calibration = read_calibration(options.calibration)
+    if not isinstance(calibration, InPlaceCalibration):
+        raise InputError(
+            tr("the calibration is of an open sensor"),
+            where=str(options.calibration),
+            advice=tr("Use gelpolight drift --zero, or calibrate again"),
+        )
+    new = _refreshed(calibration, options)
+    write_calibration(new, options.output)
+    say("\n".join(quality_lines(new.quality)))
+    say(
+        tr("Calibration {id} written to {path}: {verdict}").format(
+            id=new.identity, path=options.output, verdict=new.verdict.value
+        )
+    )
+    return 0
+
+
+def _refreshed(calibration: InPlaceCalibration, options: argparse.Namespace) -> InPlaceCalibration:
+    if options.session is not None:
+        session = read_any_session(options.session)
+        if not isinstance(session, ClosedSession):
+            raise InputError(
+                tr("the session is of an open sensor"),
+                where=str(options.session),
+                advice=tr("Name a session whose session.toml has a table [in_place]"),
+            )
+        return repaired(calibration, session).calibration
+    images = [read_picture(path, response=calibration.response) for path in options.background]
+    for path, image in zip(options.background, images, strict=True):
+        require_colour(image, where=str(path))
+    made = datetime.now(UTC).isoformat(timespec="seconds")
+    background = average(images, name=str(options.background[0]))
+    return with_background(calibration, background, operator=user_name(), made=made)

@@ -1,0 +1,1 @@
+"""What a page is given: settings, source, calibration library and messages."""

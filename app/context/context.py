@@ -1,0 +1,122 @@
+"""What every page gets: settings, workspace, status, messages and the image source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, Signal
+
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from app.cameras.manager import CameraManager
+    from app.services.log import Log
+    from app.services.settings import Settings
+    from app.services.status import StatusModel
+    from app.services.toasts import Toasts
+    from app.sources.bench import Bench
+    from app.sources.source import SourceInfo
+    from app.workspace.workspace import Workspace
+
+
+class SourceChoice(QObject):
+    """The selected source. The live pages open and close it.
+
+    Attributes
+    ----------
+    info : SourceInfo or None
+        The source.
+    bench : Bench or None
+        The objects on the virtual sensor. None until the virtual sensor is first selected.
+    """
+
+    changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.info: SourceInfo | None = None
+        self.bench: Bench | None = None
+
+    def choose(self, info: SourceInfo | None) -> None:
+        """Select a source, or none."""
+        if info is not self.info:
+            self.info = info
+            self.changed.emit()
+
+    def choose_virtual_sensor(self) -> None:
+        """Select the virtual sensor. The objects on its bench are kept."""
+        from app.sources.bench import Bench  # slow import: loads the sensor's optics
+        from app.sources.listing import virtual_sensor
+        from gelpolight_core.design.sensor_design import SensorDesign
+
+        if self.bench is None:
+            self.bench = Bench(SensorDesign())
+        if self.info is None or self.info.kind != "virtual":
+            self.choose(*virtual_sensor(self.bench)())
+
+    def choose_recording(self, file: Path) -> None:
+        """Select a recording and play it from the start."""
+        from app.sources.listing import recordings  # slow import, as above
+
+        for info in recordings([file])():
+            self.choose(info)
+
+    def choose_folder(self, folder: Path) -> None:
+        """Select a folder of images and show them one after the other."""
+        from app.sources.listing import image_folders  # slow import, as above
+
+        for info in image_folders([folder])():
+            self.choose(info)
+
+    @property
+    def idle_name(self) -> str | None:
+        """Name of the source while no page uses it. None if there is none."""
+        return None if self.info is None else tr("{name}, idle").format(name=self.info.name)
+
+    @property
+    def remembered(self) -> tuple[str, Path | None]:
+        """Kind and file of the source, enough to select it again. An empty kind means none."""
+        return ("", None) if self.info is None else (self.info.kind, self.info.file)
+
+    def choose_again(self, kind: str, file: Path | None) -> None:
+        """Select the remembered source if it still exists and none is selected."""
+        if self.info is not None:
+            return
+        if kind == "virtual":
+            self.choose_virtual_sensor()
+        elif kind == "folder" and file is not None:
+            self.choose_folder(file)
+        elif kind == "recording" and file is not None:
+            self.choose_recording(file)
+
+
+class Requests(QObject):
+    """Requests from a page to the main window."""
+
+    page = Signal(str)  # name: show that page
+    path = Signal(str, str)  # name, path: show that page and open a folder or file in it
+    session = Signal(str)  # folder: calibrate from it and remember it
+    choose_session = Signal()  # the same, but let the user choose the folder first
+    guide = Signal(str, str)  # page, heading: show what the guide says about it
+    open_files = Signal()  # let the user choose files, and open them
+    new_sensor = Signal()  # start another calibration; an open session is closed
+    demo = Signal()  # select the virtual sensor as the source
+    begin_demo = Signal()  # the same, and start calibrating it
+    rest = Signal(bool)  # pause the processing of live images while times are measured, or continue
+    calibrations_changed = Signal()  # calibrations added, removed, validated or put into use
+
+
+@dataclass(frozen=True, slots=True)
+class AppContext:
+    """Passed to every page as the keyword ``context``."""
+
+    settings: Settings
+    workspace: Workspace
+    status: StatusModel
+    toasts: Toasts
+    source: SourceChoice
+    requests: Requests
+    log: Log
+    cameras: CameraManager

@@ -1,0 +1,94 @@
+"""The table of pages in the navigation. Each page is loaded when it is first opened."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QWidget
+
+    from app.context.context import AppContext
+
+
+@dataclass(frozen=True, slots=True)
+class PageEntry:
+    """One page of the main window.
+
+    A page is a QWidget whose class takes the keyword ``context`` (an AppContext). Optional methods:
+    ``enter()`` and ``leave()`` (the page becomes visible or hidden), ``may_close() -> bool`` (asked
+    before the window closes), ``open_path(path)`` (a folder or file was dropped or chosen),
+    ``begin()`` (start with a new sensor) and ``begin_demo()`` (start with the virtual sensor).
+
+    Attributes
+    ----------
+    name : str
+        Short name for settings and scripts.
+    title : str
+        Text in the navigation.
+    icon : str
+        A name of :mod:`app.theme.icons`.
+    factory : str
+        ``module:class``. The module is imported when the page is first opened.
+    also : tuple of str, optional
+        Further modules that the page imports only when it needs them.
+    """
+
+    name: str
+    title: str
+    icon: str
+    factory: str
+    also: tuple[str, ...] = ()
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Names of all modules that are loaded before the page is created."""
+        return self.module, *self.also
+
+    @property
+    def module(self) -> str:
+        """Name of the page's module."""
+        return self.factory.partition(":")[0]
+
+    @property
+    def exists(self) -> bool:
+        """Whether the module exists."""
+        parent = self.module.rpartition(".")[0]
+        return (
+            importlib.util.find_spec(parent) is not None
+            and importlib.util.find_spec(self.module) is not None
+        )
+
+    def make(self, context: AppContext) -> QWidget:
+        """Load and create the page."""
+        name = self.factory.partition(":")[2]
+        page: QWidget = getattr(importlib.import_module(self.module), name)(context=context)
+        return page
+
+
+def all_pages() -> tuple[PageEntry, ...]:
+    """Return the pages of this program in the order of the workflow."""
+    table = (
+        PageEntry("start", tr("Start"), "home", "app.start.page:StartPage"),
+        PageEntry("sensors", tr("Sensors"), "sensors", "app.sensors.page:SensorsPage"),
+        PageEntry(
+            "calibrate",
+            tr("Calibrate"),
+            "calibrate",
+            "app.calibrate.page:CalibratePage",
+            also=(
+                "app.sources.virtual",
+                "app.sources.listing",
+                "app.bench.virtual_session",
+                "app.bench.bench_panel",
+                "app.calibrate.reflectance.curves",
+            ),
+        ),
+        PageEntry("inspect", tr("Inspect"), "inspect", "app.inspect.page:InspectPage"),
+        PageEntry("measure", tr("Measure"), "measure", "app.measure.page:MeasurePage"),
+    )
+    return tuple(entry for entry in table if entry.exists)

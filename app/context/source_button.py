@@ -1,0 +1,141 @@
+"""The button that shows the image source and lets the user select another one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QFileDialog, QMenu, QToolButton, QWidget
+
+from app.context.context import AppContext
+from app.context.recordings_dialog import RecordingsDialog
+from app.sources.source import SourceInfo
+from app.widgets.label import plain_tip
+from app.widgets.naming import named
+from gelpolight_core.recording.recording import ENDING
+from gelpolight_core.translation import tr
+
+
+class SourceButton(QToolButton):
+    """Shows the source in use. Its menu offers the others.
+
+    Parameters
+    ----------
+    context : AppContext
+        Holds the source that all pages share.
+    page : str
+        First part of the object name.
+    none : str
+        Text of the choice without a camera.
+    """
+
+    def __init__(
+        self, *, context: AppContext, page: str, none: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._context = context
+        named(self, f"{page}.source", tr("Camera"), tr("Source of the live image"))
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self)
+        menu.setObjectName(f"{page}.source.menu")
+        self._page, self._found = page, list[QAction]()
+        self._cameras_end = menu.addSeparator()
+        for name, text, choose in (
+            ("virtual", tr("Virtual sensor"), context.source.choose_virtual_sensor),
+            ("folder", tr("Folder of images…"), self.choose_folder),
+            ("recording", tr("Recording…"), self.show_recordings),
+            ("none", none, lambda: context.source.choose(None)),
+        ):
+            action = menu.addAction(text, choose)
+            action.setObjectName(f"{page}.source.{name}")
+        menu.addSeparator()
+        self._settings = menu.addAction(tr("Camera settings…"), self.show_settings)
+        self._settings.setObjectName(f"{page}.source.settings")
+        menu.aboutToShow.connect(self.list_cameras)
+        self.setMenu(menu)
+        context.source.changed.connect(self._show)
+        self._show()
+
+    def list_cameras(self) -> None:
+        """Offer the cameras that are connected now."""
+        menu = self.menu()
+        for action in self._found:
+            menu.removeAction(action)
+            action.deleteLater()
+        infos = self._context.cameras.infos()
+        self._found = [QAction(info.name, menu) for info in infos] or [
+            QAction(tr("No camera connected"), menu)
+        ]
+        for number, action in enumerate(self._found):
+            action.setObjectName(f"{self._page}.source.camera.{number}")
+            action.setEnabled(bool(infos))
+            if infos:
+                info = infos[number]
+                action.setToolTip(plain_tip(info.detail))
+                action.triggered.connect(lambda _=False, info=info: self.use_camera(info))
+        menu.insertActions(self._cameras_end, self._found)
+
+    def use_camera(self, info: SourceInfo) -> None:
+        """Use the images of a camera. Selecting the same camera again changes nothing."""
+        now = self._context.source.info
+        if now is None or (now.kind, now.detail) != (info.kind, info.detail):
+            self._context.source.choose(info)
+
+    def show_settings(self) -> None:
+        """Show the camera settings and let the user change them."""
+        show_settings_of_source(self._context, self)
+
+    def choose_folder(self) -> None:
+        """Let the user choose a folder whose images replace the camera."""
+        chosen = QFileDialog.getExistingDirectory(
+            self, tr("Folder of images"), str(self._context.settings.folder("images"))
+        )
+        if chosen:
+            self.use_folder(Path(chosen))
+
+    def use_folder(self, folder: Path) -> None:
+        """Use the images of a folder instead of a camera."""
+        self._context.settings.keep_folder("images", folder)
+        self._context.source.choose_folder(folder)
+
+    def show_recordings(self) -> RecordingsDialog:
+        """Show the recordings of the workspace, to play one instead of the camera."""
+        recordings = self._context.workspace.recordings()
+        dialog = RecordingsDialog(recordings, self)
+        dialog.chosen.connect(lambda path: self.use_recording(Path(path)))
+        dialog.other_wanted.connect(lambda: self.choose_recording())
+        dialog.open()
+        return dialog
+
+    def choose_recording(self) -> None:
+        """Let the user choose the file of a recording that replaces the camera."""
+        chosen, _ = QFileDialog.getOpenFileName(
+            self,
+            tr("Recording"),
+            str(self._context.settings.folder("recording")),
+            tr("Recordings (*{ending})").format(ending=ENDING),
+        )
+        if chosen:
+            self.use_recording(Path(chosen))
+
+    def use_recording(self, file: Path) -> None:
+        """Use the frames of a recording instead of a camera."""
+        self._context.settings.keep_folder("recording", file.parent)
+        self._context.source.choose_recording(file)
+
+    def _show(self) -> None:
+        info = self._context.source.info
+        name = tr("none") if info is None else info.name
+        self.setText(tr("Camera: {name}").format(name=name))
+        self._settings.setEnabled(info is not None and info.kind == "camera")
+
+
+def show_settings_of_source(context: AppContext, parent: QWidget) -> None:
+    """Show the settings of the camera in use. Nothing happens if the source is not a camera."""
+    camera = context.cameras.of(context.source.info)
+    if camera is not None:
+        from app.cameras.dialog import show_camera_dialog  # created at first use
+
+        show_camera_dialog(context.cameras, camera, parent)

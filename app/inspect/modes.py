@@ -1,0 +1,188 @@
+"""The choice between accuracy and speed: model and effort."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from statistics import median
+
+from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QComboBox, QWidget
+
+from app.context.context import AppContext
+from app.live.frame_results import Shown
+from app.services.jobs import Job, Jobs
+from app.widgets.inputs import ComboBox
+from app.widgets.label import plain_tip
+from app.widgets.naming import named
+from gelpolight_core.reconstruction.efforts import (
+    CLOSED_WAYS,
+    FOUND,
+    FULL,
+    IN_PLACE,
+    PAPER,
+    WAYS,
+    Way,
+)
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.translation import tr
+
+WIDTH_CHARACTERS = 32
+TIMED = 15
+"""Number of frames for the median time."""
+
+
+class ModeBox(ComboBox):
+    """The modes of reconstruction, each with its error and its time."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(
+            self,
+            "inspect.mode",
+            tr("Accuracy and speed"),
+            tr(
+                "Choose accuracy or speed. Each name is followed by the errors of height "
+                "and size,\nmeasured on a simulated sensor, and by the time of a frame on "
+                "this machine once it\nhas been used. A frozen image always has the full "
+                "accuracy of its model."
+            ),
+        )
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(WIDTH_CHARACTERS)
+        self.setEnabled(False)
+
+    def show_modes(self, modes: tuple[Way, ...], chosen: Way | None) -> None:
+        """Offer these modes. None: there is no calibration."""
+        with QSignalBlocker(self):
+            self.clear()
+            for mode in modes:
+                self.addItem("", mode)
+            self.setCurrentIndex(modes.index(chosen) if chosen in modes else -1)
+        self.setEnabled(len(modes) > 1)
+        self.show_times({})
+
+    def show_times(self, times_ms: Mapping[Way, float]) -> None:
+        """Write the measured times next to the modes."""
+        for index in range(self.count()):
+            text = mode_text(self.itemData(index), times_ms.get(self.itemData(index)))
+            if text != self.itemText(index):
+                self.setItemText(index, text)
+                self.setItemData(index, plain_tip(text), Qt.ItemDataRole.ToolTipRole)
+        widest = max((self.view().sizeHintForColumn(0), self.width()))
+        self.view().setMinimumWidth(widest)
+
+
+class ModeChoice(QObject):
+    """Makes the reconstructors of the mode that the user selected.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        Runs slow preparation.
+    parent : QObject
+        Owner.
+    context : AppContext
+        Holds the settings, which store the mode.
+
+    Signals
+    -------
+    chosen(object, object)
+        Reconstructors for live and for frozen images, or None.
+    """
+
+    chosen = Signal(object, object)
+
+    def __init__(self, jobs: Jobs, parent: QObject, *, context: AppContext) -> None:
+        super().__init__(parent)
+        self._jobs, self._context = jobs, context
+        self.box = ModeBox()
+        self.box.activated.connect(self._on_chosen)
+        self._live: Reconstructor | None = None
+        self._best: Reconstructor | None = None
+        self._paper: Reconstructor | None = None
+        self._times: dict[Way, deque[float]] = {}
+        self._last: Shown | None = None
+
+    @property
+    def mode(self) -> Way:
+        """The mode in the settings, or the default if that one is not available."""
+        kept = Way(*self._context.settings.reconstruction)
+        return kept if kept in WAYS else Way()
+
+    def offer(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Offer the modes of a calibration, and continue with the mode selected before."""
+        self._live, self._best = live, best
+        self._paper = live if live is not None and live.model == PAPER else None
+        self._times.clear()
+        modes = () if live is None else WAYS
+        if self._paper is not None:
+            modes = tuple(mode for mode in WAYS if mode.model == PAPER)
+        if live is not None and live.model == IN_PLACE:
+            modes = CLOSED_WAYS
+        self.box.show_modes(modes, self.mode if self.mode in modes else next(reversed(modes), None))
+        self._choose()
+
+    def follow(self, shown: Shown | None) -> None:
+        """Note the processing time of a frame, once per frame."""
+        heightmap = None if shown is None else shown.heightmap
+        if shown is None or shown is self._last or heightmap is None or heightmap.trace is None:
+            return
+        self._last = shown
+        if heightmap.depth_sd_mm is None:  # a frame with other, longer work
+            mode = Way(
+                heightmap.model, heightmap.trace.effort if heightmap.model == FULL else "best"
+            )
+            self._times.setdefault(mode, deque(maxlen=TIMED)).append(shown.depth_ms)
+            if not self.box.view().isVisible():
+                self.box.show_times({mode: median(ms) for mode, ms in self._times.items()})
+
+    def close(self) -> None:
+        """Release the reconstructors."""
+        self._live = self._best = self._paper = None
+
+    def _on_chosen(self, index: int) -> None:
+        mode = self.box.itemData(index)
+        self._context.settings.reconstruction = (mode.model, mode.effort)
+        self._choose()
+
+    def _choose(self) -> None:
+        mode, live, best = self.box.currentData(), self._live, self._best
+        if live is None or mode is None:
+            self.chosen.emit(None, None)
+        elif mode.model == IN_PLACE:
+            self.chosen.emit(live, best)
+        elif mode.model == FULL:
+            self.chosen.emit(best if mode.effort == "best" else live.at_effort(mode.effort), best)
+        elif self._paper is not None:
+            self.chosen.emit(self._paper, self._paper)
+        else:
+            self.chosen.emit(live, best)  # until the other one is ready
+            self._make_paper(live)
+
+    def _make_paper(self, live: Reconstructor) -> None:
+        def work(tell: Callable[[float], None]) -> Reconstructor:
+            tell(0.1)
+            made = Reconstructor(live.calibration, model=PAPER)
+            made.warm_up()
+            return made
+
+        def done(made: Reconstructor) -> None:
+            if self._live is live:
+                self._paper = made
+                self._choose()
+
+        self._jobs.submit(Job(tr("Preparing the paper's model"), work, done))
+
+
+def mode_text(mode: Way, milliseconds: float | None) -> str:
+    """Return the label of a mode with its errors, and its time if that is known."""
+    found = FOUND.get(mode)
+    if found is None:  # the calibration's quality table states them
+        return mode.label if milliseconds is None else f"{mode.label}   {milliseconds:.0f} ms"
+    height, size = found.height_percent, found.size_percent
+    decimals = 2 if max(height, size) < 1.0 else 1
+    parts = [mode.label, f"{height:.{decimals}f} / {size:.{decimals}f} %"]
+    if milliseconds is not None:
+        parts.append(tr("{ms:.0f} ms").format(ms=milliseconds))
+    return "   ".join(parts)

@@ -1,0 +1,90 @@
+"""The line above the views: what to do next, or the progress of work."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QSizePolicy, QWidget
+
+from app.live.advice import Advice
+from app.services.jobs import Jobs
+from app.widgets.label import PlainLabel, plain_tip
+from app.widgets.meaning import show_meaning
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+# Short work needs no progress bar.
+SHOWN_FROM = 0.005
+
+
+class Banner(QWidget):
+    """Shows what to do next. Its space is reserved, so that nothing moves when it is empty.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        Their progress is shown, and they can be stopped.
+    idle : str
+        Shown in muted colour if there is no advice.
+
+    Signals
+    -------
+    act_wanted(str)
+        The button next to the advice was clicked. Its name.
+    """
+
+    act_wanted = Signal(str)
+
+    def __init__(self, jobs: Jobs, *, idle: str) -> None:
+        super().__init__()
+        named(self, "inspect.banner", tr("What to do next"))
+        self._advice, self._idle = Advice(), idle
+        self._text = named(PlainLabel(), "inspect.advice", tr("Advice"))
+        self._text.setWordWrap(True)
+        self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._button = named(QPushButton(), "inspect.advised", tr("Do this"))
+        self._button.clicked.connect(lambda: self.act_wanted.emit(self._advice.act))
+        self._bar = named(QProgressBar(), "inspect.progress", tr("Progress"))
+        self._bar.setFixedWidth(220)
+        self._stop = named(QPushButton(tr("Stop")), "inspect.stop", tr("Stop the work"))
+        self._stop.clicked.connect(jobs.cancel)
+        jobs.progressed.connect(self.show_work)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 4, 10, 4)
+        for widget in (self._text, self._button, self._bar, self._stop):
+            row.addWidget(widget)
+        lines = 2 * self._text.fontMetrics().lineSpacing()
+        self.setFixedHeight(max(lines, self._button.sizeHint().height()) + 8)
+        self._working = False
+        self._show()
+
+    def advise(self, advice: Advice) -> None:
+        """Show an advice, with a button for its action."""
+        self._advice = advice
+        self._button.setText(advice.button)
+        self._show()
+
+    def show_work(self, title: str, share: float) -> None:
+        """Show the progress of work. An empty title: no work is running."""
+        self._working = bool(title) and share >= SHOWN_FROM
+        self._bar.setValue(round(100.0 * share))
+        if self._working:
+            self._text.setText(tr("{title}…").format(title=title))
+        self._show()
+
+    def _show(self) -> None:
+        advice, role = self._advice, ""
+        if not self._working:
+            self._text.setText(advice.text or self._idle)
+            role = advice.role if advice.text else "muted"
+        # A text that is longer than the banner starts in it, and the tooltip shows all of it.
+        room = self._text.rect().adjusted(0, 0, 0, 10 * self.height())
+        wrap = Qt.TextFlag.TextWordWrap
+        shown = self._text.fontMetrics().boundingRect(room, wrap, self._text.text())
+        fits = shown.height() <= self._text.height()
+        vertical = Qt.AlignmentFlag.AlignVCenter if fits else Qt.AlignmentFlag.AlignTop
+        self._text.setAlignment(Qt.AlignmentFlag.AlignLeft | vertical)
+        self._text.setToolTip(plain_tip(self._text.text()))
+        show_meaning(self._text, role)
+        self._button.setVisible(bool(advice.act) and not self._working)
+        self._bar.setVisible(self._working)
+        self._stop.setVisible(self._working)

@@ -1,0 +1,169 @@
+"""The calibration of the page: the one in use, or one that fits the source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QComboBox, QWidget
+
+from app.context.calibration_status import show_in_use
+from app.context.context import AppContext
+from app.live.advice import Known
+from app.services.jobs import Job, Jobs
+from app.widgets.inputs import ComboBox
+from app.widgets.label import plain_tip
+from app.widgets.naming import named
+from app.workspace.entries import Entry
+from gelpolight_core.errors import InputError
+from gelpolight_core.session.camera_settings import settings_of_texts
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+WIDTH_CHARACTERS = 22
+# From this size on kernels may be compiled, which takes a minute the first time.
+WARM_FROM = 0.2
+
+
+class CalibrationBox(ComboBox):
+    """The calibrations of the library. Selecting one puts it into use."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "inspect.calibration", tr("Calibration in use"))
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(WIDTH_CHARACTERS)
+
+    def show_entries(self, entries: tuple[Entry, ...]) -> None:
+        """Show the calibrations that can be read."""
+        with QSignalBlocker(self):
+            self.clear()
+            self.addItem(tr("No calibration"), None)
+            for entry in entries:
+                if entry.summary is not None:
+                    size = "x".join(map(str, entry.summary.picture_size))
+                    self.addItem(entry.name, str(entry.path))
+                    tip = plain_tip(f"{entry.serial}, {entry.summary.identity}, {size}")
+                    self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
+                    if entry.in_use:
+                        self.setCurrentIndex(self.count() - 1)
+        self.view().setMinimumWidth(max(self.view().sizeHintForColumn(0), self.width()))
+
+
+class CalibrationChoice(QObject):
+    """Reads the calibration in use in the background.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        Runs the reading.
+    box : CalibrationBox
+        Shows the library.
+    context : AppContext
+        Holds the workspace.
+
+    Signals
+    -------
+    loaded(object, object)
+        Reconstructors of the calibration in use, for live and for frozen images. None if there is
+        none, or until it is read.
+    """
+
+    loaded = Signal(object, object)
+
+    def __init__(self, jobs: Jobs, box: CalibrationBox, *, context: AppContext) -> None:
+        super().__init__(box)
+        self._jobs, self._box, self._context = jobs, box, context
+        self._state: tuple[object, ...] = ()
+        self._reading: Job | None = None
+        self.entries: tuple[Entry, ...] = ()
+        box.activated.connect(self._on_chosen)
+        context.requests.calibrations_changed.connect(self.refresh)
+
+    def refresh(self) -> None:
+        """Update from the library, and read the calibration in use if it changed."""
+        try:
+            self.entries = self._context.workspace.entries()
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+            self.entries = ()
+        self._box.show_entries(self.entries)
+        show_in_use(self._context, self.entries)
+        used = next((e for e in self.entries if e.in_use and e.summary is not None), None)
+        state = () if used is None or used.summary is None else (used.path, used.summary.identity)
+        if state == self._state:
+            return
+        self._state = state
+        if used is not None:
+            self._read(used.path)
+        # The previous calibration must not be used under the new name, even if reading fails.
+        self.loaded.emit(None, None)
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether the calibration in use is being read. False after an error."""
+        return self._reading is not None and not self._reading.over
+
+    @property
+    def _reading_failed(self) -> bool:
+        """Whether the last reading was stopped or failed. A successful one is released."""
+        return self._reading is not None and self._reading.over
+
+    def refer_cameras(self, live: Reconstructor | None) -> None:
+        """Require the camera settings that a calibration was made with."""
+        texts = {} if live is None else live.calibration.provenance.camera_settings
+        self._context.cameras.refer(tr("the calibration"), settings_of_texts(texts))
+
+    def use_what_fits(self, serial: str, size: tuple[int, int] | None) -> None:
+        """Put the newest calibration that fits such images into use. Empty and None fit all."""
+        for entry in self.entries:
+            summary = entry.summary
+            if summary is not None and Known(summary.serial, summary.picture_size).fits(
+                serial, size
+            ):
+                self._use(entry.path)
+                return
+
+    def _on_chosen(self, index: int) -> None:
+        path = self._box.itemData(index)
+        self._use(None if path is None else Path(path))
+
+    def _use(self, path: Path | None) -> None:
+        try:
+            self._context.workspace.use(path)
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+        if self._reading_failed:
+            self._state = ()  # a repeated request reads it again
+        self._context.requests.calibrations_changed.emit()
+
+    def _read(self, path: Path) -> None:
+        def work(tell: Callable[[float], None]) -> object:
+            from app.live.frame_results import warm_up
+            from gelpolight_core.calibration.file import read_calibration
+            from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+            calibration = read_calibration(path)
+            live = Reconstructor(calibration, effort="fast")
+            tell(WARM_FROM)
+            live.warm_up()
+            warm_up()
+            return path, live, Reconstructor(calibration)
+
+        def done(found: tuple[Path, object, object]) -> None:
+            if self._reading is not reading:
+                return  # requested again: the file may have changed
+            self._reading = None
+            if self._state[:1] == found[:1]:
+                self.loaded.emit(*found[1:])
+
+        title = tr("Preparing the calibration")
+        failed = partial(self._context.toasts.show, kind="fail")
+        reading = Job(title, work, done, failed)
+        self._reading = reading
+        self._jobs.submit(reading)

@@ -1,0 +1,295 @@
+"""The depth of the live images: calibration, reconstructors, health, and the state for advice."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+
+from PySide6.QtCore import QObject, Signal
+
+from app.context.context import AppContext
+from app.live.advice import Known, LiveState, Size, advise
+from app.live.calibration_choice import CalibrationBox, CalibrationChoice
+from app.live.first_calibration import begin_first_calibration
+from app.live.frame_results import Maker, Shown, Wanted, camera_image
+from app.live.session import LiveSession
+from app.services.jobs import Jobs
+from app.sources.processor import Failure, Outcome
+from app.sources.source import SourceInfo
+from gelpolight_core.health.finding import Finding
+from gelpolight_core.health.watch import HealthWatch
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.trace_tally import TraceTally
+from gelpolight_core.translation import tr
+
+RATE_WINDOW_S = 2.0
+
+
+class LiveDepth(QObject):
+    """Turns the images of a session into depth, as long as the calibration in use fits them.
+
+    Parameters
+    ----------
+    live : LiveSession
+        The images, and the owner of this object.
+    jobs : Jobs
+        Runs slow work.
+    box : CalibrationBox
+        Shows the calibrations.
+    context : AppContext
+        Shared by all pages.
+
+    Attributes
+    ----------
+    live : LiveSession
+        The images.
+    calibrations : CalibrationChoice
+        The library, and the calibration in use.
+    last : Shown or None
+        The newest result.
+
+    Signals
+    -------
+    shown(object)
+        Shown: the result of the newest frame. Without depth if it cannot be reconstructed.
+    calibration_loaded(object, object)
+        The calibration in use is another, or is read: its reconstructors for live and for frozen
+        images, or None. Depth is computed once :meth:`choose` is called.
+    calibration_switched()
+        Live depth comes from another calibration from now on, or from none.
+    changed()
+        The state, on which the advice is based, may have changed.
+    """
+
+    shown = Signal(object)
+    calibration_loaded = Signal(object, object)
+    calibration_switched = Signal()
+    changed = Signal()
+
+    def __init__(
+        self, live: LiveSession, jobs: Jobs, box: CalibrationBox, *, context: AppContext
+    ) -> None:
+        super().__init__(live)
+        self.live, self._jobs, self._context = live, jobs, context
+        self.calibrations = CalibrationChoice(jobs, box, context=context)
+        self.last: Shown | None = None
+        self._maker = Maker(None)
+        self._chosen: tuple[Reconstructor | None, Reconstructor | None] = None, None
+        self._size: Size | None = None
+        self._info: SourceInfo | None = None
+        self._lost = self._failure = ""
+        self._watch = HealthWatch()
+        self._fault: Finding | None = None
+        self._shown_s: deque[float] = deque()
+        self._tally = TraceTally()
+        live.process(self._maker)
+        live.processed.connect(self._on_processed)
+        live.source_changed.connect(self._on_source)
+        live.switched.connect(self._on_switched)
+        live.lost.connect(self._on_lost)
+        self.calibrations.loaded.connect(self._on_loaded)
+        jobs.progressed.connect(self._on_progress)
+
+    # Called by the page
+
+    def enter(self) -> None:
+        """Show the source through the calibration in use."""
+        self.calibrations.refresh()
+        self.calibrations.refer_cameras(self._chosen[0])
+        self.live.enter(True)
+
+    def finish(self) -> None:
+        """Release the source and the reconstructors, whose threads end with them."""
+        self.live.finish()
+        self._chosen = None, None
+        self._use(None, None)
+
+    def want(self, wanted: Wanted) -> None:
+        """Change what is computed from the frames. A frozen image is processed again."""
+        if wanted != self._maker.wanted:
+            self._maker.wanted = wanted
+            self._process_again()
+
+    def choose(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Use these reconstructors for live and for frozen images, if they fit the images."""
+        self._chosen = live, best
+        if self.live.page_shown:
+            self.calibrations.refer_cameras(live)
+        self.update()
+
+    def act(self, name: str) -> None:
+        """Do what an advice proposes. Names that only the page knows have no effect."""
+        match name:
+            case "virtual":
+                self._context.source.choose_virtual_sensor()
+            case "calibrate":
+                begin_first_calibration(self._jobs, context=self._context)
+            case "sensors":
+                self._context.requests.page.emit("sensors")
+            case "fitting":
+                self.calibrations.use_what_fits(self.live.serial, self._size)
+            case "reopen":
+                self.live.open()
+
+    # State
+
+    @property
+    def reconstructor(self) -> Reconstructor | None:
+        """The reconstructor in use for frozen images, at full accuracy."""
+        return self._maker.best
+
+    @property
+    def live_reconstructor(self) -> Reconstructor | None:
+        """The reconstructor in use for live images."""
+        return self._maker.live
+
+    @property
+    def state(self) -> LiveState:
+        """What is known about the images and the calibrations."""
+        info, chosen, used = self._context.source.info, self._chosen[0], None
+        if chosen is not None:
+            camera = chosen.calibration.camera
+            used = Known(chosen.calibration.sensor.serial, (camera.width, camera.height))
+        summaries = (entry.summary for entry in self.calibrations.entries)
+        return LiveState(
+            kind="" if info is None else info.kind,
+            serial=self.live.serial,
+            size=self._size,
+            used=used,
+            calibrations=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
+            trouble=self._lost or self._failure,
+            fault=self._fault,
+            reading=self.calibrations.is_reading,
+        )
+
+    def update(self) -> None:
+        """Use the calibration only if it fits the images, and announce the state."""
+        live, best = self._chosen if advise(self.state).usable else (None, None)
+        if live is not self._maker.live:
+            self._use(live, best)
+        self.changed.emit()
+
+    def rate_text(self) -> str:
+        """Return the frame rate and times as text."""
+        if self.last is None or self.last.heightmap is None:
+            return ""
+        times, heightmap = self._shown_s, self.last.heightmap
+        hz = (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
+        texts = [tr("{hz:.0f} shown/s, {ms:.0f} ms").format(hz=hz, ms=self.last.total_ms)]
+        if heightmap.trace is None:
+            texts.append(heightmap.model)
+        else:
+            steps = tr("{effort}, steps: {n}")
+            texts.append(steps.format(effort=heightmap.trace.effort, n=len(heightmap.trace.done)))
+        if heightmap.visible_depth_mm is not None:
+            um = 1e3 * heightmap.visible_depth_mm
+            texts.append(tr("visible from {um:.0f} um").format(um=um))
+        return ", ".join(texts)
+
+    def trace_text(self) -> str:
+        """Return the computed steps of the shown frame, and of the last minute, one per line."""
+        if self.last is None or self.last.heightmap is None or self.last.heightmap.trace is None:
+            return ""
+        steps = [step.sentence for step in self.last.heightmap.trace.steps]
+        minute = self._tally.lines(time.monotonic())
+        return "\n".join([*steps, "", *minute] if minute else steps)
+
+    # The images
+
+    def _on_source(self) -> None:
+        self._size = None
+
+    def _on_switched(self) -> None:
+        self.last, self._failure = None, ""
+        self._shown_s.clear()
+        self._restart_health()
+        info = self._context.source.info
+        if self.live.stream is not None and info != self._info:
+            self._info = info
+            self._maker.colour_range.reset()
+        self.update()
+
+    def _on_lost(self, why: str) -> None:
+        self._set_trouble(why, self._failure)
+
+    def _on_progress(self, title: str, _share: float) -> None:
+        if not title:  # the end of a job may mean that it failed
+            self.update()
+
+    def _on_processed(self, item: Outcome[Shown] | Failure) -> None:
+        frame = item.frame
+        if isinstance(item, Failure):
+            shown = Shown(frame, camera=camera_image(frame, self._maker.wanted))
+            self._set_trouble(self._lost, item.sentence)
+        else:
+            self.last = shown = item.value
+            self._note_time(shown)
+            self._set_trouble(self._lost, "")
+        size = frame.rgb.shape[1], frame.rgb.shape[0]
+        if size != self._size:
+            self._size = size
+            self.update()
+        self._follow_health(shown)
+        self.shown.emit(shown)
+
+    def _note_time(self, shown: Shown) -> None:
+        now = time.monotonic()
+        self._shown_s.append(now)
+        trace = shown.heightmap and shown.heightmap.trace
+        if trace is not None and not self.live.paused:
+            self._tally.add(trace, now)
+        while now - self._shown_s[0] > RATE_WINDOW_S:
+            self._shown_s.popleft()
+
+    def _process_again(self) -> None:
+        if self.last is not None:
+            self.live.process_again(self.last.frame)
+
+    def _set_trouble(self, lost: str, failure: str) -> None:
+        before, now = self._lost or self._failure, lost or failure
+        self._lost, self._failure = lost, failure
+        if before == now:
+            return
+        if not now:
+            self._restart_health()  # a camera that was reconnected may have moved
+        self.update()
+
+    # The health of the sensor
+
+    def _restart_health(self) -> None:
+        """Forget everything: the camera, the calibration or a setting is another."""
+        self._watch = HealthWatch()
+        self._set_fault(None)
+
+    def _follow_health(self, shown: Shown) -> None:
+        heightmap = shown.heightmap
+        if heightmap is None or heightmap.health is None or not shown.frame.settled:
+            return
+        findings = self._watch.update(heightmap.health, shown.frame.time_s).findings
+        self._set_fault(findings[0] if findings else None)
+
+    def _set_fault(self, fault: Finding | None) -> None:
+        before, self._fault = self._fault, fault
+        # The figure of a fault that lasts changes with every frame; the advice need not.
+        if (before and before.key) != (fault and fault.key):
+            self.update()
+
+    # The calibration
+
+    def _on_loaded(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        self._chosen = None, None
+        self._restart_health()
+        self._use(None, None)
+        self.calibration_loaded.emit(live, best)
+
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Use these reconstructors from now on, and drop results in progress."""
+        before, wanted = self._maker.live, self._maker.wanted
+        self._maker = Maker(live, best)
+        self._maker.wanted = wanted
+        self.live.process(self._maker)
+        if self.last is not None:
+            self.last = Shown(self.last.frame)  # its depth comes from the previous calibration
+        self._process_again()
+        if (before and before.calibration) is not (live and live.calibration):
+            self.calibration_switched.emit()

@@ -1,0 +1,385 @@
+"""Computes from a frame only what is shown. Runs in the processing thread."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.live.zebra import eight_bits
+from app.sources.source import Frame
+from app.view2d import shading
+from app.view2d.colour_range import ColourRange, SteadyEnd
+from app.view2d.cuts import Cut, Section, cut
+from app.view2d.display import SURROUND, Display, colour_table
+from app.view2d.quantities import (
+    FLAG_COLOURS,
+    Reference,
+    depth_scale,
+    difference_scale,
+    difference_to,
+    flag_scale,
+    slope_scale,
+    uncertainty_scale,
+)
+from app.view3d.surface import LIVE_NODES, ColourScale, Surface, surface_of
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.misfit import Misfit, solve_misfit
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+LIVE_PX = 560
+CAMERA_PX = 760
+STILL_PX = 2000
+MISFIT_NODES = 128, 400
+"""Longest side of a live and of a frozen image, in pixels."""
+LEAST_MISFIT = 0.02
+WHITE = np.full((256, 3), 255, np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is shown. Nothing else is computed.
+
+    Attributes
+    ----------
+    surface, height, camera : bool
+        The visible views.
+    normals : str
+        Content of the normals view: ``normals``, ``slope``, or empty if it is hidden.
+    quality : str
+        Content of the quality view: ``flags``, ``uncertainty``, ``misfit``, or empty if it is
+        hidden.
+    section : Section or None
+        The line to measure along.
+    region : Rectangle or None
+        The rectangle whose roughness is measured.
+    display : Display
+        The display settings.
+    reference : Reference or None
+        The reference of the difference.
+    still : bool
+        Whether the image is frozen. It is then processed at full detail, with the uncertainty if
+        needed.
+    """
+
+    surface: bool = False
+    height: bool = False
+    normals: str = ""
+    camera: bool = False
+    quality: str = ""
+    section: Section | None = None
+    region: Rectangle | None = None
+    display: Display = field(default_factory=Display)
+    reference: Reference | None = None
+    still: bool = False
+
+    @property
+    def needs_uncertainty(self) -> bool:
+        """Whether a view shows the uncertainty of a frozen image."""
+        in_3d = self.surface and self.display.colour_by == "uncertainty"
+        return self.still and (in_3d or self.quality == "uncertainty")
+
+    @property
+    def needs_depth(self) -> bool:
+        """Whether the frame must be reconstructed."""
+        views = self.surface or self.height or bool(self.normals) or bool(self.quality)
+        return views or self.section is not None or self.region is not None
+
+    @property
+    def needs_normals(self) -> bool:
+        """Whether the reconstruction must include the normals."""
+        return bool(self.normals) or self.quality == "misfit"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """The results of a frame. None for those that were not requested.
+
+    Attributes
+    ----------
+    frame : Frame
+        The frame of the camera.
+    heightmap : HeightMap or None
+        As reconstructed.
+    range_mm : (low, high)
+        Depths at the ends of the colours.
+    camera : (rows, columns, 3) uint8 or None
+        The camera image, reduced in size while live.
+    height, normals, quality : (rows, columns, 3) uint8 or None
+        Images over the extent of the grid.
+    quality_top : float
+        Value at the upper end of the quality image's colours: mm, or a share.
+    misfit : Misfit or None
+        How well the depth explains the image.
+    surface : Surface or None
+        For the 3D view.
+    cut : Cut or None
+        Measurements along the line.
+    depth_ms, total_ms : float
+        Time of the reconstruction, and of all steps.
+    """
+
+    frame: Frame
+    heightmap: HeightMap | None = None
+    range_mm: tuple[float, float] = (0.0, 1.0)
+    camera: NDArray[np.uint8] | None = None
+    height: NDArray[np.uint8] | None = None
+    normals: NDArray[np.uint8] | None = None
+    quality: NDArray[np.uint8] | None = None
+    quality_top: float = 0.0
+    misfit: Misfit | None = None
+    surface: Surface | None = None
+    cut: Cut | None = None
+    depth_ms: float = 0.0
+    total_ms: float = 0.0
+
+
+class Maker:
+    """Computes what is shown. The processing thread calls it with each frame.
+
+    Parameters
+    ----------
+    live : Reconstructor or None
+        For live images. None: only the camera image.
+    best : Reconstructor or None
+        For frozen images. By default the same.
+
+    Attributes
+    ----------
+    colour_range : ColourRange
+        The automatic range of the colours. It is reset for another source.
+    """
+
+    def __init__(self, live: Reconstructor | None, best: Reconstructor | None = None) -> None:
+        self.live, self.best = live, best or live
+        self.wanted = Wanted()
+        self.colour_range = ColourRange()
+        self._misfit_top = SteadyEnd()
+        self._last: tuple[Frame, tuple[Reconstructor, bool], HeightMap, float] | None = None
+
+    def __call__(self, frame: Frame) -> Shown:
+        """Compute the requested results of a frame."""
+        wanted = self.wanted
+        began = time.perf_counter()
+        camera = camera_image(frame, wanted) if wanted.camera else None
+        if self.live is None or not wanted.needs_depth:
+            return Shown(frame, camera=camera)
+        heightmap, depth_ms = self._heightmap(frame, wanted)
+        misfit = self._misfit(frame, heightmap, wanted) if wanted.quality == "misfit" else None
+        misfit_top = 0.0 if misfit is None else self._steady_top(misfit, frame)
+        automatic = self.colour_range.update(heightmap.depth_mm, frame.time_s)
+        range_mm = wanted.display.range_mm or automatic
+        shown = _Images(heightmap, wanted, range_mm, misfit, misfit_top)
+        surface = shown.surface() if wanted.surface else None
+        quality, top = shown.quality() if wanted.quality else (None, 0.0)
+        return Shown(
+            frame=frame,
+            heightmap=heightmap,
+            range_mm=shown.range_mm,
+            camera=camera,
+            height=shown.height() if wanted.height else None,
+            normals=shown.normals() if wanted.normals else None,
+            quality=quality,
+            quality_top=top,
+            misfit=misfit,
+            surface=surface,
+            cut=None if wanted.section is None else cut(heightmap, wanted.section, wanted.region),
+            depth_ms=depth_ms,
+            total_ms=1e3 * (time.perf_counter() - began),
+        )
+
+    def _heightmap(self, frame: Frame, wanted: Wanted) -> tuple[HeightMap, float]:
+        """Return the frame's height map. That of a frozen image is kept."""
+        reconstructor = self.best if wanted.still else self.live
+        assert reconstructor is not None
+        uncertainty = wanted.needs_uncertainty
+        if self._last is not None:
+            same, made, heightmap, depth_ms = self._last
+            has = (heightmap.normals is not None, heightmap.depth_sd_mm is not None)
+            enough = has[0] >= wanted.needs_normals and (has[1] or made[1] >= uncertainty)
+            if same is frame and made[0] is reconstructor and enough:
+                return heightmap, depth_ms
+        began = time.perf_counter()
+        heightmap = reconstructor.depth(
+            frame.rgb, normals=wanted.needs_normals, uncertainty=uncertainty
+        )
+        depth_ms = 1e3 * (time.perf_counter() - began)
+        self._last = frame, (reconstructor, uncertainty), heightmap, depth_ms
+        return heightmap, depth_ms
+
+    def _misfit(self, frame: Frame, heightmap: HeightMap, wanted: Wanted) -> Misfit:
+        reconstructor = self.best if wanted.still else self.live
+        assert reconstructor is not None
+        nodes = MISFIT_NODES[wanted.still]
+        return solve_misfit(reconstructor, frame.rgb, heightmap, largest=nodes)
+
+    def _steady_top(self, misfit: Misfit, frame: Frame) -> float:
+        known = misfit.values[np.isfinite(misfit.values)]
+        top = float(np.percentile(known, 99.0)) if known.size else 0.0
+        return self._misfit_top.update(max(top, LEAST_MISFIT), frame.time_s)
+
+
+def camera_image(frame: Frame, wanted: Wanted) -> NDArray[np.uint8]:
+    """Return the camera image for the screen."""
+    shown = frame.rgb if wanted.still else shading.fitted(frame.rgb, CAMERA_PX)
+    return eight_bits(shown)
+
+
+class _Images:
+    """The images of one height map, in the size in which they are shown."""
+
+    def __init__(
+        self,
+        heightmap: HeightMap,
+        wanted: Wanted,
+        range_mm: tuple[float, float],
+        misfit: Misfit | None = None,
+        misfit_top: float = 0.0,
+    ) -> None:
+        self._map, self._wanted, self._display = heightmap, wanted, wanted.display
+        self._misfit, self._misfit_top = misfit, misfit_top
+        self._px = STILL_PX if wanted.still else LIVE_PX
+        self._depth = shading.fitted(heightmap.depth_mm, self._px)
+        rows, columns = self._depth.shape
+        self._pitch_mm = heightmap.pitch_mm * heightmap.depth_mm.shape[1] / columns
+        self._flags = self._thinned(heightmap.flags)
+        self._outside = cv2.bitwise_and(
+            self._flags, np.full((rows, columns), Flag.OUTSIDE.value, np.uint8)
+        )
+        self.range_mm = range_mm
+        self._flat: NDArray[np.uint8] | None = None
+        self._lit: NDArray[np.uint8] | None = None
+
+    def _thinned(self, values: NDArray[Any]) -> NDArray[Any]:
+        rows, columns = self._depth.shape
+        return np.asarray(cv2.resize(values, (columns, rows), interpolation=cv2.INTER_NEAREST))
+
+    def _coloured(self) -> NDArray[np.uint8]:
+        if self._flat is None:
+            table = colour_table(self._display.colours)
+            self._flat = shading.coloured(self._depth, table, *self.range_mm)
+        return self._flat
+
+    def _shaded(self) -> NDArray[np.uint8]:
+        if self._lit is None:
+            display = self._display
+            self._lit = shading.shaded(
+                self._depth,
+                self._pitch_mm,
+                colour_table(display.colours),
+                self.range_mm,
+                display.light,
+                exaggeration=display.exaggeration,
+                contour_mm=display.contour_mm,
+            )
+        return self._lit
+
+    def height(self) -> NDArray[np.uint8]:
+        """Return the height map."""
+        if self._display.relief:
+            rgb = self._shaded().copy()
+        else:
+            rgb = self._with_contours(self._coloured()).copy()
+        return shading.outside_filled(rgb, self._outside, SURROUND)
+
+    def normals(self) -> NDArray[np.uint8]:
+        """Return the normals or the slope as colours."""
+        assert self._map.normals is not None
+        normals = shading.fitted(self._map.normals, self._px)
+        if self._wanted.normals == "slope":
+            rgb = _in_colours(shading.steepness_deg(normals), slope_scale())
+        else:
+            rgb = shading.normal_colours(normals)
+        return shading.outside_filled(rgb, self._outside, SURROUND)
+
+    def quality(self) -> tuple[NDArray[np.uint8] | None, float]:
+        """Return the flags over the dimmed relief, or a quantity in colours, and its upper end."""
+        sd = self._map.depth_sd_mm
+        if self._misfit is not None:
+            top = self._misfit_top
+            rows, columns = self._depth.shape
+            shown = cv2.resize(np.nan_to_num(self._misfit.values), (columns, rows))
+            rgb = shading.coloured(np.asarray(shown), colour_table("inferno"), 0.0, top)
+            return shading.outside_filled(rgb, self._outside, SURROUND), top
+        if self._wanted.quality == "uncertainty":
+            if sd is None:
+                return None, 0.0
+            shown = shading.fitted(sd, self._px)
+            inside = shown[self._outside == 0]
+            top = float(np.percentile(inside, 99.0)) if inside.size else 1.0
+            rgb = shading.coloured(shown, colour_table("inferno"), 0.0, top)
+            return shading.outside_filled(rgb, self._outside, SURROUND), top
+        grey = cv2.cvtColor(self._shaded(), cv2.COLOR_RGB2GRAY)
+        dim = cv2.convertScaleAbs(cv2.merge([grey] * 3), alpha=0.6, beta=25)
+        rgb = shading.flag_colours(np.asarray(dim, np.uint8), self._flags, FLAG_COLOURS)
+        return shading.outside_filled(rgb, self._outside, SURROUND), 0.0
+
+    def surface(self) -> Surface | None:
+        """Return the mesh nodes, their colours and the colour scale."""
+        wanted, display = self._wanted, self._display
+        if display.colour_by == "depth" and not wanted.still:
+            scale, texture = depth_scale(display.colours, self.range_mm), self._shaded()
+        else:
+            rgb, scale = self._quantity()
+            texture = rgb if wanted.still else cv2.multiply(rgb, self._light(), scale=1 / 255.0)
+        return surface_of(
+            self._map,
+            np.asarray(texture, np.uint8),
+            scale,
+            range_mm=self.range_mm,
+            largest=None if wanted.still else LIVE_NODES,
+            depth_mm=None if wanted.still else self._depth,
+            light=tuple(map(float, display.light.direction())) if wanted.still else None,  # type: ignore[arg-type]
+        )
+
+    def _quantity(self) -> tuple[NDArray[np.uint8], ColourScale]:
+        """Return the quantity that colours the surface, without shading, and its scale.
+
+        If it is not available (no reference, no uncertainty of a live image), use the depth.
+        """
+        display, sd, reference = self._display, self._map.depth_sd_mm, self._wanted.reference
+        if display.colour_by == "slope":
+            across, down = shading.slopes(self._depth, self._pitch_mm)
+            slope = np.degrees(np.arctan(cv2.magnitude(across, down)))
+            scale = slope_scale()
+            return self._with_contours(_in_colours(slope, scale)), scale
+        if display.colour_by == "flags":
+            scale = flag_scale()
+            plain = np.broadcast_to(scale.table[0], (*self._depth.shape, 3)).copy()
+            return shading.flag_colours(plain, self._flags, FLAG_COLOURS), scale
+        if display.colour_by == "uncertainty" and sd is not None:
+            shown = 1e3 * shading.fitted(sd, self._px)
+            scale = uncertainty_scale(shown[self._outside == 0])
+            return self._with_contours(_in_colours(shown, scale)), scale
+        if display.colour_by == "difference" and reference is not None:
+            difference = shading.fitted(difference_to(self._map, reference.heightmap), self._px)
+            scale = difference_scale(difference[self._outside == 0])
+            return self._with_contours(_in_colours(np.nan_to_num(difference), scale)), scale
+        scale = depth_scale(display.colours, self.range_mm)
+        return self._with_contours(self._coloured()), scale
+
+    def _with_contours(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        step = self._display.contour_mm
+        return shading.with_contours(rgb, self._depth, step) if step > 0.0 else rgb
+
+    def _light(self) -> NDArray[np.uint8]:
+        """Return the relief under the lamp, without colours."""
+        return shading.shaded(
+            self._depth, self._pitch_mm, WHITE, self.range_mm, self._display.light,
+            exaggeration=self._display.exaggeration,
+        )  # fmt: skip
+
+
+def _in_colours(values: NDArray[Any], scale: ColourScale) -> NDArray[np.uint8]:
+    return shading.coloured(np.asarray(values, np.float32), scale.table, scale.low, scale.high)
+
+
+def warm_up() -> None:
+    """Compile the functions that the first image would otherwise wait for."""
+    flat, display = np.zeros((8, 8), np.float32), Display()
+    shading.shaded(flat, 0.1, colour_table(display.colours), (0.0, 1.0), display.light)

@@ -1,0 +1,186 @@
+"""Checks of sharpness and exposure, fast enough for every few frames; no Qt here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.quality import Verdict
+from gelpolight_core.translation import tr
+
+Rgb = NDArray[np.uint8] | NDArray[np.uint16]  # or one channel of it
+
+# A twentieth of a percent may be glints and hot pixels, which do not show the exposure.
+SATURATED_WARN = 0.0005
+# Core stages fail from a few percent on; at one percent the user should act.
+SATURATED_FAIL = 0.01
+# Eight bits below a quarter of the scale leave fewer than 64 grey levels.
+DARK_SHARE_OF_SCALE = 0.25
+# A mirror spot may be a dozen pixels in a million, and the only content to expose for; hot pixels
+# at a short exposure are fewer.
+BRIGHTEST_PIXELS = 12
+# Seconds in which an old best focus loses half of its lead.
+BEST_HALF_LIFE_S = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """The exposure of an image.
+
+    Attributes
+    ----------
+    saturated_share : float
+        Pixels with a channel at the end of scale, 0..1.
+    brightest : float
+        Level that only a few pixels exceed, share of the scale.
+    verdict : Verdict
+        Verdict on the exposure.
+    advice : str
+        Message for the user.
+    """
+
+    saturated_share: float
+    brightest: float
+    verdict: Verdict
+    advice: str
+
+
+def end_of_scale(rgb: Rgb) -> int:
+    """Return the largest value that an image's pixels can have."""
+    return int(np.iinfo(rgb.dtype).max)
+
+
+def brightest_channel(rgb: Rgb) -> Rgb:
+    """Return the largest of the three channels at every pixel, (rows, columns)."""
+    return np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
+
+
+def saturated(rgb: Rgb) -> NDArray[np.uint8]:
+    """Return 255 where a channel is at the end of the scale, else 0; (rows, columns).
+
+    A 16-bit image counts as saturated from the last 8-bit step on, because cameras of 10 or 12 bit
+    fill 16 bits by shifting.
+    """
+    top = end_of_scale(rgb)
+    limit = 254 if top == 255 else 0xFEFF
+    return (brightest_channel(rgb) > limit).view(np.uint8) * np.uint8(255)
+
+
+def measure_exposure(rgb: Rgb) -> Exposure:
+    """Judge the exposure of an image.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        The whole image.
+    """
+    full = saturated(rgb)
+    share = cv2.countNonZero(full) / full.size
+    brightest = _level_of_brightest(rgb)
+    if share > SATURATED_WARN:
+        verdict = Verdict.FAIL if share > SATURATED_FAIL else Verdict.WARN
+        text = tr("Too bright: {p} % of the pixels are saturated. Shorten the exposure.")
+        return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * share)))
+    if brightest < DARK_SHARE_OF_SCALE:
+        verdict = Verdict.FAIL if brightest < 0.25 * DARK_SHARE_OF_SCALE else Verdict.WARN
+        text = tr("Too dark: maximum {p} % of the scale. Lengthen the exposure.")
+        return Exposure(share, brightest, verdict, text.format(p=_percent(100.0 * brightest)))
+    if brightest >= 1.0:
+        text = tr("Good exposure, except for saturated bright spots.")
+        return Exposure(share, brightest, Verdict.PASS, text)
+    text = tr("Good exposure: the brightest areas reach {p} % of the scale.")
+    return Exposure(share, brightest, Verdict.PASS, text.format(p=_percent(100.0 * brightest)))
+
+
+def _level_of_brightest(rgb: Rgb) -> float:
+    """Return the share of the scale that the brightest pixels reach, except for a few."""
+    counts = np.cumsum(np.bincount(_high_byte(brightest_channel(rgb)).ravel(), minlength=256)[::-1])
+    return float(255 - int(np.searchsorted(counts, BRIGHTEST_PIXELS))) / 255.0
+
+
+def _high_byte(values: Rgb) -> NDArray[np.uint8]:
+    return np.asarray(values >> (8 * values.dtype.itemsize - 8), np.uint8)
+
+
+def _percent(value: float) -> str:
+    return f"{value:.0f}" if value >= 2.0 else f"{value:.1g}"
+
+
+def measure_focus(rgb: Rgb) -> float:
+    """Return the sharpness of an image: squared steps over two pixels over squared brightness.
+
+    Brenner's gradient, along rows and columns. Dividing by the brightness makes it independent of
+    the exposure, so that only the focus changes it. Values of different scenes cannot be compared.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        The whole image; a subsample has no fine detail.
+    """
+    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+    energy = cv2.norm(grey, cv2.NORM_L2SQR)
+    if energy == 0.0 or min(grey.shape) < 3:
+        return 0.0
+    steps = cv2.norm(grey[2:], grey[:-2], cv2.NORM_L2SQR)
+    steps += cv2.norm(grey[:, 2:], grey[:, :-2], cv2.NORM_L2SQR)
+    return float(steps / energy)
+
+
+class BestFocus:
+    """Remembers the best sharpness, so that a user who turns the lens finds the way back to it.
+
+    The memory loses half of its lead every :data:`BEST_HALF_LIFE_S`, so that another scene, which
+    has another sharpness, gets its own best value.
+    """
+
+    def __init__(self) -> None:
+        self.best = 0.0
+        self._seen_s: float | None = None
+
+    def update(self, focus: float, time_s: float) -> float:
+        """Add a sharpness measured at `time_s`; return it as a share of the best, 0..1."""
+        if self._seen_s is not None:
+            fade = 0.5 ** (max(time_s - self._seen_s, 0.0) / BEST_HALF_LIFE_S)
+            self.best = focus + (self.best - focus) * fade
+        self.best = max(self.best, focus)
+        self._seen_s = time_s
+        return focus / self.best if self.best > 0.0 else 0.0
+
+
+def channel_histograms(rgb: Rgb, bins: int = 64) -> NDArray[np.int64]:
+    """Count pixels by brightness, separately for each channel.
+
+    Parameters
+    ----------
+    rgb : (rows, columns, 3) uint8 or uint16
+        The image, or a regular subset of its pixels.
+    bins : int, optional
+        A power of two, at most 256.
+
+    Returns
+    -------
+    (3, bins) int64
+        Counts; the last bin is the end of the scale.
+    """
+    shift = 8 * rgb.dtype.itemsize - (bins - 1).bit_length()
+    return np.stack(
+        [np.bincount(rgb[..., k].ravel() >> shift, minlength=bins) for k in range(3)]
+    ).astype(np.int64)
+
+
+def pixel_text(rgb: Rgb, u: float, v: float) -> str:
+    """Return the values of the pixel at (u, v) as text; empty outside the image."""
+    rows, columns = rgb.shape[:2]
+    if not (-0.5 <= u < columns - 0.5 and -0.5 <= v < rows - 0.5):
+        return ""
+    column, row = math.floor(u + 0.5), math.floor(v + 0.5)
+    top = end_of_scale(rgb)
+    values = (
+        f"{name} {int(value)} ({100.0 * int(value) / top:.0f} %)"
+        for name, value in zip(("R", "G", "B"), rgb[row, column], strict=True)
+    )
+    return f"u {column}, v {row}:  " + "   ".join(values)

@@ -1,0 +1,222 @@
+"""One image in a pyqtgraph view: zoom, pan, fit, and the pointer position.
+
+Coordinates are the core's: (u, v) with pixel centres at integers, v down.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtGui import QPainter, QResizeEvent
+from PySide6.QtWidgets import QWidget
+
+from app.live.drawing import OverlayItem
+from app.view2d.display import SURROUND
+from app.widgets.label import PlainLabel
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+# From this magnification on pixels are shown as squares, which is the purpose of zooming in.
+SQUARES_FROM = 1.5
+LEAST_SHOWN_PX = 6.0
+FARTHEST_PX = 8000.0
+
+
+class _Box(pg.ViewBox):  # type: ignore[misc]
+    """A view box that passes on drags with the left button if requested."""
+
+    dragged = Signal(str, float, float)
+
+    def __init__(self) -> None:
+        super().__init__(lockAspect=1.0, invertY=True, enableMenu=False)
+        self.hands_drags_on = False
+
+    def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
+        if not self.hands_drags_on or event.button() != Qt.MouseButton.LeftButton:
+            super().mouseDragEvent(event, axis)
+            return
+        event.accept()
+        if event.isStart():
+            self._tell("begin", event.buttonDownPos())
+        self._tell("end" if event.isFinish() else "move", event.pos())
+
+    def _tell(self, phase: str, at: Any) -> None:
+        position = self.mapToView(at)
+        self.dragged.emit(phase, position.x(), position.y())
+
+
+class ImageView(pg.GraphicsView):  # type: ignore[misc]
+    """Shows an image and an overlay.
+
+    Signals
+    -------
+    pointed(float, float)
+        Image pixel (u, v) under the pointer; NaN if there is none.
+    clicked(float, float)
+        A left click on the image.
+    dragged(str, float, float)
+        "begin", "move" or "end" of a drag with the left button, and its position; without
+        :meth:`hand_drags_on` such a drag pans.
+    zoomed(float)
+        Screen pixels per image pixel; NaN without an image.
+    resized()
+        The size of the view changed.
+    """
+
+    pointed = Signal(float, float)
+    clicked = Signal(float, float)
+    dragged = Signal(str, float, float)
+    zoomed = Signal(float)
+    resized = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent, background=SURROUND)
+        named(self, "live.image", tr("Live image"))
+        # Keys belong to the whole live view, which handles those of tools and handles.
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._size = self._drawn = (0, 0)
+        self._fitted = True
+        self._box = _Box()
+        self._box.dragged.connect(self.dragged)
+        self._box.disableAutoRange()
+        self.setCentralItem(self._box)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        self._box.addItem(self._image, ignoreBounds=True)
+        self.overlay = OverlayItem()
+        self.overlay.setZValue(10)
+        self._box.addItem(self.overlay, ignoreBounds=True)
+        self._box.sigRangeChangedManually.connect(self._on_moved_by_hand)
+        self._box.sigRangeChanged.connect(self._on_range)
+        self.scene().sigMouseMoved.connect(self._on_pointer)
+        self.scene().sigMouseClicked.connect(self._on_click)
+        self._placeholder = PlainLabel(tr("No camera. Select a source."), self)
+        self._placeholder.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._placeholder.setWordWrap(True)
+        self._placeholder.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 15px;")
+        self._placeholder.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """(width, height) in pixels; (0, 0) without an image."""
+        return self._size
+
+    @property
+    def scale_px(self) -> float:
+        """Screen pixels per image pixel."""
+        width, _ = self._box.viewPixelSize()
+        return float(self.devicePixelRatioF() / width) if width > 0.0 else 1.0
+
+    def show_rgb(
+        self, rgb: NDArray[np.uint8] | None, *, size: tuple[int, int] | None = None
+    ) -> None:
+        """Show an image (rows, columns, 3); None removes it.
+
+        A reduced image has the `size` (width, height) of its original; positions are pixels of the
+        original.
+        """
+        self._placeholder.setVisible(rgb is None)
+        if rgb is None:
+            self._image.clear()
+            self._size = self._drawn = (0, 0)
+            self.zoomed.emit(math.nan)
+            return
+        self._image.setImage(rgb, autoLevels=False)
+        size = size or (rgb.shape[1], rgb.shape[0])
+        drawn = (rgb.shape[1], rgb.shape[0])
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._image.setRect(QRectF(-0.5, -0.5, *size))
+        if size != self._size:
+            self._size = size
+            # Half a pixel: (0, 0) is the centre of the first pixel, not its corner.
+            self._image.setRect(QRectF(-0.5, -0.5, *size))
+            # Far enough out for full size in any window, but the image must not get lost.
+            reach = max(4.0 * max(size), FARTHEST_PX)
+            self._box.setLimits(
+                minXRange=LEAST_SHOWN_PX,
+                xMin=-reach,
+                xMax=size[0] + reach,
+                yMin=-reach,
+                yMax=size[1] + reach,
+            )
+            self.fit()
+
+    def hand_drags_on(self, on: bool) -> None:
+        """Emit drags with the left button instead of panning; the middle button still pans."""
+        self._box.hands_drags_on = on
+
+    def say(self, text: str) -> None:
+        """Change the text that is shown when there is no image."""
+        self._placeholder.setText(text)
+
+    def fit(self) -> None:
+        """Show the whole image, also after the view's size changes."""
+        self._fitted = True
+        if self._size != (0, 0):
+            self._box.setRange(QRectF(-0.5, -0.5, *self._size), padding=0.0)
+
+    def full_size(self) -> None:
+        """Show one image pixel on one screen pixel, keeping the centre of the view."""
+        self._scale_to(1.0)
+
+    def zoom_by(self, factor: float) -> None:
+        """Magnify around the centre of the view."""
+        self._scale_to(self.scale_px * factor)
+
+    def _scale_to(self, scale: float) -> None:
+        if self._size == (0, 0):
+            return
+        self._fitted = False
+        middle = self._box.viewRect().center()
+        width = self._box.width() * self.devicePixelRatioF() / scale
+        height = self._box.height() * self.devicePixelRatioF() / scale
+        self._box.setRange(
+            QRectF(middle.x() - width / 2, middle.y() - height / 2, width, height), padding=0.0
+        )
+
+    def view_position(self, u: float, v: float) -> tuple[float, float]:
+        """Return where a point of the image is in this widget, in points."""
+        at = self.mapFromScene(self._box.mapViewToScene(pg.Point(u, v)))
+        return float(at.x()), float(at.y())
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
+        if not hasattr(self, "_placeholder"):  # the base class resizes itself in its constructor
+            super().resizeEvent(event)
+            return
+        scale = self.scale_px
+        super().resizeEvent(event)
+        self._placeholder.setGeometry(self.rect().adjusted(20, 20, -20, -20))
+        if self._fitted:
+            self.fit()
+        else:
+            self._scale_to(scale)
+        self.resized.emit()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().leaveEvent(event)
+        self.pointed.emit(math.nan, math.nan)
+
+    def _on_moved_by_hand(self, *_: Any) -> None:
+        self._fitted = False
+
+    def _on_range(self, *_: Any) -> None:
+        self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, self.scale_px < SQUARES_FROM)
+        self.zoomed.emit(self.scale_px if self._size != (0, 0) else math.nan)
+
+    def _on_pointer(self, at: Any) -> None:
+        position = self._box.mapSceneToView(at)
+        self.pointed.emit(position.x(), position.y())
+
+    def _on_click(self, event: Any) -> None:
+        if event.button() != Qt.MouseButton.LeftButton:
+            return
+        if event.double():
+            self.fit()
+            return
+        position = self._box.mapSceneToView(event.scenePos())
+        self.clicked.emit(position.x(), position.y())

@@ -1,0 +1,141 @@
+"""Playback controls of a recording: play, step, seek, loop, speed."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QHBoxLayout,
+    QToolButton,
+    QWidget,
+)
+
+from app.sources.recording import Playback, RecordingSource
+from app.widgets.actions import make_action
+from app.widgets.inputs import ComboBox, Slider
+from app.widgets.label import PlainLabel
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+POLL_MS = 100
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+class ReplayBar(QWidget):
+    """Controls the playback of a recording. Hidden if there is none.
+
+    Parameters
+    ----------
+    page : str
+        First part of its object name.
+
+    Signals
+    -------
+    moved()
+        The user moved to another frame or started playing.
+    """
+
+    moved = Signal()
+
+    def __init__(self, page: str = "inspect") -> None:
+        super().__init__()
+        named(self, f"{page}.replay", tr("Replay"))
+        self._source: RecordingSource | None = None
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 2, 8, 2)
+        for name, text, slot, keys, icon_name in (
+            ("back", tr("Previous frame"), lambda: self._step(-1), ",", "step-back"),
+            ("play", tr("Play or pause"), self._toggle, "Ctrl+Space", "play"),
+            ("on", tr("Next frame"), lambda: self._step(1), ".", "step-on"),
+        ):
+            action = make_action(
+                self, f"replay.{name}", text, slot, keys=(keys,), icon_name=icon_name,
+                tip=f"{text} ({keys})",
+            )  # fmt: skip
+            button = named(QToolButton(), f"{page}.replay.{name}", text)
+            button.setDefaultAction(action)
+            button.setAutoRaise(True)
+            row.addWidget(button)
+            if name == "play":
+                action.setCheckable(True)
+                self._play = action
+        self._slider = named(
+            Slider(Qt.Orientation.Horizontal),
+            f"{page}.replay.seek",
+            tr("Position in the recording"),
+        )
+        self._slider.valueChanged.connect(self._seek)
+        row.addWidget(self._slider, 1)
+        self._words = named(PlainLabel(), f"{page}.replay.words", tr("Current position"))
+        row.addWidget(self._words)
+        self._loop = named(
+            QCheckBox(tr("Loop")), f"{page}.replay.loop", tr("Start again at the end")
+        )
+        self._loop.toggled.connect(lambda on: self._source and self._source.set_loop(on))
+        self._speed = named(ComboBox(), f"{page}.replay.speed", tr("Speed"))
+        for speed in SPEEDS:
+            self._speed.addItem(tr("{s:g} x").format(s=speed), speed)
+        self._speed.activated.connect(self._set_speed)
+        row.addWidget(self._loop)
+        row.addWidget(self._speed)
+        self._timer = QTimer(self)
+        self._timer.setInterval(POLL_MS)
+        self._timer.timeout.connect(self._poll)
+        self.hide()
+
+    def follow(self, source: object) -> None:
+        """Follow a source. The bar is hidden unless the source is a recording."""
+        self._source = source if isinstance(source, RecordingSource) else None
+        self.setVisible(self._source is not None)
+        if self._source is None:
+            self._timer.stop()
+        else:
+            self._timer.start()
+            self._poll()
+
+    def _poll(self) -> None:
+        if self._source is None:
+            return
+        now = self._source.playback()
+        with QSignalBlocker(self._slider):
+            self._slider.setRange(0, max(now.count - 1, 0))
+            self._slider.setValue(now.position)
+        with QSignalBlocker(self._loop):
+            self._loop.setChecked(now.loop)
+        with QSignalBlocker(self._speed):
+            self._speed.setCurrentIndex(self._speed.findData(now.speed))
+        self._play.setChecked(now.playing)
+        self._words.setText(playback_text(now))
+
+    def _toggle(self) -> None:
+        if self._source is not None:
+            playing = self._source.playback().playing
+            (self._source.pause if playing else self._source.play)()
+            self._poll()
+            if not playing:
+                self.moved.emit()
+
+    def _step(self, count: int) -> None:
+        if self._source is not None:
+            self._source.step(count)
+            self._poll()
+            self.moved.emit()
+
+    def _seek(self, index: int) -> None:
+        if self._source is not None:
+            self._source.seek(index)
+            self.moved.emit()
+
+    def _set_speed(self, index: int) -> None:
+        if self._source is not None:
+            self._source.set("speed", float(self._speed.itemData(index)))
+
+
+def playback_text(now: Playback) -> str:
+    """Return the position of a player as text."""
+    text = tr("{t:.2f} / {d:.2f} s,  frame {k} of {n}").format(
+        t=now.time_s, d=now.duration_s, k=now.position + 1, n=now.count
+    )
+    if now.damaged:
+        text += tr(",  {n} damaged").format(n=now.damaged)
+    return text

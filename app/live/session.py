@@ -1,0 +1,305 @@
+"""One live session: the selected source, its stream, and what is computed from each image."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from app.context.context import AppContext
+from app.sources.mailbox import Mailbox
+from app.sources.processor import Failure, Outcome, Processor
+from app.sources.recording import RecordingSource
+from app.sources.source import Frame
+from app.sources.stream import Stream
+from gelpolight_core.translation import tr
+
+TICK_MS = 8
+STATUS_MS = 500
+# Shorter times mean that only the camera image is shown.
+LEAST_MS = 0.5
+
+
+class _Inbox:
+    """The mailbox of the processing thread. It counts the frames that were skipped."""
+
+    def __init__(self) -> None:
+        self.box: Mailbox[Frame] = Mailbox()
+        self._lock = threading.Lock()
+        self.skipped = 0
+
+    def put(self, frame: Frame) -> None:
+        if self.box.put(frame):
+            with self._lock:
+                self.skipped += 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Capture:
+    """A capture in progress, and where its result goes."""
+
+    frames: Future[list[Frame]]
+    done: Callable[[list[Any]], object]
+    failed: Callable[[str], object]
+    aborted: Callable[[str], object]
+
+
+class LiveSession(QObject):
+    """The live images of one page: open while the page is visible and needs images.
+
+    One thread reads the frames of the source, another runs a function on the newest one. Results
+    of a replaced function or of a closed source are dropped.
+
+    Parameters
+    ----------
+    context : AppContext
+        Holds the source that all pages share.
+    name : str
+        Name of the processing thread.
+    parent : QObject, optional
+        Owner.
+
+    Attributes
+    ----------
+    stream : Stream or None
+        Delivers the frames. None while no source is open.
+
+    Signals
+    -------
+    source_changed()
+        Another source was selected. It is opened afterwards.
+    switched()
+        The stream was replaced or removed.
+    lost(str)
+        Why no images arrive, as a sentence. Empty if they do.
+    processed(object)
+        Outcome or Failure of the function for the newest frame.
+    """
+
+    source_changed = Signal()
+    switched = Signal()
+    lost = Signal(str)
+    processed = Signal(object)
+
+    def __init__(self, *, context: AppContext, name: str, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._context = context
+        self.stream: Stream | None = None
+        self._page_shown, self._wanted = False, True
+        self._paused = self._resting = False
+        self._lost = ""
+        self._capture: _Capture | None = None
+        self._inbox = _Inbox()
+        self._outbox: Mailbox[Outcome[Any] | Failure] = Mailbox()
+        self._function: Callable[[Frame], Any] = lambda _frame: None
+        self._processor: Processor[Any] = Processor(
+            self._inbox.box, self._function, self._outbox, name=name
+        )
+        self._tick, self._status = QTimer(self), QTimer(self)
+        self._tick.setTimerType(Qt.TimerType.PreciseTimer)
+        self._tick.setInterval(TICK_MS)
+        self._tick.timeout.connect(self._poll)
+        self._status.setInterval(STATUS_MS)
+        self._status.timeout.connect(self._update_status)
+        self._following = (
+            context.source.changed.connect(self._on_source),
+            context.requests.rest.connect(self.rest),
+        )
+
+    # When the source is open
+
+    def enter(self, page_shown: bool) -> None:
+        """Note whether the page is visible, and open or close the source accordingly."""
+        self._page_shown = page_shown
+        self.open()
+
+    def use(self, wanted: bool) -> None:
+        """Start or stop capturing. Unused images would only slow down other work."""
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self.open()
+
+    def open(self) -> None:
+        """Open the selected source, if the page is visible and needs images."""
+        self._close()
+        info = self._context.source.info
+        if info is not None and self._page_shown and self._wanted:
+            self._inbox.skipped = 0
+            self.stream = Stream(info.open())
+            if not self._paused:
+                self.stream.add_tap(self._inbox.put)
+            self.stream.start()
+            self._processor.start()
+            self._tick.start()
+            self._status.start()
+            self._context.status.update(camera=info.name)
+        self.switched.emit()
+
+    def finish(self) -> None:
+        """Release the source for good."""
+        for connection in self._following:
+            self.disconnect(connection)
+        if self._page_shown:
+            self.enter(False)
+
+    def _on_source(self) -> None:
+        self.source_changed.emit()
+        self.open()
+
+    def _close(self) -> None:
+        self._tick.stop()
+        self._status.stop()
+        capture, self._capture = self._capture, None
+        if self.stream is not None:
+            self.stream.remove_tap(self._inbox.put)
+            self._processor.stop()
+            self._resting = False
+            self.stream.stop()
+            self.stream = None
+            # Only the session that had the source open may change the status.
+            self._context.status.update(
+                camera=self._context.source.idle_name,
+                rate_hz=None,
+                dropped=None,
+                processing_ms=None,
+            )
+        self._inbox.box.take()
+        self._outbox.take()
+        self._set_lost("")
+        if capture is not None:
+            capture.aborted(
+                tr("The image was not captured because the camera was released. Capture it again.")
+            )
+
+    @property
+    def page_shown(self) -> bool:
+        """Whether the page is visible."""
+        return self._page_shown
+
+    # What is computed
+
+    @property
+    def paused(self) -> bool:
+        """Whether new frames are ignored."""
+        return self._paused
+
+    @property
+    def processing_ms(self) -> float:
+        """Typical time of the function in ms."""
+        return self._processor.figures().median_ms
+
+    @property
+    def source(self) -> object:
+        """The open source. None if there is none."""
+        return None if self.stream is None else self.stream.source
+
+    @property
+    def serial(self) -> str:
+        """Serial of the sensor of the open source. Empty if unknown."""
+        choice, source = self._context.source, self.source
+        if choice.info is None or source is None:
+            return ""
+        if choice.info.kind == "virtual" and choice.bench is not None:
+            return choice.bench.design.serial
+        if isinstance(source, RecordingSource) and source.header is not None:
+            return source.header.serial
+        return ""
+
+    def process(self, function: Callable[[Frame], Any]) -> None:
+        """Run another function on the frames from now on, and drop results in progress."""
+        self._function = function
+        self._processor.replace(function)
+
+    def process_again(self, frame: Frame) -> None:
+        """Process a frame again while the images are paused, and drop results in progress."""
+        if self._paused:
+            self._processor.replace(self._function)
+            self._inbox.box.put(frame)
+
+    def pause(self, on: bool) -> None:
+        """Ignore new frames, or continue."""
+        if on == self._paused:
+            return
+        self._paused = on
+        if self.stream is not None:
+            (self.stream.remove_tap if on else self.stream.add_tap)(self._inbox.put)
+        self._inbox.box.take()
+
+    def rest(self, on: bool) -> None:
+        """Stop processing while another thread uses what the function needs."""
+        if self.stream is None or on == self._resting:
+            return
+        self._resting = on
+        (self._processor.stop if on else self._processor.start)()
+
+    # Captures
+
+    @property
+    def capturing(self) -> bool:
+        """Whether a capture is in progress."""
+        return self._capture is not None
+
+    def capture(
+        self,
+        count: int,
+        done: Callable[[list[Any]], object],
+        failed: Callable[[str], object],
+        *,
+        aborted: Callable[[str], object] | None = None,
+    ) -> None:
+        """Collect the next frames that show the present state of the source.
+
+        A second capture before the first one has ended is ignored.
+
+        Parameters
+        ----------
+        count : int
+            Number of frames.
+        done : callable
+            Called with their images, each (rows, columns, 3).
+        failed : callable
+            Called with a sentence instead if they cannot be captured.
+        aborted : callable, optional
+            Called with a sentence instead if the source is closed meanwhile. Default: `failed`.
+        """
+        if self._capture is not None:
+            return
+        if self.stream is None:
+            failed(tr("There is no camera. Select a source first."))
+            return
+        frames = self.stream.capture(count)
+        self._capture = _Capture(frames, done, failed, aborted or failed)
+
+    def _poll(self) -> None:
+        item = self._outbox.take()
+        if item is not None and item.generation == self._processor.generation:
+            self.processed.emit(item)
+        if self._capture is not None and self._capture.frames.done():
+            capture, self._capture = self._capture, None
+            error = capture.frames.exception()
+            if error is not None:
+                capture.failed(str(error))
+            else:
+                capture.done([frame.rgb for frame in capture.frames.result()])
+
+    # Status
+
+    def _update_status(self) -> None:
+        if self.stream is None:
+            return
+        figures = self.stream.figures()
+        self._context.status.update(
+            rate_hz=figures.rate_hz,
+            dropped=figures.dropped + self._inbox.skipped,
+            processing_ms=self.processing_ms if self.processing_ms >= LEAST_MS else None,
+        )
+        self._set_lost(figures.lost or "")
+
+    def _set_lost(self, why: str) -> None:
+        if why != self._lost:
+            self._lost = why
+            self.lost.emit(why)

@@ -1,0 +1,153 @@
+"""Zero: corrects a background shift with the present background of the untouched sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject
+
+from app.context.context import AppContext
+from app.live.session import LiveSession
+from app.services.jobs import Job, Jobs
+from app.workspace.workspace import ENDING, Workspace
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.user import user_name
+from gelpolight_core.quality import Verdict
+from gelpolight_core.reconstruction.background_shift import (
+    BackgroundDrift,
+    background_drift,
+    zeroed,
+)
+from gelpolight_core.translation import tr
+
+FRAMES = 8
+SUFFIX = "-zero"
+
+
+@dataclass(frozen=True, slots=True)
+class Zeroed:
+    """A calibration set to zero, and how far the background had moved before.
+
+    Attributes
+    ----------
+    path : Path
+        The calibration with the present background.
+    origin : Path
+        The original calibration, which is kept.
+    before : BackgroundDrift
+        The image compared with the original background.
+    """
+
+    path: Path
+    origin: Path
+    before: BackgroundDrift
+
+
+class ZeroControl(QObject):
+    """Sets zero with the next images of a session.
+
+    Parameters
+    ----------
+    live : LiveSession
+        The images, and the owner of this object.
+    jobs : Jobs
+        Runs the computation.
+    context : AppContext
+        Holds the library and the messages.
+    """
+
+    def __init__(self, live: LiveSession, jobs: Jobs, *, context: AppContext) -> None:
+        super().__init__(live)
+        self._live, self._jobs, self._context = live, jobs, context
+
+    def set_zero(self) -> None:
+        """Use the present background of the untouched sensor as the zero reference."""
+        if self._live.stream is None or self._context.workspace.in_use is None:
+            text = tr("Zero needs a camera and a calibration in use.")
+            self._context.toasts.show(text, "warn")
+        else:
+            self._live.capture(FRAMES, self._on_captured, self._on_failed, aborted=self._on_aborted)
+
+    def _on_captured(self, frames: list[NDArray[Any]]) -> None:
+        workspace = self._context.workspace
+        used = workspace.in_use
+        if used is not None:
+            self._jobs.submit(
+                Job(
+                    tr("Setting zero"),
+                    lambda _tell: zero_calibration(workspace, used, frames),
+                    self._on_zeroed,
+                    self._on_failed,
+                )
+            )
+
+    def _on_aborted(self, _sentence: str) -> None:
+        text = tr("Zero was not set because the camera was released. Set it again.")
+        self._context.toasts.show(text, "warn")
+
+    def _on_failed(self, sentence: str) -> None:
+        self._context.toasts.show(sentence, "fail")
+
+    def _on_zeroed(self, done: Zeroed) -> None:
+        self._context.requests.calibrations_changed.emit()
+        poor = [f for f in done.before.quality.figures if f.verdict is not Verdict.PASS]
+        text = tr("Zero is set. The original calibration is kept.")
+        if poor:
+            text += " " + tr("The background had changed: {what} {v:.2g} {unit}.").format(
+                what=poor[0].label, v=poor[0].value, unit=poor[0].unit
+            )
+        # A calibration that was itself made by Zero is overwritten. Only the original remains.
+        undo = (tr("Undo"), lambda: self._use(done.origin))
+        self._context.toasts.show(text, "warn" if poor else "pass", actions=(undo,))
+
+    def _use(self, path: Path) -> None:
+        try:
+            self._context.workspace.use(path)
+        except InputError as error:
+            self._on_failed(str(error))
+        self._context.requests.calibrations_changed.emit()
+
+
+def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[Any]]) -> Zeroed:
+    """Write the calibration in use with the present background, and put it into use.
+
+    The new file is next to the original, which is not changed. Zeroing again replaces the new file.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Stores both.
+    used : Path
+        The calibration in use, which may itself be one set to zero.
+    frames : sequence of (height, width, 3)
+        Images of the untouched sensor.
+
+    Raises
+    ------
+    InputError
+        If the sensor is touched or the frames cannot be used.
+    """
+    origin = original_of(used)
+    calibration = read_calibration(origin)
+    before = background_drift(frames[0], calibration)
+    made = datetime.now(UTC).isoformat(timespec="seconds")
+    changed = zeroed(calibration, frames, operator=user_name(), made=made)
+    path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")
+    write_calibration(changed, path)
+    workspace.use(path)
+    return Zeroed(path, origin, before)
+
+
+def original_of(used: Path) -> Path:
+    """Return the original of a calibration set to zero. Any other is its own original."""
+    if used.stem.endswith(SUFFIX):
+        origin = used.with_name(f"{used.stem.removesuffix(SUFFIX)}{ENDING}")
+        if origin.is_file():
+            return origin
+    return used

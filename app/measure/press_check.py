@@ -1,0 +1,223 @@
+"""Position of the next press in the image, and whether the camera sees it there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.live.overlay import Line, Marker, Overlay, Role
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.protocol import PressWanted
+from gelpolight_core.measurement.result import Truth
+from gelpolight_core.measurement.steadiness import find_contact
+from gelpolight_core.optics.refraction import membrane_to_camera
+from gelpolight_core.reconstruction.background_shift import background_drift
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+TOLERANCE_MM = 1.5
+"""Allowed distance of an object from its position: what a hand without a guide achieves."""
+OUTLINE_POINTS = 72
+
+
+class ImageMap:
+    """From points on the membrane to the image, through a calibration's optics or scale.
+
+    Parameters
+    ----------
+    calibration : Calibration or InPlaceCalibration
+        Of the sensor in use.
+    """
+
+    def __init__(self, calibration: AnyCalibration) -> None:
+        self._calibration = calibration
+
+    def to_image(self, points_mm: Array) -> Array:
+        """Return the pixels (u, v) that see points (N, 2) of the flat membrane, (N, 2)."""
+        c = self._calibration
+        if isinstance(c, InPlaceCalibration):
+            return c.in_place.grid.to_pixels(points_mm)
+        directions = membrane_to_camera(np.asarray(points_mm, np.float64), c.plane, c.stack)
+        return np.asarray(c.camera.project(directions))
+
+    def pixels_per_mm(self, place_mm: tuple[float, float]) -> float:
+        """Return the scale of the image at a point."""
+        x, y = place_mm
+        ends = self.to_image(np.array([[x - 0.5, y], [x + 0.5, y]]))
+        return float(np.linalg.norm(ends[1] - ends[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A press in image coordinates.
+
+    Attributes
+    ----------
+    press : PressWanted
+        The requested press.
+    outline_px : (N, 2)
+        Closed outline of the object's face.
+    circle_px : (N, 2)
+        Closed line within which its centre may be.
+    centre_px : (float, float)
+        Its centre.
+    pixels_per_mm : float
+        Scale there.
+    """
+
+    press: PressWanted
+    outline_px: Array
+    circle_px: Array
+    centre_px: tuple[float, float]
+    pixels_per_mm: float
+
+    def overlay(self, role: Role = "expected") -> Overlay:
+        """Return the overlay of the live image."""
+        u, v = self.centre_px
+        marker = Marker(u, v, "plus", role, object_name(self.press.truth))
+        lines = (
+            Line(self.outline_px, role, closed=True),
+            Line(self.circle_px, "info", closed=True),
+        )
+        return Overlay(markers=(marker,), lines=lines)
+
+
+def make_target(press: PressWanted, image_map: ImageMap) -> Target:
+    """Return a press in image coordinates.
+
+    Parameters
+    ----------
+    press : PressWanted
+        Object and position.
+    image_map : ImageMap
+        Of the sensor's calibration.
+    """
+    centre = np.array(press.place_mm)
+    u, v = image_map.to_image(centre[None])[0]
+    return Target(
+        press,
+        image_map.to_image(centre + _face(press)),
+        image_map.to_image(centre + _circle(TOLERANCE_MM)),
+        (float(u), float(v)),
+        image_map.pixels_per_mm(press.place_mm),
+    )
+
+
+def object_name(truth: Truth) -> str:
+    """Return the name of an object, such as "Cylinder 5 mm, height 1 mm"."""
+    shape = {"cylinder": tr("Cylinder"), "cuboid": tr("Cuboid")}[truth.shape]
+    return tr("{shape} {size:g} mm, height {height:g} mm").format(
+        shape=shape, size=truth.size_mm, height=truth.height_mm
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PressSeen:
+    """What a frame shows of a press.
+
+    Attributes
+    ----------
+    overlay : Overlay
+        Marks on the image.
+    sentence : str
+        What to do.
+    held : bool
+        Whether the object is pressed in at its position.
+    """
+
+    overlay: Overlay
+    sentence: str
+    held: bool = False
+
+
+class PressCheck:
+    """Checks live frames for one press. Called in the processing thread.
+
+    Attributes
+    ----------
+    phase : str
+        ``lift`` until the bare membrane was seen, then ``press``, and ``hold`` while the object is
+        pressed in at its position.
+
+    Parameters
+    ----------
+    target : Target
+        Object and position.
+    bare : (rows, columns, 3) uint8 or uint16
+        The untouched membrane.
+    """
+
+    def __init__(self, target: Target, bare: NDArray[Any]) -> None:
+        self.phase = "lift"
+        self._target, self._bare = target, bare
+
+    def __call__(self, rgb: NDArray[Any]) -> PressSeen:
+        """Return what a frame shows of the press."""
+        target, bare = self._target, self._bare
+        if rgb.shape != bare.shape or rgb.dtype != bare.dtype:
+            text = tr("The size of the camera image has changed. Capture the bare membrane again.")
+            return PressSeen(target.overlay("bad"), text)
+        contact = find_contact(bare, rgb)
+        if self.phase == "lift":
+            if not contact.lifted:
+                return PressSeen(target.overlay(), tr("Lift everything off the sensor."))
+            self.phase = "press"
+        if not contact.pressed:
+            self.phase = "press"
+            text = tr("Press the object in at the mark until its base touches.")
+            return PressSeen(target.overlay(), text)
+        away_mm = math.dist(contact.centre_px, target.centre_px) / target.pixels_per_mm
+        if away_mm > TOLERANCE_MM:
+            self.phase = "press"
+            text = tr(
+                "The object is {away:.1f} mm from the mark. Lift it and press it at the mark."
+            )
+            return PressSeen(target.overlay("bad"), text.format(away=away_mm))
+        self.phase = "hold"
+        return PressSeen(target.overlay("good"), tr("Hold it still."), held=True)
+
+
+def _face(press: PressWanted) -> Array:
+    half = 0.5 * press.truth.size_mm
+    if press.truth.shape == "cylinder":
+        return _circle(half)
+    yaw = math.radians(press.yaw_deg)
+    turn = np.array([[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]])
+    along = np.linspace(-half, half, OUTLINE_POINTS // 4, endpoint=False)
+    side = np.full_like(along, half)
+    corners = [(along, -side), (side, along), (-along, side), (-side, -along)]
+    points = np.concatenate([np.stack(pair, axis=-1) for pair in corners])
+    return np.asarray(points @ turn)
+
+
+def _circle(radius_mm: float) -> Array:
+    angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS, endpoint=False)
+    return radius_mm * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def why_not_bare(rgb: NDArray[Any], calibration: AnyCalibration) -> str:
+    """Return why an image cannot be that of the bare membrane. Empty if it can.
+
+    Parameters
+    ----------
+    rgb : (height, width, 3) uint8 or uint16
+        The image.
+    calibration : Calibration
+        Of the sensor. Its background is the membrane with nothing on it.
+    """
+    try:
+        touched = background_drift(rgb, calibration).touched
+    except InputError as error:
+        return str(error)
+    if not touched:
+        return ""
+    return tr(
+        "Something presses on the membrane. Lift everything off the sensor, then click "
+        '"Capture bare membrane".'
+    )

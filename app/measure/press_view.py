@@ -1,0 +1,365 @@
+"""Measuring a press: the live or frozen image, the tools on it, and the results."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QFileDialog,
+)
+
+from app.context.context import AppContext
+from app.live.frame_results import Shown, Wanted
+from app.live.zero import ZeroControl
+from app.measure.advice import measuring_advice
+from app.measure.judging import Judged, judge
+from app.measure.keeping import Kept
+from app.measure.measuring import MeasuredImage
+from app.measure.press_view_frame import PressViewFrame
+from app.measure.steady import SteadyPress
+from app.services.jobs import Jobs
+from app.view2d.display import Display
+from app.view3d.saving import ViewSaving
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.proposal import Proposal
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.recording import ENDING as RECORDING
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.translation import tr
+
+IMAGES = (".png", ".tif", ".tiff")
+
+
+class PressView(PressViewFrame):
+    """Measures pressed objects.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        For long work.
+    context : AppContext
+        Shared by all pages.
+
+    Signals
+    -------
+    kept(object)
+        A result (Kept) to be saved to the records.
+    indenters_wanted(), limits_wanted()
+        The user wants to edit the indenters or the limits.
+    """
+
+    kept = Signal(object)
+    indenters_wanted = Signal()
+    limits_wanted = Signal()
+
+    def __init__(self, jobs: Jobs, *, context: AppContext) -> None:
+        super().__init__(jobs, context=context)
+        self.zero = ZeroControl(self.live, jobs, context=context)
+        self._steady = SteadyPress()
+        self.saving = ViewSaving(self.details.surface, self, settings=context.settings)
+        self._best: Reconstructor | None = None
+        self._shown: Shown | None = None
+        self._refused = ""
+        self._connect()
+        self.restore()
+
+    def _connect(self) -> None:
+        self.hold_pressed.connect(self.toggle_hold)
+        self.open_pressed.connect(self.choose_file)
+        self.propose_pressed.connect(self.propose)
+        self.keep_pressed.connect(self.keep)
+        self.live.source_changed.connect(self._on_source)
+        self.live.switched.connect(self._on_switched)
+        self.depth.shown.connect(self._on_live)
+        self.depth.calibration_loaded.connect(self._use)
+        self.depth.changed.connect(self._advise)
+        self.banner.act_wanted.connect(self._on_act)
+        self.work.changed.connect(self._refresh)
+        self.work.image_changed.connect(self._refresh)
+        self.map.drawn.connect(self.details.show_tools)
+        self.details.wanted_changed.connect(self._want)
+        self.saving.reported.connect(self.context.toasts.show)
+        self.replay.moved.connect(self._on_replayed)
+        self.work.busy_changed.connect(self._advise)
+        self.work.refused.connect(self._on_refused)
+        self.work.proposed.connect(self._on_proposed)
+        self.map.hold_wanted.connect(lambda: self.hold(True))
+        self.map.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
+        panel = self.panel
+        panel.propose_wanted.connect(self.propose)
+        panel.tool_chosen.connect(self.work.choose)
+        panel.remove_wanted.connect(lambda: self.work.remove(self.work.chosen))
+        panel.keep_wanted.connect(self.keep)
+        panel.truth.changed.connect(self.judge_again)
+        panel.truth.indenters_wanted.connect(self.indenters_wanted)
+        panel.truth.limits_wanted.connect(self.limits_wanted)
+
+    # Called by the page
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The calibration used for measuring. None if there is none."""
+        return None if self._best is None else self._best.calibration
+
+    def enter(self) -> None:
+        """Show the source through the calibration in use."""
+        self._want()
+        self.depth.enter()
+        self.show_validated()
+        self._refresh()
+
+    def leave(self) -> None:
+        """Release the source. A frozen image stays."""
+        self.keep_layout()
+        self.live.enter(False)
+
+    def close_work(self) -> None:
+        """End every thread. Those of the reconstructors end with them."""
+        self.work.close()
+        self._best = self._shown = None
+        self.depth.finish()
+        self.details.finish()
+
+    def _want(self) -> None:
+        """Compute from live frames only what is visible."""
+        details = self.details
+        self.depth.want(
+            Wanted(height=True, surface=details.wants_surface, camera=details.wants_camera)
+        )
+
+    def open_file(self, path: Path) -> None:
+        """Measure on an image, or play a recording as the camera.
+
+        Raises
+        ------
+        InputError
+            If it is neither.
+        """
+        if path.suffix.lower() == RECORDING:
+            self.context.source.choose_recording(path)
+            self.release()
+            return
+        if path.suffix.lower() not in IMAGES:
+            raise InputError(
+                tr("The file is neither an image nor a recording"),
+                where=str(path),
+                advice=tr("Open a PNG or TIFF image of the calibrated sensor"),
+            )
+        self.context.settings.keep_folder("press", path.parent)
+        self._take(MeasuredImage(path.name, path=path))
+
+    def choose_file(self) -> None:
+        """Let the user choose an image or a recording."""
+        endings = " ".join(f"*{ending}" for ending in (*IMAGES, RECORDING))
+        chosen, _ = QFileDialog.getOpenFileName(
+            self,
+            tr("Open an image or a recording"),
+            str(self.context.settings.folder("press")),
+            tr("Images and recordings ({endings})").format(endings=endings),
+        )
+        if chosen:
+            self._try_file(Path(chosen))
+
+    def _try_file(self, path: Path) -> None:
+        try:
+            self.open_file(path)
+        except InputError as error:
+            self.context.toasts.show(str(error), "fail")
+
+    # Live and frozen
+
+    def toggle_hold(self) -> None:
+        """Freeze the image, or continue."""
+        if self.work.image is None:
+            self.hold()
+        else:
+            self.release()
+
+    def hold(self, by_hand: bool = True) -> None:
+        """Freeze the shown image to measure on it."""
+        shown = self._shown
+        if self.work.image is None and shown is not None:
+            now = datetime.now().astimezone()
+            name = tr("{camera}, {time:%H:%M:%S}").format(camera=self._camera(), time=now)
+            image = MeasuredImage(name, frame=shown.frame, serial=self.live.serial)
+            self._take(image, propose=not by_hand)
+        self._follow_hold()
+
+    def release(self) -> None:
+        """Continue with the live image."""
+        self._steady.hold_off()
+        self.work.take(None)
+        self.live.pause(False)
+        self._follow_hold()
+        if self.live.stream is None or not self.map.view.has_image:
+            self._say_what_comes()
+
+    def _take(self, image: MeasuredImage, *, propose: bool = False) -> None:
+        self.live.pause(True)
+        self._refused = ""
+        self.panel.say_kept("")
+        self.panel.truth.new_press()
+        self.work.take(image, propose=propose)
+        if image.path is not None:
+            self._say_what_comes()
+        self._follow_hold()
+
+    def _say_what_comes(self) -> None:
+        """Show a text instead of the map."""
+        image = self.work.image
+        if image is None or self._best is None:
+            self.map.say(tr("No depth yet."))
+        else:
+            self.map.say(tr("Reconstructing {name}…").format(name=image.name))
+
+    def _follow_hold(self) -> None:
+        held = self.work.image is not None
+        self.hold_action.setChecked(held)
+        self.hold_action.setText(tr("Frozen") if held else tr("Freeze"))
+        self._refresh()
+
+    def _on_live(self, shown: Shown) -> None:
+        if self.work.image is not None:
+            return
+        self.map.show_live(shown, Display())
+        self.details.show_live(shown)
+        heightmap = shown.heightmap
+        could, self._shown = self._can_hold, None if heightmap is None else shown
+        if could != self._can_hold:
+            self._refresh()
+        if heightmap is None:
+            return
+        frame = shown.frame
+        steady = self._steady.update(heightmap.depth_mm, frame.time_s, settled=frame.settled)
+        if steady and self.auto.isChecked():
+            self.hold(by_hand=False)
+
+    def _camera(self) -> str:
+        info = self.context.source.info
+        return tr("image") if info is None else info.name
+
+    # Measuring
+
+    def propose(self) -> None:
+        """Detect the pressed object."""
+        if self.work.image is None:
+            self.hold(by_hand=False)
+        else:
+            self.work.propose()
+
+    def keep(self) -> None:
+        """Save the result of the chosen tool to the records."""
+        result, heightmap = self.work.result, self.work.heightmap
+        best = self._best
+        if result is None or heightmap is None or best is None:
+            return
+        kept = Kept(
+            result=result,
+            judged=self.judged(),
+            stated=self.panel.truth.stated,
+            limits=self.context.settings.limits,
+            heightmap=heightmap,
+            serial=best.calibration.sensor.serial,
+            operator=self.panel.operator.text().strip(),
+            note=self.panel.note.text().strip(),
+        )
+        self.kept.emit(kept)
+
+    def judged(self) -> tuple[Judged, ...]:
+        """Return the comparison of the chosen tool's result with the true values."""
+        result = self.work.result
+        if result is None:
+            return ()
+        return judge(result, self.panel.truth.stated, self.context.settings.limits)
+
+    def judge_again(self) -> None:
+        """Compare with the true values again after they, the result or the limits changed."""
+        try:
+            rows = self.judged()
+        except InputError as error:
+            self.panel.truth.show_refusal(str(error))
+            return
+        self.panel.truth.show_verdict(rows, self.work.result)
+
+    def _refresh(self) -> None:
+        known = self.work.heightmap is not None or self._can_hold
+        self.panel.show_work(self.work, known=known)
+        self._show_details()
+        self.map.tools.allow(known)
+        self.hold_action.setEnabled(self.work.image is not None or self._can_hold)
+        self.judge_again()
+        self._advise()
+
+    def _show_details(self) -> None:
+        self.details.show_answer(self.work.answer)
+        self.details.show_result(self.work.tool, self.work.result)
+
+    def _on_switched(self) -> None:
+        self.replay.follow(self.live.source)
+        self.follow_bench()
+
+    def _on_replayed(self) -> None:
+        """Show another frame of the recording instead of the frozen one."""
+        if self.work.image is not None:
+            self.release()
+
+    @property
+    def _can_hold(self) -> bool:
+        return self._shown is not None
+
+    def _on_proposed(self, proposal: Proposal | None) -> None:
+        if proposal is None:
+            text = tr("No ball, cylinder or cuboid was found. Press one, or use the other tools.")
+            self.context.toasts.show(text)
+        elif len(proposal.candidates) > 1:
+            names = tr(" and ").join(proposal.candidates)
+            text = tr(
+                "The object is not unique: {names} fit equally well. Choose the correct tool."
+            )
+            self.context.toasts.show(text.format(names=names), "warn")
+
+    def _on_refused(self, sentence: str) -> None:
+        self._refused = sentence
+        self.map.say(tr("This image cannot be measured."))
+        self._advise()
+
+    # The calibration and the source
+
+    def _use(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
+        """Measure with another calibration. Live only if it fits the images."""
+        self._best = best
+        self._refused, self._shown = "", None
+        # Before the tools are redrawn: it gives their position in the camera image.
+        self.details.use(None if best is None else best.calibration)
+        self.work.use(best)
+        self._say_what_comes()
+        self.show_validated()
+        self.depth.choose(live, best)
+        self._refresh()
+
+    def _on_source(self) -> None:
+        self._shown = None
+        if self.work.image is None:
+            self.map.say(tr("No depth yet."))
+
+    # Advice
+
+    def _advise(self) -> None:
+        """Show what to do next."""
+        held = self.work.image is not None
+        heightmap = self.work.heightmap if held else None
+        notes = () if heightmap is None else heightmap.notes
+        self.banner.advise(
+            measuring_advice(self.depth.state, held=held, refused=self._refused, notes=notes)
+        )
+
+    def _on_act(self, name: str) -> None:
+        match name:
+            case "live":
+                self.release()
+            case "zero":
+                self.zero.set_zero()
+            case _:
+                self.depth.act(name)

@@ -1,0 +1,1 @@
+"""What every page of the window uses: settings, log, messages, background jobs."""

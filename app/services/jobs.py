@@ -1,0 +1,237 @@
+"""Long work in one background thread, one job after the other."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from app.sources.stopping import join
+from gelpolight_core.calibration.project import Cancelled
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+_LOG = logging.getLogger(__name__)
+POLL_MS = 50
+# Longest time for work that cannot be cancelled at once, such as one step of a computation or
+# writing an image to a slow disk.
+CLOSE_S = 10.0
+
+
+@dataclass
+class Job:
+    """One piece of work.
+
+    Attributes
+    ----------
+    title : str
+        Shown while the job runs.
+    work : callable
+        Gets a function that reports progress (0 to 1). That function also stops the work if the
+        job was cancelled.
+    done : callable
+        Called in the GUI thread with the return value of `work`.
+    failed : callable or None
+        Called in the GUI thread with a sentence if the job fails. None: emit Jobs.refused.
+    stopped : callable or None
+        Called in the GUI thread with a sentence if the job is cancelled, while it runs or before
+        it starts. None: emit Jobs.refused, only if it was running. Not called after Jobs are
+        closed.
+    ended : callable
+        Called in the GUI thread before any of these, whatever the result. Not called after Jobs
+        are closed.
+    must : bool
+        Whether the job also runs when all others are cancelled.
+    over : bool
+        Whether the job has ended and its result was delivered or dropped. It then holds no data.
+    """
+
+    title: str
+    work: Callable[[Callable[[float], None]], Any]
+    done: Callable[[Any], None] = field(default=lambda _result: None)
+    failed: Callable[[str], None] | None = None
+    stopped: Callable[[str], None] | None = None
+    ended: Callable[[], object] = field(default=lambda: None)
+    must: bool = False
+    over: bool = False
+    share: float = 0.0
+    future: Future[Any] | None = None
+    cancel: threading.Event = field(default_factory=threading.Event)
+
+
+class Jobs(QObject):
+    """Runs jobs in order and reports their progress in the GUI thread.
+
+    Parameters
+    ----------
+    name : str
+        Name of the thread.
+    parent : QObject, optional
+        Owner.
+
+    Signals
+    -------
+    progressed(str, float)
+        Title and progress (0 to 1) of the running job. An empty title: no job is running.
+    refused(str)
+        A sentence: why a job failed.
+    """
+
+    progressed = Signal(str, float)
+    refused = Signal(str)
+
+    def __init__(self, name: str, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._name = name
+        self._thread: threading.Thread | None = None
+        self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._waiting: deque[Job] = deque()
+        self._timer = QTimer(self)
+        self._timer.setInterval(POLL_MS)
+        self._timer.timeout.connect(self._poll)
+        self._progress = ("", 0.0)
+
+    @property
+    def busy(self) -> bool:
+        """Whether a job is running or waiting."""
+        return bool(self._waiting)
+
+    def submit(self, job: Job) -> None:
+        """Add a job to the end of the queue."""
+        job.future = Future()
+        self._waiting.append(job)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+            self._thread.start()
+        self._queue.put(job)
+        self._timer.start()
+        self._say()
+
+    def cancel(self) -> None:
+        """Stop the running job at its next step and drop the waiting ones."""
+        for job in self._waiting:
+            if job.must:
+                continue
+            job.cancel.set()
+            if job.future is not None:
+                job.future.cancel()
+
+    def close(self, timeout_s: float = CLOSE_S) -> bool:
+        """Cancel all jobs that may be cancelled and end the thread after the others.
+
+        Only lost work is reported. Return whether the thread has ended; a hanging one is abandoned.
+        """
+        self.cancel()
+        self._timer.stop()
+        kept = [job for job in self._waiting if job.must]
+        self._waiting.clear()
+        thread, self._thread = self._thread, None
+        if thread is None:
+            return True
+        self._queue.put(None)
+        ended = join(thread, timeout_s)
+        for job in kept:
+            self._tell_lost(job)
+        return ended
+
+    def _tell_lost(self, job: Job) -> None:
+        """Report a job that had to run and has not finished."""
+        assert job.future is not None
+        if not job.future.done():  # it continues as long as the program runs
+            _LOG.error("%s had not finished when the page closed", job.title)
+            job.future.add_done_callback(partial(_log_late, job.title))
+            sentence = tr("{title}: not finished yet. Keep the program running for a while")
+            self.refused.emit(sentence.format(title=job.title))
+            return
+        future, job.future, job.over = job.future, None, True
+        if (error := future.exception()) is not None:
+            self._tell_failure(job, error)
+
+    def _work(self) -> None:
+        """Run the jobs in order, in the thread."""
+        while (job := self._queue.get()) is not None:
+            self._do(job)
+            del job  # otherwise the thread would keep the result until the next job
+
+    def _do(self, job: Job) -> None:
+        future = job.future
+        if future is None or not future.set_running_or_notify_cancel():
+            return
+        try:
+            future.set_result(job.work(partial(self._tell, job)))
+        except BaseException as error:  # passed to the GUI thread, which reports it
+            future.set_exception(error)
+        finally:
+            # The traceback refers to this frame. Together with the objects of the work this would
+            # be a reference cycle that stays until the garbage collector runs.
+            del future, job
+
+    def _tell(self, job: Job, share: float) -> None:
+        """Store the progress. Called in the worker thread."""
+        if job.cancel.is_set():
+            raise Cancelled
+        job.share = share
+
+    def _poll(self) -> None:
+        while self._waiting and self._waiting[0].future is not None:
+            job = self._waiting[0]
+            assert job.future is not None
+            if not job.future.done():
+                break
+            self._waiting.popleft()
+            self._finish(job)
+        self._say()
+        if not self._waiting:
+            self._timer.stop()
+
+    def _finish(self, job: Job) -> None:
+        # If `done` refers to its job, keeping the result there would make a reference cycle.
+        future, job.future, job.over = job.future, None, True
+        assert future is not None
+        job.ended()
+        if future.cancelled():
+            if job.stopped is not None:
+                job.stopped(_stopped(job))
+            return
+        error = future.exception()
+        if error is None:
+            job.done(future.result())
+        else:
+            self._tell_failure(job, error)
+
+    def _tell_failure(self, job: Job, error: BaseException) -> None:
+        if isinstance(error, Cancelled):
+            (job.stopped or self.refused.emit)(_stopped(job))
+        elif isinstance(error, InputError):
+            (job.failed or self.refused.emit)(str(error))
+        else:
+            _LOG.error("%s failed", job.title, exc_info=error)
+            self.refused.emit(
+                tr("{title}: internal error ({kind}). See the log for details").format(
+                    title=job.title, kind=type(error).__name__
+                )
+            )
+
+    def _say(self) -> None:
+        progress = (self._waiting[0].title, self._waiting[0].share) if self._waiting else ("", 0.0)
+        if progress != self._progress:
+            self._progress = progress
+            self.progressed.emit(*progress)
+
+
+def _stopped(job: Job) -> str:
+    return tr("{title}: stopped").format(title=job.title)
+
+
+def _log_late(title: str, future: Future[Any]) -> None:
+    """Log the end of a job that nothing waits for any more, in the thread that ends it."""
+    if not future.cancelled() and (error := future.exception()) is not None:
+        _LOG.error("%s failed after it was closed", title, exc_info=error)

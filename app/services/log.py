@@ -1,0 +1,136 @@
+"""The log: a file of limited size, and the latest records for the log window."""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import logging
+import tempfile
+from collections import deque
+from dataclasses import dataclass
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from typing import TextIO
+
+import platformdirs
+
+from gelpolight_core import __version__
+
+NAME = "gelpolight.log"
+CRASHES = "gelpolight-crash.log"
+FILE_BYTES = 1_000_000
+FILES = 5
+KEPT = 5000
+OURS = ("app", "gelpolight_core")
+LINE = "%(asctime)s %(levelname)-7s %(threadName)s %(name)s: %(message)s"
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One line of the log, with its sequence number."""
+
+    number: int
+    level: int
+    text: str
+
+
+def worth_keeping(record: logging.LogRecord) -> bool:
+    """Return whether to keep a record: all of ours, but only warnings and errors of libraries."""
+    return record.levelno >= logging.WARNING or record.name.partition(".")[0] in OURS
+
+
+class RecentRecords(logging.Handler):
+    """Keeps the latest records. It may be read from any thread."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.DEBUG)
+        self.setFormatter(logging.Formatter(LINE))
+        self._records: deque[Record] = deque(maxlen=KEPT)
+        self._count = 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a record. Called while the handler holds its lock."""
+        self._count += 1
+        self._records.append(Record(self._count, record.levelno, self.format(record)))
+
+    def since(self, number: int) -> tuple[Record, ...]:
+        """Return the kept records after the given number."""
+        self.acquire()
+        try:
+            return tuple(r for r in self._records if r.number > number)
+        finally:
+            self.release()
+
+
+class Log:
+    """The log of one run of the program.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Folder of the log files. Default: the user's log folder, or the temporary folder if that is
+        not writable.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.recent = RecentRecords()
+        self.folder, self._file = _open_file(folder)
+        self._crashes: TextIO | None = None
+        self._level_before = logging.WARNING
+
+    def start(self) -> str:
+        """Start logging, and return the crash report that the last run left, if any."""
+        root = logging.getLogger()
+        self._level_before = root.level
+        root.setLevel(logging.INFO)
+        for handler in (self.recent, self._file):
+            handler.addFilter(worth_keeping)
+            root.addHandler(handler)
+        logging.captureWarnings(True)
+        crash = self.folder / CRASHES
+        left = ""
+        try:
+            left = crash.read_text("utf-8", "replace") if crash.is_file() else ""
+            # A crash inside a library cannot be caught, but its stack can be written to a file.
+            self._crashes = crash.open("w", encoding="utf-8")
+            faulthandler.enable(self._crashes)
+        except OSError as error:  # the program runs without it
+            logging.getLogger(__name__).warning("Crash reports are off: %s", error)
+        if left:
+            logging.getLogger(__name__).error("The last run crashed:\n%s", left)
+        logging.getLogger(__name__).info("GelPoLight Studio %s starts", __version__)
+        return left
+
+    def stop(self) -> None:
+        """Close the log."""
+        root = logging.getLogger()
+        logging.captureWarnings(False)
+        root.removeHandler(self.recent)
+        root.removeHandler(self._file)
+        root.setLevel(self._level_before)
+        with contextlib.suppress(OSError):  # a full disk was already reported
+            self._file.close()
+        if self._crashes is not None:
+            faulthandler.disable()
+            self._crashes.close()
+            self._crashes = None
+
+
+def _open_file(folder: Path | None) -> tuple[Path, logging.Handler]:
+    wanted = folder or platformdirs.user_log_path("gelpolight")
+    # If the disk is full or the home folder is read-only, use the temporary folder, or no file.
+    with contextlib.suppress(OSError):
+        return wanted, _handler(wanted)
+    with contextlib.suppress(OSError):
+        spare = Path(tempfile.mkdtemp(prefix="gelpolight-log-"))
+        return spare, _handler(spare)
+    return wanted, logging.NullHandler()
+
+
+def _handler(folder: Path) -> RotatingFileHandler:
+    folder.mkdir(parents=True, exist_ok=True)
+    handler = RotatingFileHandler(
+        folder / NAME, maxBytes=FILE_BYTES, backupCount=FILES, encoding="utf-8"
+    )
+    handler.setFormatter(logging.Formatter(LINE))
+    return handler

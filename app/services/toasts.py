@@ -1,0 +1,299 @@
+"""Messages that appear, can be read and disappear without blocking the user."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.theme import theme
+from app.theme.icons import icon
+from app.widgets.label import PlainLabel
+from app.widgets.naming import named
+from app.widgets.native import give_own_window, native_windows
+from gelpolight_core.translation import tr
+
+log = logging.getLogger(__name__)
+
+MOST = 4
+HISTORY = 200
+MARGIN = 12
+WIDTH = 420
+# Allows half the speed of a slow reader (180 words a minute), and a minimum time.
+LEAST_MS = 5000
+MS_A_WORD = 650
+ICONS = {"info": ("info", "accent"), "pass": ("pass", "pass"), "warn": ("warn", "warn")}
+ICONS["fail"] = ("fail", "fail")
+LEVELS = {"info": logging.INFO, "pass": logging.INFO, "warn": logging.WARNING}
+WORDS = {"info": tr("Note"), "pass": tr("Done"), "warn": tr("Warning"), "fail": tr("Error")}
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """A message in the history.
+
+    Attributes
+    ----------
+    when : datetime
+        Local time of the message, or of its last repetition.
+    kind : str
+        ``info``, ``pass``, ``warn`` or ``fail``.
+    text : str
+        The message.
+    times : int
+        How often it was shown in succession.
+    """
+
+    when: datetime
+    kind: str
+    text: str
+    times: int = 1
+
+
+class Toast(QWidget):
+    """One message with its buttons."""
+
+    gone = Signal()
+
+    def __init__(
+        self, parent: QWidget, text: str, kind: str, actions: tuple[tuple[str, Callable], ...]
+    ) -> None:
+        super().__init__(parent)
+        self.text = text
+        self.kind = kind
+        self.times = 1
+        named(self, "toast", f"{WORDS[kind]}: {text}")
+        give_own_window(self)  # over the 3D view, which has a native window
+        self._label = PlainLabel(text, self)
+        self._label.setWordWrap(True)
+        self._label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._label.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        sign = PlainLabel(parent=self)
+        self._label.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
+        sign.setPixmap(icon(*ICONS[kind]).pixmap(22, 22))
+        sign.setAlignment(Qt.AlignmentFlag.AlignTop)
+        close = named(QToolButton(self), "toast.close", tr("Close this message"), tr("Close"))
+        close.setIcon(icon("close"))
+        close.setAutoRaise(True)
+        close.clicked.connect(self.dismiss)
+        top = QHBoxLayout()
+        top.addWidget(sign)
+        top.addWidget(self._label, 1)
+        top.addWidget(close, 0, Qt.AlignmentFlag.AlignTop)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 10, 8, 10)
+        layout.addLayout(top)
+        if actions:
+            row = QHBoxLayout()
+            row.addStretch(1)
+            for i, (label, act) in enumerate(actions):
+                button = named(QPushButton(label, self), f"toast.action{i}", label)
+                button.clicked.connect(act)
+                button.clicked.connect(self.dismiss)
+                row.addWidget(button)
+            layout.addLayout(row)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.timeout.connect(self.dismiss)
+        self._restart()
+
+    def height_for(self, width: int) -> int:
+        """Return the height that the message needs at a given width."""
+        layout = self.layout()
+        layout.activate()
+        return (
+            layout.totalHeightForWidth(width)
+            if layout.hasHeightForWidth()
+            else (layout.totalSizeHint().height())
+        )
+
+    def again(self) -> None:
+        """Count a repeated message instead of showing it twice."""
+        self.times += 1
+        self._label.setText(f"{self.text}  ({self.times}x)")
+        self._restart()
+
+    def _restart(self) -> None:
+        # An error stays until it is closed: the user may be at the sensor, not at the screen.
+        if self.kind != "fail":
+            self._timer.start(max(LEAST_MS, MS_A_WORD * len(self.text.split())))
+
+    def dismiss(self) -> None:
+        """Close and disappear."""
+        self._timer.stop()
+        self.gone.emit()
+        self.hide()
+        self.deleteLater()
+
+    def enterEvent(self, event: QEvent) -> None:
+        """Stay while the user reads it."""
+        self._timer.stop()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        """Restart the countdown."""
+        self._restart()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw a rectangle with an edge in the colour of the message kind."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(QColor(theme.colour("line")), 1))
+        painter.setBrush(theme.colour("base"))
+        painter.drawRoundedRect(self.rect().adjusted(0, 0, -1, -1), 6, 6)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(theme.colour(ICONS[self.kind][1]))
+        painter.drawRect(0, 6, 4, self.height() - 12)
+
+
+class Toasts(QObject):
+    """The messages in the lower right corner of a window, above everything else, and their history.
+
+    Signals
+    -------
+    history_changed()
+        A message was added to the history.
+    """
+
+    history_changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._host: QWidget | None = None
+        self._over: QWidget | None = None
+        self._shown: list[Toast] = []
+        self._history: deque[Notice] = deque(maxlen=HISTORY)
+        self._show_log: Callable[[], None] | None = None
+        # A native window that appears later would cover the messages.
+        native_windows.appeared.connect(self._raise_all)
+
+    def attach(
+        self, host: QWidget, show_log: Callable[[], None], *, over: QWidget | None = None
+    ) -> None:
+        """Show the messages as children of a window.
+
+        Parameters
+        ----------
+        host : QWidget
+            The window. Whatever changes inside its other children stays below the messages.
+        show_log : callable
+            Opens the log.
+        over : QWidget, optional
+            The part of the window whose corner they use. Default: all of it.
+        """
+        self._host, self._over = host, over or host
+        self._show_log = show_log
+        self._over.installEventFilter(self)
+        host.destroyed.connect(self._detach)
+
+    def show(
+        self,
+        text: str,
+        kind: str = "info",
+        *,
+        actions: tuple[tuple[str, Callable[[], object]], ...] = (),
+        with_log: bool = False,
+    ) -> None:
+        """Show a message, and write it to the log and to the history.
+
+        Parameters
+        ----------
+        text : str
+            One or two sentences.
+        kind : str
+            ``info``, ``pass``, ``warn`` or ``fail``. The last one stays until it is closed.
+        actions : tuple of (label, callable)
+            Buttons, such as "Undo".
+        with_log : bool
+            Whether a button opens the log.
+        """
+        log.log(LEVELS.get(kind, logging.ERROR), "%s", text)
+        self._remember(text, kind)
+        if self._host is None:
+            return
+        for toast in self.shown():
+            if (toast.text, toast.kind) == (text, kind) and not actions:
+                toast.again()
+                self._arrange()
+                return
+        if with_log and self._show_log is not None:
+            actions = (*actions, (tr("Show log"), self._show_log))
+        toast = Toast(self._host, text, kind, actions)
+        toast.gone.connect(lambda: self._forget(toast))
+        self._shown.append(toast)
+        for old in self._shown[:-MOST]:
+            old.dismiss()
+        toast.show()
+        self._arrange()
+
+    def shown(self) -> list[Toast]:
+        """Return the visible messages, oldest first."""
+        return list(self._shown)
+
+    @property
+    def history(self) -> tuple[Notice, ...]:
+        """The last messages of this run, oldest first."""
+        return tuple(self._history)
+
+    def _remember(self, text: str, kind: str) -> None:
+        notice = Notice(datetime.now().astimezone(), kind, text)
+        last = self._history[-1] if self._history else None
+        if last is not None and (last.text, last.kind) == (text, kind):
+            notice = replace(notice, times=last.times + 1)
+            self._history.pop()
+        self._history.append(notice)
+        self.history_changed.emit()
+
+    def _detach(self) -> None:
+        self._host = self._over = None
+        self._shown.clear()
+
+    def _forget(self, toast: Toast) -> None:
+        if toast in self._shown:
+            self._shown.remove(toast)
+            self._arrange()
+
+    def clear(self) -> None:
+        """Close all messages. They stay in the history."""
+        for toast in self.shown():
+            toast.dismiss()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Follow the size and position of the part of the window that is used."""
+        if event.type() in (QEvent.Type.Resize, QEvent.Type.Move):
+            self._arrange()
+        return False
+
+    def _arrange(self) -> None:
+        if self._host is None or self._over is None:
+            return
+        corner = self._over.mapTo(self._host, QPoint())
+        area = QRect(corner, self._over.size()).adjusted(MARGIN, MARGIN, -MARGIN, -MARGIN)
+        width = min(WIDTH, area.width())
+        bottom = area.bottom() + 1
+        for toast in reversed(self.shown()):
+            height = toast.height_for(width)
+            bottom -= height
+            toast.setGeometry(area.right() + 1 - width, bottom, width, height)
+            bottom -= 8
+        self._raise_all()
+
+    def _raise_all(self) -> None:
+        for toast in self._shown:
+            toast.raise_()
+            # Qt does nothing if the widget is already the last child; the window system's order of
+            # native windows is another one.
+            if toast.windowHandle() is not None:
+                toast.windowHandle().raise_()

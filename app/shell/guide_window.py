@@ -1,0 +1,141 @@
+"""A window with the guide, which is part of every installation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QImage, QTextCursor, QTextDocument
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QSplitter,
+    QTextBrowser,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+# In the order in which they are read.
+PAGES = (
+    ("index", tr("Overview")),
+    ("guide/first-start", tr("First start")),
+    ("guide/what-you-need", tr("What you need")),
+    ("guide/cameras", tr("Cameras")),
+    ("guide/calibrate", tr("Calibrate")),
+    ("guide/validate", tr("Validate")),
+    ("guide/inspect", tr("Inspect")),
+    ("guide/measure", tr("Measure")),
+    ("guide/keeping-it-true", tr("Keeping it true")),
+    ("closed-sensors", tr("Closed sensors")),
+    ("quality-figures", tr("Quality figures")),
+    ("health", tr("Faults of an image")),
+    ("troubleshooting", tr("Troubleshooting")),
+)
+# What each page of the program is described in.
+OF_PAGE = {
+    "start": "guide/first-start",
+    "sensors": "guide/validate",
+    "calibrate": "guide/calibrate",
+    "inspect": "guide/inspect",
+    "measure": "guide/measure",
+}
+EDGE_PX = 40
+
+
+class GuideText(QTextBrowser):
+    """Shows a Markdown page. Its images are not wider than the window."""
+
+    def loadResource(self, kind: int, name: QUrl) -> Any:
+        """Return a page or a scaled image."""
+        if kind == QTextDocument.ResourceType.ImageResource.value:
+            image = QImage(self.source().resolved(name).toLocalFile())
+            width = max(self.viewport().width() - EDGE_PX, 200)
+            if image.width() > width:
+                image = image.scaledToWidth(width, Qt.TransformationMode.SmoothTransformation)
+            return image
+        return super().loadResource(kind, name)
+
+    def doSetSource(self, name: QUrl, kind: Any) -> None:
+        """Show a page of the guide. Anything else is shown by the web browser."""
+        if not name.isLocalFile() and not name.isRelative():
+            QDesktopServices.openUrl(name)
+            return
+        super().doSetSource(name, kind)
+
+    def show_heading(self, words: str) -> bool:
+        """Scroll to the first heading that contains some words. Return whether there is one."""
+        block = self.document().begin()
+        while block.isValid():
+            if block.blockFormat().headingLevel() and words.casefold() in block.text().casefold():
+                cursor = QTextCursor(block)
+                self.setTextCursor(cursor)
+                place = self.document().documentLayout().blockBoundingRect(block).top()
+                self.verticalScrollBar().setValue(round(place))
+                return True
+            block = block.next()
+        return False
+
+
+class GuideWindow(QDialog):
+    """The guide, with a list of its pages.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder with the Markdown pages.
+    parent : QWidget, optional
+        The main window.
+    """
+
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        named(self, "guide", tr("Guide"))
+        self.setWindowTitle(tr("Guide"))
+        self.resize(980, 720)
+        self._folder = folder
+        self.list = named(QListWidget(self), "guide.pages", tr("Pages of the guide"))
+        for name, title in PAGES:
+            if self._path(name).is_file():
+                item = QListWidgetItem(title)
+                item.setData(Qt.ItemDataRole.UserRole, name)
+                self.list.addItem(item)
+        self.list.setMaximumWidth(220)
+        self.list.itemClicked.connect(lambda i: self.show_page(i.data(Qt.ItemDataRole.UserRole)))
+        self.list.itemActivated.connect(lambda i: self.show_page(i.data(Qt.ItemDataRole.UserRole)))
+        self.text = named(GuideText(self), "guide.text", tr("Guide"))
+        self.text.setOpenExternalLinks(False)
+        back = named(QPushButton(tr("Back"), self), "guide.back", tr("Back"))
+        back.setEnabled(False)
+        back.setAutoDefault(False)
+        back.clicked.connect(self.text.backward)
+        self.text.backwardAvailable.connect(back.setEnabled)
+        split = QSplitter(self)
+        split.addWidget(self.list)
+        split.addWidget(self.text)
+        split.setStretchFactor(1, 1)
+        split.setChildrenCollapsible(False)
+        row = QHBoxLayout()
+        row.addWidget(back)
+        row.addStretch(1)
+        column = QVBoxLayout(self)
+        column.addLayout(row)
+        column.addWidget(split, 1)
+
+    def show_page(self, name: str, heading: str = "") -> None:
+        """Show a page, at a heading if one is given."""
+        self.text.setSource(QUrl.fromLocalFile(str(self._path(name))))
+        for row in range(self.list.count()):
+            if self.list.item(row).data(Qt.ItemDataRole.UserRole) == name:
+                self.list.setCurrentRow(row)
+        if heading:
+            self.text.show_heading(heading)
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{name}.md"

@@ -1,0 +1,125 @@
+"""The messages of this run: a button in the status bar that counts the new ones, and their list."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtGui import QHideEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.services.toasts import ICONS, WORDS, Toasts
+from app.theme.icons import icon
+from app.widgets.label import PlainLabel
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+SIZE = QSize(480, 360)
+# From the least to the most important.
+ORDER = ("pass", "info", "warn", "fail")
+
+
+class NotificationsButton(QToolButton):
+    """Shows how many messages are new, with the sign of the most important one.
+
+    Parameters
+    ----------
+    toasts : Toasts
+        The messages.
+    show_log : callable
+        Opens the log.
+    """
+
+    def __init__(
+        self, toasts: Toasts, show_log: Callable[[], None], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        named(self, "main.notifications", tr("Notifications"), tr("Messages of this run"))
+        self.setAutoRaise(True)
+        self.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._toasts, self._show_log = toasts, show_log
+        self._new: list[str] = []
+        toasts.history_changed.connect(self._on_message)
+        self.clicked.connect(self.show_list)
+        self._show()
+
+    def show_list(self) -> NotificationList:
+        """Show the list of messages above the button. All of them count as read."""
+        self._new.clear()
+        self._show()
+        panel = NotificationList(self._toasts, self._show_log, self)
+        panel.resize(SIZE.boundedTo(self.window().size()))
+        corner = self.mapToGlobal(QPoint(self.width(), 0))
+        panel.move(corner - QPoint(panel.width(), panel.height() + 4))
+        panel.show()
+        panel.list.setFocus()
+        return panel
+
+    def _on_message(self) -> None:
+        self._new.append(self._toasts.history[-1].kind)
+        self._show()
+
+    def _show(self) -> None:
+        worst = max(self._new, key=ORDER.index, default="")
+        self.setIcon(icon(*ICONS[worst]) if worst else icon("info"))
+        self.setText(str(len(self._new)) if self._new else "")
+        text = tr("Notifications: {n} new").format(n=len(self._new))
+        self.setAccessibleName(text if self._new else tr("Notifications"))
+
+
+class NotificationList(QFrame):
+    """A list of messages, newest first, that closes when something else is clicked."""
+
+    def __init__(self, toasts: Toasts, show_log: Callable[[], None], parent: QWidget) -> None:
+        super().__init__(parent, Qt.WindowType.Popup)
+        named(self, "notifications", tr("Notifications"))
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setFrameShape(QFrame.Shape.StyledPanel)
+        self.list = named(QListWidget(self), "notifications.list", tr("Messages, newest first"))
+        self.list.setWordWrap(True)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.list.setSelectionMode(QListWidget.SelectionMode.NoSelection)
+        for notice in reversed(toasts.history):
+            times = f"  ({notice.times}x)" if notice.times > 1 else ""
+            item = QListWidgetItem(
+                icon(*ICONS[notice.kind]), f"{notice.when:%H:%M:%S}  {notice.text}{times}"
+            )
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{WORDS[notice.kind]}: {notice.text}")
+            self.list.addItem(item)
+        empty = PlainLabel(tr("No messages in this run"), self)
+        empty.setVisible(not toasts.history)
+        self.list.setVisible(bool(toasts.history))
+        close = named(
+            QPushButton(tr("Close visible messages"), self),
+            "notifications.clear",
+            tr("Close visible messages"),
+        )
+        close.setEnabled(bool(toasts.shown()))
+        close.clicked.connect(toasts.clear)
+        log = named(QPushButton(icon("log"), tr("Show log"), self), "notifications.log", tr("Log"))
+        log.clicked.connect(show_log)
+        for button in (close, log):
+            button.clicked.connect(self.close)
+        row = QHBoxLayout()
+        row.addStretch(1)
+        row.addWidget(close)
+        row.addWidget(log)
+        column = QVBoxLayout(self)
+        column.addWidget(empty, 1, Qt.AlignmentFlag.AlignCenter)
+        column.addWidget(self.list, 1)
+        column.addLayout(row)
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Go away for good: it is made again when it is asked for."""
+        super().hideEvent(event)
+        self.deleteLater()

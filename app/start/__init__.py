@@ -1,0 +1,1 @@
+"""The Start page: continue the last work, or begin new work."""

@@ -1,0 +1,182 @@
+"""The Start page: continue the last session, use the last calibration, or begin something new."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from PySide6.QtCore import Qt, SignalInstance
+from PySide6.QtGui import QImageReader, QPixmap
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from app.context.context import AppContext
+from app.start.card import PICTURE, Card
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import make_bold
+from app.widgets.naming import named
+from app.workspace.entries import Entry
+from app.workspace.sessions import SessionEntry, unfinished
+from gelpolight_core.calibration.titles import stage_title
+from gelpolight_core.errors import InputError
+from gelpolight_core.quality import verdict_word
+from gelpolight_core.translation import tr
+
+WIDTH = 620
+# Larger images are not decoded here: the window must be up at once.
+MOST_BYTES = 40_000_000
+
+
+class StartPage(QWidget):
+    """Offers what a technician does first.
+
+    Parameters
+    ----------
+    context : AppContext
+        Shared by all pages.
+    """
+
+    def __init__(self, *, context: AppContext) -> None:
+        super().__init__()
+        named(self, "home", tr("Start"))
+        self._context = context
+        self._session: SessionEntry | None = None
+        self._calibration: Entry | None = None
+        requests = context.requests
+        title = PlainLabel(tr("What do you want to do?"), self)
+        make_bold(title, size=1.5)
+        self.go_on = Card("home.continue", tr("&Continue the calibration"), "calibrate", self)
+        self.go_on.clicked.connect(self._continue)
+        self.use = Card("home.inspect", tr("&Inspect with the calibration"), "inspect", self)
+        self.use.clicked.connect(self._inspect)
+        self.new = self._card("home.new", tr("Calibrate a &new sensor"), "add", requests.new_sensor)
+        self.new.say(tr("From its camera, step by step"))
+        self.open = self._card("home.open", tr("&Open files…"), "folder", requests.open_files)
+        self.open.say(tr("A session, a calibration or a recording"))
+        self.demo = self._card(
+            "home.demo", tr("&Try the virtual sensor"), "demo", requests.begin_demo
+        )
+        self.demo.say(tr("All functions, without a camera"))
+        middle = QWidget(self)
+        middle.setMaximumWidth(WIDTH)
+        column = QVBoxLayout(middle)
+        column.setSpacing(10)
+        column.addStretch(1)
+        column.addWidget(title)
+        column.addSpacing(8)
+        for card in (self.go_on, self.use, self.new, self.open, self.demo):
+            column.addWidget(card)
+        column.addStretch(2)
+        area = named(QScrollArea(self), "home.area", tr("Start"))
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setWidgetResizable(True)
+        inner = QWidget()
+        centred = QHBoxLayout(inner)
+        centred.addStretch(1)
+        centred.addWidget(middle, 6)
+        centred.addStretch(1)
+        area.setWidget(inner)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(area)
+        requests.calibrations_changed.connect(self.refresh)
+        self.refresh()
+
+    def enter(self) -> None:
+        """Read the workspace again."""
+        self.refresh()
+        first = next(card for card in (self.go_on, self.use, self.new) if not card.isHidden())
+        first.setFocus()
+
+    def refresh(self) -> None:
+        """Show what can be continued and used."""
+        entries, sessions = self._read()
+        open_sessions = unfinished(sessions, entries)
+        self._session = max(open_sessions, key=lambda s: s.changed, default=None)
+        self._calibration = last_calibration(entries)
+        self.go_on.setVisible(self._session is not None)
+        self.use.setVisible(self._calibration is not None)
+        if self._session is not None:
+            self.go_on.say(session_text(self._session))
+            self.go_on.show_picture(_picture(self._session))
+        if self._calibration is not None:
+            self.use.say(calibration_text(self._calibration))
+
+    def _card(self, name: str, title: str, sign: str, wanted: SignalInstance) -> Card:
+        card = Card(name, title, sign, self)
+        card.clicked.connect(lambda _=False: wanted.emit())
+        return card
+
+    def _read(self) -> tuple[tuple[Entry, ...], tuple[SessionEntry, ...]]:
+        workspace = self._context.workspace
+        try:
+            return workspace.entries(), workspace.sessions()
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+            return (), ()
+
+    def _continue(self) -> None:
+        if self._session is not None:
+            self._context.requests.session.emit(str(self._session.folder))
+
+    def _inspect(self) -> None:
+        entry = self._calibration
+        if entry is None:
+            return
+        if not entry.in_use:
+            try:
+                self._context.workspace.use(entry.path)
+            except InputError as error:
+                self._context.toasts.show(str(error), "fail")
+                return
+            self._context.requests.calibrations_changed.emit()
+        self._context.requests.page.emit("inspect")
+
+
+def last_calibration(entries: Sequence[Entry]) -> Entry | None:
+    """Return the calibration in use, otherwise the newest one that can be read."""
+    good = [entry for entry in entries if entry.summary is not None and entry.created is not None]
+    used = [entry for entry in good if entry.in_use]
+    return max(used or good, key=lambda entry: entry.created or datetime.min, default=None)
+
+
+def session_text(session: SessionEntry) -> str:
+    """Return the sensor, the next step and the age of a session."""
+    step = session.next_stage
+    step_text = (
+        tr("next: {step}").format(step=stage_title(step)) if step else tr("all images captured")
+    )
+    return tr("Sensor {serial}, {step}\n{n} images, last changed {when}").format(
+        serial=session.serial, step=step_text, n=session.images, when=_when(session.changed)
+    )
+
+
+def calibration_text(entry: Entry) -> str:
+    """Return the name, age and state of a calibration."""
+    assert entry.summary is not None and entry.created is not None
+    state = tr("validated") if entry.validated else tr("not validated")
+    return tr("Sensor {serial}, {verdict}, {state}\n{name}, made {when}").format(
+        serial=entry.serial,
+        verdict=verdict_word(entry.summary.verdict).lower(),
+        state=state,
+        name=entry.name,
+        when=_when(entry.created),
+    )
+
+
+def _when(time: datetime) -> str:
+    local, now = time.astimezone(), datetime.now().astimezone()
+    if local.date() == now.date():
+        return tr("today at {time}").format(time=f"{local:%H:%M}")
+    return f"{local:%Y-%m-%d %H:%M}"
+
+
+def _picture(session: SessionEntry) -> QPixmap | None:
+    """Return the newest image of a session, or None if it is missing, too large or not readable."""
+    if session.newest is None:
+        return None
+    reader = QImageReader(str(session.newest))
+    size = reader.size()
+    if not size.isValid() or 4 * size.width() * size.height() > MOST_BYTES:
+        return None
+    reader.setScaledSize(size.scaled(PICTURE * 2, Qt.AspectRatioMode.KeepAspectRatio))
+    return QPixmap.fromImageReader(reader)

@@ -1,0 +1,112 @@
+"""Measurements along the section line and in the rectangle on the height map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.measurement.measured import Measured
+from gelpolight_core.measurement.profile import (
+    Profile,
+    angle_between,
+    slope,
+    step_height,
+    take_profile,
+    width_at,
+    width_ends,
+)
+from gelpolight_core.measurement.profile_roughness import profile_roughness
+from gelpolight_core.measurement.roughness import roughness
+from gelpolight_core.reconstruction.height_map import HeightMap
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A line over the height map, and two ranges of it that are compared.
+
+    Attributes
+    ----------
+    start_mm, end_mm : (x, y)
+        Ends of the line.
+    width_mm : float
+        Depth is averaged over this width across the line.
+    first, second : (from, to)
+        Ranges as shares of the line's length.
+    level_mm : float or None
+        Depth at which the width is measured. None: half of the height.
+    cutoff_mm : float or None
+        Cut-off of the roughness of the line. None: it is not measured.
+    """
+
+    start_mm: Point = (-6.0, 0.0)
+    end_mm: Point = (6.0, 0.0)
+    width_mm: float = 0.2
+    first: Point = (0.02, 0.14)
+    second: Point = (0.44, 0.56)
+    level_mm: float | None = None
+    cutoff_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cut:
+    """Measurements of one frame.
+
+    Attributes
+    ----------
+    profile : Profile or None
+        None if there is none.
+    figures : tuple of Measured
+        Of the profile, then of the rectangle.
+    sentences : tuple of str
+        Why something could not be measured.
+    width_ends : (left, right, level) or None
+        Ends of the width: two positions along the line, and their depth; mm.
+    """
+
+    profile: Profile | None = None
+    figures: tuple[Measured, ...] = ()
+    sentences: tuple[str, ...] = ()
+    width_ends: tuple[float, float, float] | None = None
+
+
+def cut(heightmap: HeightMap, section: Section | None, region: Rectangle | None) -> Cut:
+    """Measure along a line and in a rectangle. None: not needed."""
+    profile, ends, figures, sentences = None, None, [], []
+    if section is not None:
+        try:
+            profile = take_profile(
+                heightmap, section.start_mm, section.end_mm, width_mm=section.width_mm
+            )
+        except InputError as error:
+            sentences.append(str(error))
+    if section is not None and profile is not None:
+        length = float(profile.along_mm[-1])
+        first = (length * section.first[0], length * section.first[1])
+        second = (length * section.second[0], length * section.second[1])
+        for measure in (
+            lambda: step_height(profile, first_mm=first, second_mm=second),
+            lambda: width_at(profile, section.level_mm),
+            lambda: slope(profile, *first),
+            lambda: slope(profile, *second),
+            lambda: angle_between(profile, first, second),
+        ):
+            try:
+                figures.append(measure())
+            except InputError as error:
+                sentences.append(error.found)
+        if section.cutoff_mm is not None:
+            try:
+                figures.extend(profile_roughness(profile, cutoff_mm=section.cutoff_mm).figures)
+            except InputError as error:
+                sentences.append(str(error))
+        if any(figure.name == "width" for figure in figures):
+            ends = width_ends(profile, section.level_mm)
+    if region is not None:
+        try:
+            figures.extend(roughness(heightmap, region).figures)
+        except InputError as error:
+            sentences.append(error.found)
+    return Cut(profile, tuple(figures), tuple(dict.fromkeys(sentences)), ends)

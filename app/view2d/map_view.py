@@ -1,0 +1,267 @@
+"""A map of the membrane: axes and scale bar in mm, colour bar, zoom, pan, a shared cursor."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QFont, QPainter, QResizeEvent
+from PySide6.QtWidgets import QWidget
+
+from app.theme import theme
+from app.view2d.colour_bar import TEXT_FILL, ColourBar
+from app.view2d.display import SURROUND
+from app.widgets.label import PlainLabel
+from app.widgets.lengths import length_text, round_length_mm
+from app.widgets.naming import named
+from app.widgets.plots import own_plot_menus
+from gelpolight_core.translation import tr
+
+CURSOR = "#ffffff"
+REACH_MM = 40.0
+ROOMY_PX = 180
+"""Smaller views have no axes, only the scale bar: the map needs the space."""
+SCALE_SHARE = 0.25
+"""Longest scale bar, of the view's width."""
+
+
+class MapView(pg.GraphicsView):  # type: ignore[misc]
+    """Shows an image over an extent in mm, x right and y down, in the sensor frame.
+
+    Parameters
+    ----------
+    name, accessible : str
+        The widget's name, and its text for screen readers.
+    limits : (low, high), optional
+        The user can drag the ends of the colour bar within these.
+
+    Attributes
+    ----------
+    box : pyqtgraph.ViewBox
+        Holds the image and what is drawn over it, in mm.
+    bar : ColourBar
+        Next to the map. Hidden until its range is shown.
+
+    Signals
+    -------
+    pointed(float, float)
+        Position (x, y) under the pointer, mm; NaN where there is none.
+    bar_double_clicked()
+        The colour bar was double-clicked.
+    """
+
+    pointed = Signal(float, float)
+    bar_double_clicked = Signal()
+
+    def __init__(
+        self,
+        name: str,
+        accessible: str,
+        parent: QWidget | None = None,
+        *,
+        limits: tuple[float, float] | None = None,
+    ) -> None:
+        super().__init__(parent)
+        named(self, name, accessible)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setMinimumSize(120, 100)
+        self.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, True)
+        self._extent = QRectF()
+        self._fitted = True
+        self.box = pg.ViewBox(lockAspect=1.0, invertY=True, enableMenu=False)
+        self.box.setBackgroundColor(SURROUND)
+        self.box.disableAutoRange()
+        self._plot = pg.PlotItem(viewBox=self.box)
+        self.bar = ColourBar(limits)
+        for item in (self._plot, self.bar):
+            own_plot_menus(item, self)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        self.box.addItem(self._image, ignoreBounds=True)
+        self._lines = self._make_cursor()
+        self._scale = _RoundScaleBar(self.box)
+        self._unit = pg.LabelItem()
+        self._lay_out()
+        self._words = self._make_words()
+        self.shown_images = 0
+        self._apply_theme()
+        self._connect()
+        self._show_scales(False)
+
+    def _make_cursor(self) -> list[pg.InfiniteLine]:
+        pen = pg.mkPen(CURSOR, width=1, style=Qt.PenStyle.DashLine)
+        lines = [pg.InfiniteLine(angle=angle, pen=pen) for angle in (90, 0)]
+        for line in lines:
+            line.setVisible(False)
+            line.setZValue(20)
+            self.box.addItem(line, ignoreBounds=True)
+        return lines
+
+    def _make_words(self) -> PlainLabel:
+        words = PlainLabel(parent=self)
+        words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        words.setWordWrap(True)
+        words.setStyleSheet("color: #c4ccd4; background: transparent; font-size: 14px;")
+        words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        return words
+
+    def _lay_out(self) -> None:
+        plot = self._plot
+        plot.hideButtons()
+        plot.layout.setContentsMargins(0, 0, 0, 0)
+        for side in ("left", "bottom"):
+            plot.getAxis(side).enableAutoSIPrefix(False)
+            plot.getAxis(side).setStyle(
+                maxTickLevel=1,
+                maxTextLevel=1,
+                hideOverlappingLabels=True,
+                tickTextWidth=20,
+                tickTextHeight=14,
+                tickTextOffset=3,
+                textFillLimits=TEXT_FILL,
+            )
+        plot.layout.addItem(self.bar, 2, 5)  # where ColorBarItem.setImageItem puts it
+        # Corner where the axes meet.
+        self._unit.setParentItem(plot)
+        self._unit.anchor(itemPos=(0, 1), parentPos=(0, 1))
+        self.setCentralItem(plot)
+
+    def _connect(self) -> None:
+        self.box.sigRangeChangedManually.connect(self._on_moved_by_hand)
+        self.box.sigRangeChanged.connect(self._scale.follow)
+        self.box.sigResized.connect(self._on_box_resized)
+        self.scene().sigMouseMoved.connect(self._on_pointer)
+        self.scene().sigMouseClicked.connect(self._on_click)
+
+    def set_image(self, rgb: NDArray[np.uint8], extent_mm: tuple[float, ...]) -> None:
+        """Show an image over (left, top, right, bottom)."""
+        left, top, right, bottom = extent_mm
+        extent = QRectF(left, top, right - left, bottom - top)
+        self._image.setImage(rgb, autoLevels=False)
+        self.shown_images += 1
+        if self._image.boundingRect().size() != extent.size() or extent != self._extent:
+            self._image.setRect(extent)
+        if extent != self._extent:
+            self._extent = extent
+            self._words.hide()
+            self._show_scales(True)
+            reach = REACH_MM + max(extent.width(), extent.height())
+            self.box.setLimits(minXRange=0.2, xMin=-reach, xMax=reach, yMin=-reach, yMax=reach)
+            self.fit()
+
+    def show_colours(self, colours: str, low: float, high: float, unit: str) -> None:
+        """Show the colour bar with a range."""
+        self.bar.show_range(colours, low, high, unit)
+        words = f"{low:.3g} … {high:.3g} {unit}"
+        if words != self.accessibleDescription():
+            self.setAccessibleDescription(words)
+
+    @property
+    def has_image(self) -> bool:
+        """Whether an image is shown, not a text."""
+        return not self._extent.isNull()
+
+    def say(self, text: str) -> None:
+        """Show a text instead of the image, without axes and colour bar."""
+        self._image.clear()
+        self._extent = QRectF()
+        self._show_scales(False)
+        self.bar.setVisible(False)
+        self._words.setText(text)
+        self._words.show()
+
+    def fit(self) -> None:
+        """Show the whole extent, also after the view's size changes."""
+        self._fitted = True
+        if not self._extent.isEmpty():
+            self.box.setRange(self._extent, padding=0.01)
+
+    def show_cursor(self, x_mm: float, y_mm: float) -> None:
+        """Mark a position. NaN: none."""
+        there = math.isfinite(x_mm) and math.isfinite(y_mm)
+        for line, value in zip(self._lines, (x_mm, y_mm), strict=True):
+            line.setVisible(there)
+            if there:
+                line.setValue(value)
+
+    def resizeEvent(self, event: QResizeEvent | None) -> None:  # noqa: D102
+        super().resizeEvent(event)
+        # The base class resizes itself during its construction and after closing.
+        if hasattr(self, "_words") and not self.closed:
+            self._words.setGeometry(self.rect().adjusted(16, 16, -16, -16))
+            self._show_scales(self.has_image)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().leaveEvent(event)
+        self.pointed.emit(math.nan, math.nan)
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "_words"):
+            self._apply_theme()
+
+    def _apply_theme(self) -> None:
+        self.setBackground(theme.colour("window"))
+        font = QFont(self.font())
+        font.setPointSize(max(font.pointSize() - 1, 7))
+        for side in ("left", "bottom"):
+            axis = self._plot.getAxis(side)
+            axis.setPen(theme.colour("muted"))
+            axis.setTextPen(theme.colour("text"))
+            axis.setStyle(tickFont=font)
+        self._unit.setText(tr("mm"), color=theme.colour("text"), size=f"{font.pointSize()}pt")
+        self.bar.apply_theme(font)
+
+    def _show_scales(self, on: bool) -> None:
+        self._scale.setVisible(on)
+        roomy = min(self.width(), self.height()) >= ROOMY_PX
+        for side in ("left", "bottom"):
+            self._plot.showAxis(side, on and roomy)
+        self._unit.setVisible(on and roomy)
+
+    def _on_box_resized(self, *_: Any) -> None:
+        if self._fitted:
+            self.fit()
+        self._scale.follow()
+
+    def _on_moved_by_hand(self, *_: Any) -> None:
+        self._fitted = False
+
+    def _on_pointer(self, at: QPointF) -> None:
+        position = self.box.mapSceneToView(at)
+        inside = self._is_on(self.box, at) and self._extent.contains(position.x(), position.y())
+        self.pointed.emit(*((position.x(), position.y()) if inside else (math.nan, math.nan)))
+
+    def _on_click(self, event: Any) -> None:
+        if event.button() != Qt.MouseButton.LeftButton or not event.double():
+            return
+        if self._is_on(self.bar, event.scenePos()):
+            self.bar_double_clicked.emit()
+        elif self._is_on(self.box, event.scenePos()):
+            self.fit()
+
+    @staticmethod
+    def _is_on(item: pg.GraphicsWidget, at: QPointF) -> bool:
+        return bool(item.isVisible() and item.sceneBoundingRect().contains(at))
+
+
+class _RoundScaleBar(pg.ScaleBar):  # type: ignore[misc]
+    """pyqtgraph's scale bar in the lower right corner, always with a round length."""
+
+    def __init__(self, box: pg.ViewBox) -> None:
+        super().__init__(1.0, width=3, brush="#ebeef2", pen="#0a0c0f", offset=(-12, -10))
+        self._box = box
+        self.text.setColor("#ebeef2")
+        self.text.fill = pg.mkBrush(QColor(10, 12, 15, 120))
+        self.setParentItem(box)
+
+    def follow(self, *_: Any) -> None:
+        """Follow the zoom and the size of the view."""
+        length = round_length_mm(SCALE_SHARE * self._box.viewRect().width())
+        if length > 0.0 and length != self.size:
+            self.size = length
+            self.text.setText(length_text(length))
+            self.updateBar()

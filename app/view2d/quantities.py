@@ -1,0 +1,119 @@
+"""The quantities that colour the surface in 3D: values, colours and scales."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.view2d.display import colour_table
+from app.view2d.map_point import flag_words
+from app.view3d.surface import ColourScale
+from app.widgets.lengths import round_up
+from gelpolight_core.errors import InputError
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+
+STEEPEST_DEG = 60.0
+LEAST_SD_UM = 1.0
+LEAST_DIFFERENCE_MM = 0.01
+NO_FLAG = (90, 96, 104)
+
+FLAG_COLOURS = {
+    Flag.INVALID: (225, 225, 225),
+    Flag.NOT_OBSERVABLE: (255, 89, 94),
+    Flag.DARK: (84, 125, 255),
+    Flag.SATURATED: (255, 0, 255),
+    Flag.EXTRAPOLATED: (255, 202, 58),
+    Flag.UNANCHORED: (150, 110, 190),
+}
+"""Colour of each flag, the most serious first."""
+
+
+def quantity_names() -> dict[str, str]:
+    """Return the name of each quantity."""
+    return {
+        "depth": tr("Depth"),
+        "slope": tr("Slope"),
+        "uncertainty": tr("Uncertainty (when paused)"),
+        "flags": tr("Flags"),
+        "difference": tr("Difference from the reference"),
+    }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """A height map for comparison. Two are equal only if they are the same object."""
+
+    heightmap: HeightMap
+    name: str = ""
+
+
+def depth_scale(colours: str, range_mm: tuple[float, float]) -> ColourScale:
+    """Return the scale of depths."""
+    return ColourScale(tr("depth [mm]"), colour_table(colours), *range_mm)
+
+
+def slope_scale() -> ColourScale:
+    """Return the scale of slopes in degrees."""
+    return ColourScale(tr("slope [°]"), colour_table("magma"), 0.0, STEEPEST_DEG)
+
+
+def uncertainty_scale(sd_um: Map) -> ColourScale:
+    """Return the scale of standard deviations in um. One pixel in a hundred is above it."""
+    top = float(np.percentile(sd_um, 99.0)) if sd_um.size else LEAST_SD_UM
+    return ColourScale(
+        tr("1 sd [um]"),
+        colour_table("inferno"),
+        0.0,
+        round_up(max(round(top, 4), LEAST_SD_UM)),
+    )
+
+
+def flag_scale() -> ColourScale:
+    """Return the colours of the flags, with their names."""
+    words = flag_words()
+    names = [(words[flag], colour) for flag, colour in FLAG_COLOURS.items()]
+    table = np.full((256, 3), NO_FLAG, np.uint8)
+    return ColourScale(tr("flags"), table, 0.0, 1.0, ((tr("no flags"), NO_FLAG), *names))
+
+
+def difference_scale(difference_mm: Map, title: str = "") -> ColourScale:
+    """Return a scale for differences in mm, with zero in its middle."""
+    known = np.abs(difference_mm[np.isfinite(difference_mm)])
+    top = float(np.percentile(known, 99.9)) if known.size else LEAST_DIFFERENCE_MM
+    top = round_up(max(round(top, 5), LEAST_DIFFERENCE_MM))
+    title = title or tr("difference [mm]")
+    return ColourScale(title, colour_table("CET-D1"), -top, top)
+
+
+def difference_to(heightmap: HeightMap, reference: HeightMap) -> Map:
+    """Return depth minus the reference's depth on the grid of a height map. NaN where unknown.
+
+    Raises
+    ------
+    InputError
+        If the two do not overlap.
+    """
+    pitch = reference.pitch_mm
+    column = ((heightmap.x_mm - float(reference.x_mm[0])) / pitch).astype(np.float32)
+    row = ((heightmap.y_mm - float(reference.y_mm[0])) / pitch).astype(np.float32)
+    outside = reference.flags & Flag.OUTSIDE.value != 0
+    known = np.where(outside, np.float32(np.nan), reference.depth_mm).astype(np.float32)
+    columns, rows = np.meshgrid(column, row)
+    other = cv2.remap(
+        known, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT,
+        borderValue=float("nan"),
+    )  # fmt: skip
+    difference = heightmap.depth_mm - other
+    if not np.isfinite(difference).any():
+        raise InputError(
+            tr("The reference does not overlap this frame"),
+            where=tr("Difference"),
+            advice=tr("Choose a reference of the same sensor"),
+        )
+    return np.asarray(difference, np.float32)

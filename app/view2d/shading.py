@@ -1,0 +1,148 @@
+"""Maps as images: coloured, shaded, with contour lines. Arrays in, arrays out, no window."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.view2d.display import Light
+from app.view2d.shade_kernel import shade
+from gelpolight_core.reconstruction.height_map import Flag
+
+Map = NDArray[np.float32]
+Rgb = NDArray[np.uint8]
+
+AMBIENT = 0.38
+SHINE = 46.0
+HOLLOW = 1.1
+HOLLOW_MM = 0.5
+
+
+def fitted(values: NDArray[Any], largest_px: int) -> NDArray[Any]:
+    """Return a map or image averaged down to at most so many pixels per side."""
+    rows, columns = values.shape[:2]
+    # An integer factor: averaging over equal blocks is by far the fastest.
+    factor = -(-max(rows, columns) // largest_px)
+    if factor <= 1:
+        return values
+    size = max(round(columns / factor), 2), max(round(rows / factor), 2)
+    return np.asarray(cv2.resize(values, size, interpolation=cv2.INTER_AREA))
+
+
+def coloured(values: Map, table: Rgb, low: float, high: float) -> Rgb:
+    """Return a map in the colours of a table (256, 3), RGB."""
+    scale = 255.0 / max(high - low, 1e-9)
+    above = np.maximum(values - np.float32(low), np.float32(0.0))
+    return np.asarray(
+        cv2.applyColorMap(cv2.convertScaleAbs(above, alpha=scale), table[:, None]), np.uint8
+    )
+
+
+def slopes(depth_mm: Map, pitch_mm: float) -> tuple[Map, Map]:
+    """Return the slopes of a depth map along x and y."""
+    scale = 1.0 / (8.0 * pitch_mm)
+    along_x = cv2.Sobel(depth_mm, cv2.CV_32F, 1, 0, ksize=3, scale=scale)
+    along_y = cv2.Sobel(depth_mm, cv2.CV_32F, 0, 1, ksize=3, scale=scale)
+    return np.asarray(along_x), np.asarray(along_y)
+
+
+def shaded(
+    depth_mm: Map,
+    pitch_mm: float,
+    table: Rgb,
+    range_mm: tuple[float, float],
+    light: Light,
+    *,
+    exaggeration: float = 1.0,
+    contour_mm: float = 0.0,
+) -> Rgb:
+    """Return a depth map in colours under a lamp, with specular light and darker hollows.
+
+    Parameters
+    ----------
+    depth_mm : (rows, columns) float32
+        Up is towards the viewer.
+    pitch_mm : float
+        Pixel pitch.
+    table : (256, 3) uint8
+        The colours.
+    range_mm : (low, high)
+        Depths of the first and the last colour.
+    light : Light
+        The lamp.
+    exaggeration : float, optional
+        Scale of depth relative to width.
+    contour_mm : float, optional
+        Depth between contour lines. 0: none.
+    """
+    to_light = light.direction()
+    half_way = to_light + np.array([0.0, 0.0, 1.0])
+    half_way /= np.linalg.norm(half_way)
+    side = 2 * max(int(0.5 * HOLLOW_MM / pitch_mm), 1) + 1
+    out = np.empty((*depth_mm.shape, 3), np.uint8)
+    low, high = range_mm
+    shade(
+        np.ascontiguousarray(depth_mm, np.float32),
+        np.asarray(cv2.blur(depth_mm, (side, side)), np.float32),
+        table,
+        (low, 255.0 / max(high - low, 1e-9)),
+        tuple(map(float, to_light)),
+        tuple(map(float, half_way)),
+        (AMBIENT, SHINE, HOLLOW * exaggeration),
+        0.5 * exaggeration / pitch_mm,
+        float(contour_mm),
+        out,
+    )
+    return out
+
+
+def with_contours(rgb: Rgb, depth_mm: Map, step_mm: float) -> Rgb:
+    """Draw contour lines at multiples of a depth, one pixel wide, except at zero depth."""
+    phase = depth_mm / np.float32(step_mm)
+    level = np.rint(phase)
+    slope_x, slope_y = slopes(np.asarray(phase, np.float32), 1.0)
+    reach = np.maximum(cv2.magnitude(slope_x, slope_y), np.float32(1e-4))
+    cover = np.clip(1.0 - np.abs(phase - level) / reach, 0.0, 1.0) * (np.abs(level) >= 1.0)
+    keep = cv2.convertScaleAbs((1.0 - 0.75 * cover).astype(np.float32), alpha=255.0)
+    return np.asarray(cv2.multiply(rgb, cv2.merge([keep] * 3), scale=1.0 / 255.0), np.uint8)
+
+
+def normal_colours(normals: NDArray[np.float32]) -> Rgb:
+    """Return normals as colours: x as red, y as green, flatness as blue."""
+    scaled = normals * np.array([127.5, 127.5, -127.5], np.float32) + np.float32(127.5)
+    return np.asarray(np.clip(scaled, 0.0, 255.0).astype(np.uint8))
+
+
+def steepness_deg(normals: NDArray[np.float32]) -> Map:
+    """Return the slope of the surface in degrees, from its normals."""
+    across = cv2.magnitude(normals[..., 0], normals[..., 1])
+    return np.asarray(
+        cv2.phase(np.ascontiguousarray(-normals[..., 2]), across, angleInDegrees=True)
+    )
+
+
+def flag_colours(
+    rgb: Rgb, flags: NDArray[np.uint8], palette: dict[Flag, tuple[int, int, int]]
+) -> Rgb:
+    """Return an image with flagged pixels in the colour of their first flag."""
+    table = np.zeros((256, 3), np.uint8)
+    for flag, colour in reversed(palette.items()):
+        table[(np.arange(256) & flag.value) != 0] = colour
+    wanted = sum(flag.value for flag in palette)
+    painted = cv2.applyColorMap(flags, table[:, None])
+    mask = cv2.bitwise_and(flags, np.full_like(flags, wanted))
+    return np.asarray(cv2.copyTo(painted, mask, rgb.copy()), np.uint8)
+
+
+def outside_filled(rgb: Rgb, outside: NDArray[np.uint8], colour: tuple[int, int, int]) -> Rgb:
+    """Return an image with one colour where nothing is measured. `rgb` may be overwritten."""
+    return np.asarray(cv2.copyTo(_filled(rgb.shape[:2], colour), outside, rgb), np.uint8)
+
+
+@lru_cache(maxsize=4)
+def _filled(shape: tuple[int, int], colour: tuple[int, int, int]) -> Rgb:
+    return np.full((*shape, 3), colour, np.uint8)

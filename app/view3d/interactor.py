@@ -1,0 +1,323 @@
+"""The 3D view as a widget: pyvistaqt's interactor with one rendering per paint event, and picking.
+
+Left drag rotates, Shift and left drag or the middle button pans, wheel and right drag zoom, as in
+pyvista and ParaView. A left click without a drag sets a pin, a right click requests the menu.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from PySide6.QtCore import QEvent, QLoggingCategory, QPoint, QPointF, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QMouseEvent
+from PySide6.QtWidgets import QGestureEvent, QWidget
+from pyvistaqt import QtInteractor
+from vtkmodules.vtkRenderingCore import vtkPropCollection
+
+from app.theme import theme
+from app.view3d.picking import Point, hit
+from app.view3d.scene import Scene
+from app.view3d.style import Ink, Style
+from app.view3d.surface import Surface
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+CLICK_PX = 4.0
+SETTLE_MS = 250
+KEY_DEG = 6.0
+KEY_ZOOM = 1.15
+
+
+@contextmanager
+def _no_warning_of_the_format() -> Iterator[None]:
+    """Suppress Qt's warning that pyvistaqt sets the default OpenGL format, which is already set."""
+    QLoggingCategory.setFilterRules("default.warning=false")
+    try:
+        yield
+    finally:
+        QLoggingCategory.setFilterRules("")
+
+
+class Interactor(QtInteractor):  # type: ignore[misc]
+    """Shows a scene, controlled by mouse, touchpad and keys.
+
+    Attributes
+    ----------
+    scene : Scene
+        Content. Call ``update`` after a change.
+    drawings : int
+        Number of renderings.
+
+    Signals
+    -------
+    pointed(float, float)
+        Position (x, y) under the pointer, mm. NaN if there is none.
+    clicked(float, float)
+        Position of a click.
+    fit_wanted()
+        A double click.
+    menu_wanted(QPoint)
+        Position in this widget where the menu was requested.
+    """
+
+    pointed = Signal(float, float)
+    clicked = Signal(float, float)
+    fit_wanted = Signal()
+    menu_wanted = Signal(QPoint)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        with _no_warning_of_the_format():
+            super().__init__(parent, multi_samples=0, auto_update=False, lighting="none")
+        named(self, "view3d.surface", tr("Surface in 3D"))
+        self.setAcceptDrops(False)  # the window opens dropped files
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setMinimumSize(160, 120)
+        self.grabGesture(Qt.GestureType.PinchGesture)
+        self.suppress_rendering = True  # only Qt's paint events draw
+        self.drawings = 0
+        self._pressed: QPointF | None = None
+        self._fitted = True
+        self._finished = False
+        # VTK draws only inside a paint event. At any other time its request becomes a paint event.
+        self.iren.interactor.EnableRenderOff()
+        self._observed = [
+            (self.iren.interactor, self.iren.interactor.AddObserver("RenderEvent", self._on_render))
+        ]
+        style = self.iren.interactor.GetInteractorStyle()
+        for event, slot in (
+            ("StartInteractionEvent", self._on_hand), ("EndInteractionEvent", self._on_hand_off),
+        ):  # fmt: skip
+            self._observed.append((style, style.AddObserver(event, slot)))
+        self.scene = Scene(self)
+        self._orientation = self._add_orientation()
+        self._plane: object | None = None
+        self._settle = QTimer(self)
+        self._settle.setSingleShot(True)
+        self._settle.setInterval(SETTLE_MS)
+        self._settle.timeout.connect(self._refine)
+        self._follow_theme()
+
+    # Called by the panel
+
+    def show_surface(self, surface: Surface) -> None:
+        """Show the surface of a frame."""
+        self._settle.stop()
+        self.scene.show_surface(surface)
+        self.update()
+
+    def view_from(self, view: str) -> None:
+        """View the whole surface from one of VIEWS, or from the current direction (``fit``)."""
+        self._fitted = True
+        if view == "fit":
+            self.scene.fit()
+        else:
+            self.scene.view_from(view)
+        self.update()
+
+    def set_style(self, style: Style) -> None:
+        """Show or hide the axes and other parts of the style."""
+        self.scene.set_style(style)
+        self._orientation.SetEnabled(style.orientation)
+        self.update()
+
+    def show_plane(self, on: bool) -> None:
+        """Show a draggable plane, and hide what is in front of it."""
+        if on == (self._plane is not None):
+            return
+        if not on:
+            self.clear_plane_widgets()
+            self._plane = None
+            self.scene.clip_by(None)
+        else:
+            left, right, low, high, under, over = self.scene.box
+            middle = (0.5 * (left + right), 0.5 * (low + high), 0.5 * (under + over))
+            tall = (left, right, low, high, min(under, 0.0), max(over, 0.15 * (right - left)))
+            self._plane = self.add_plane_widget(
+                self._on_plane, normal=(0.0, -1.0, 0.0), origin=middle, bounds=tall,
+                implicit=True, outline_translation=False, test_callback=False, color="#ff5ac8",
+            )  # fmt: skip
+            self._on_plane((0.0, -1.0, 0.0), middle)
+        self.update()
+
+    def finish(self) -> None:
+        """Release the graphics memory."""
+        if self._finished:
+            return
+        self._finished = True
+        self.setUpdatesEnabled(False)
+        self._settle.stop()
+        for subject, tag in self._observed:
+            subject.RemoveObserver(tag)
+        self._observed.clear()
+        self._orientation.SetEnabled(False)
+        self.clear_plane_widgets()
+        self.close()
+
+    def point_at(self, at: QPointF) -> Point | None:
+        """Return the position (x, y) in the sensor frame at a point of this widget."""
+        surface = self.scene.surface
+        if surface is None:
+            return None
+        ratio = self.devicePixelRatioF()
+        across, up = ratio * at.x(), ratio * (self.height() - 1 - at.y())
+        ends = []
+        for depth in (0.0, 1.0):
+            self.renderer.SetDisplayPoint(across, up, depth)
+            self.renderer.DisplayToWorld()
+            x, y, z, w = self.renderer.GetWorldPoint()
+            ends.append(np.array([x, -y, z / self.scene.style.exaggeration]) / w)
+        return hit(surface, *ends)
+
+    # VTK's events
+
+    def resizeGL(self, width: int, height: int) -> None:
+        """Keep the whole surface visible until the user moves the camera."""
+        if self._finished:
+            return
+        super().resizeGL(width, height)
+        if self._fitted:
+            self.scene.fit()
+
+    def paintGL(self) -> None:
+        """Draw the scene once, unless its graphics memory is released."""
+        if self._finished:
+            return
+        self.drawings += 1
+        self.iren.interactor.EnableRenderOn()
+        try:
+            super().paintGL()
+        finally:
+            self.iren.interactor.EnableRenderOff()
+
+    def _on_render(self, *_: object) -> None:
+        if not self._in_paint:
+            self.update()
+
+    def _on_hand(self, *_: object) -> None:
+        self._fitted = False
+        self._settle.stop()
+        self.scene.coarsen()
+
+    def _on_hand_off(self, *_: object) -> None:
+        self._settle.start()
+
+    def _refine(self) -> None:
+        self.scene.refine()
+        self.update()
+
+    def _on_plane(self, normal: object, origin: object) -> None:
+        self.scene.clip_by((np.asarray(normal, float), np.asarray(origin, float)))
+        self.update()
+
+    def _add_orientation(self) -> object:
+        widget = self.add_camera_orientation_widget()
+        shown = widget.GetRepresentation()
+        # The scene's y axis points up, the sensor's down. z is depth.
+        shown.SetXPlusLabelText("x")
+        shown.SetXMinusLabelText("-x")
+        shown.SetYPlusLabelText("-y")
+        shown.SetYMinusLabelText("y")
+        shown.SetZPlusLabelText(tr("top"))
+        shown.SetZMinusLabelText(tr("bottom"))
+        parts = vtkPropCollection()
+        shown.GetActors(parts)
+        for number in range(parts.GetNumberOfItems()):
+            # Lighting them would cost a software renderer a tenth of each frame.
+            parts.GetItemAsObject(number).GetProperty().LightingOff()
+        return widget
+
+    # Mouse and keys
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Store the start of a click or a drag."""
+        self._pressed = event.position()
+        super().mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Emit the position under the pointer, except during a drag."""
+        super().mouseMoveEvent(event)
+        if event.buttons() == Qt.MouseButton.NoButton:
+            point = self.point_at(event.position())
+            self.pointed.emit(*(point or (math.nan, math.nan)))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Treat a press without a drag as a click."""
+        super().mouseReleaseEvent(event)
+        pressed, self._pressed = self._pressed, None
+        if pressed is None or (event.position() - pressed).manhattanLength() > CLICK_PX:
+            return
+        if event.button() == Qt.MouseButton.RightButton:
+            self.menu_wanted.emit(event.position().toPoint())
+        elif event.button() == Qt.MouseButton.LeftButton and not event.modifiers():
+            point = self.point_at(event.position())
+            if point is not None:
+                self.clicked.emit(*point)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        """Show everything. The second release of a double click is not a click."""
+        self._pressed = None
+        self.fit_wanted.emit()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        """Report that the pointer has left."""
+        super().leaveEvent(event)
+        self.pointed.emit(math.nan, math.nan)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Rotate with the arrow keys and zoom with plus and minus. Pass on all other keys."""
+        turns = {
+            Qt.Key.Key_Left: (KEY_DEG, 0.0), Qt.Key.Key_Right: (-KEY_DEG, 0.0),
+            Qt.Key.Key_Up: (0.0, -KEY_DEG), Qt.Key.Key_Down: (0.0, KEY_DEG),
+        }  # fmt: skip
+        zooms = {
+            Qt.Key.Key_Plus: KEY_ZOOM, Qt.Key.Key_Equal: KEY_ZOOM, Qt.Key.Key_Minus: 1 / KEY_ZOOM,
+        }  # fmt: skip
+        key = Qt.Key(event.key())
+        if key in turns:
+            across, up = turns[key]
+            self.camera.Azimuth(across)
+            self.camera.Elevation(up)
+            self.camera.OrthogonalizeViewUp()
+        elif key in zooms:
+            self.scene.zoom(zooms[key])
+        else:
+            event.ignore()
+            return
+        self.renderer.ResetCameraClippingRange()
+        self.update()
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
+        """Ignore VTK's own keys: they would exit or change the view without updating the menu."""
+        event.ignore()
+
+    def event(self, event: QEvent) -> bool:
+        """Zoom with a pinch on a touchpad."""
+        if isinstance(event, QGestureEvent):
+            pinch = event.gesture(Qt.GestureType.PinchGesture)
+            if pinch is not None:
+                self.scene.zoom(pinch.scaleFactor())
+                self.update()
+                return True
+        return bool(super().event(event))
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Stop drawing when VTK's window is closed."""
+        self._finished = True
+        super().closeEvent(event)
+
+    # Theme
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the program's theme."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "scene"):
+            self._follow_theme()
+
+    def _follow_theme(self) -> None:
+        low, high = ("base", "button") if theme.is_dark() else ("alternate", "base")
+        names = (theme.colour(name).name() for name in (low, high, "text", "line"))
+        self.scene.set_ink(Ink(*names))
+        self.update()

@@ -1,0 +1,339 @@
+"""The 3D view with its buttons and menu. Without OpenGL: a shaded map and the reason."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QStackedWidget,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.services.jobs import Job, Jobs
+from app.services.opengl import opengl_problem
+from app.services.settings import Settings
+from app.view3d.menu import ViewMenu
+from app.view3d.picking import Point
+from app.view3d.pins import pins_text, with_pin
+from app.view3d.style import Style, style_as_text, style_from_text
+from app.view3d.surface import Surface, SurfaceLine
+from app.widgets.label import PlainLabel
+from app.widgets.naming import named
+from app.widgets.native import give_own_window
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+    from app.view3d.interactor import Interactor
+
+_LOG = logging.getLogger(__name__)
+MODULE = "app.view3d.interactor"  # imports pyvista, which takes a second, when 3D is first shown
+HINT_SEEN = "view3d_hint"
+
+
+def view_names() -> dict[str, tuple[str, str]]:
+    """Return the label of each view direction, and its key."""
+    return {
+        "isometric": (tr("Isometric"), "Ctrl+Shift+O"),
+        "top": (tr("Top"), "Ctrl+Shift+T"),
+        "front": (tr("Front"), "Ctrl+Shift+F"),
+        "side": (tr("Side"), "Ctrl+Shift+S"),
+    }
+
+
+class FlatMap(Protocol):
+    """Replacement for the 3D view without OpenGL: a widget with a map and a cursor."""
+
+    pointed: Signal
+
+    def set_image(self, rgb: NDArray[np.uint8], extent_mm: tuple[float, ...]) -> None:
+        """Show an image over (left, top, right, bottom)."""
+
+    def show_cursor(self, x_mm: float, y_mm: float) -> None:
+        """Mark a position. NaN: none."""
+
+
+class SurfacePanel(QWidget):
+    """Shows the surface. pyvista is loaded when the first one arrives.
+
+    Parameters
+    ----------
+    jobs : Jobs
+        Load modules in the background.
+    settings : Settings
+        Store style and viewpoints.
+    flat : callable
+        Makes the map that is shown without 3D.
+
+    Attributes
+    ----------
+    view : Interactor or None
+        None until it is loaded.
+    reason : str
+        Why there is no 3D. Empty if there is.
+    menu : ViewMenu
+        Opened by the button and by a right click.
+
+    Signals
+    -------
+    pointed(float, float)
+        Position (x, y) under the pointer, mm.
+    """
+
+    pointed = Signal(float, float)
+
+    def __init__(self, jobs: Jobs, *, settings: Settings, flat: Callable[[], FlatMap]) -> None:
+        super().__init__()
+        named(self, "view3d", tr("Surface in 3D"))
+        self._jobs, self._settings = jobs, settings
+        self.view: Interactor | None = None
+        self.reason = ""
+        self.style = style_from_text(settings.display("view3d"))
+        self.pins: tuple[Point, ...] = ()
+        self._asked = False
+        self._last: Surface | None = None
+        self._lines: tuple[SurfaceLine, ...] = ()
+        self._solid: Callable[[], pv.PolyData] | None = None
+        self._make_flat = flat
+        self._flat: FlatMap | None = None
+        self.menu = ViewMenu(self, settings=settings)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        self._stack = QStackedWidget()
+        self._words = PlainLabel(tr("No depth yet."))
+        self._words.setWordWrap(True)
+        self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._words.setMargin(20)
+        self._stack.addWidget(self._words)
+        self._why = named(PlainLabel(), "view3d.reason", tr("Why 3D is not available"))
+        self._why.setWordWrap(True)
+        self._why.hide()
+        row = QHBoxLayout()
+        row.setContentsMargins(4, 2, 4, 2)
+        row.setSpacing(2)
+        for name, (text, keys) in view_names().items():
+            row.addWidget(self._button(name, text, f"{text} ({keys})"))
+        row.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
+        row.addStretch(1)
+        button = named(QToolButton(), "view3d.menu", tr("3D menu"), tr("Options of the 3D view"))
+        button.setText(tr("3D options"))
+        button.setAutoRaise(True)
+        button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        button.setMenu(self.menu)
+        row.addWidget(button)
+        self._tools = QWidget()
+        self._tools.setLayout(row)
+        self._hint = self._make_hint()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self._tools)
+        column.addWidget(self._why)
+        column.addWidget(self._stack, 1)
+        column.addWidget(self._hint)
+
+    def _button(self, name: str, text: str, tip: str) -> QToolButton:
+        button = named(QToolButton(), f"view3d.{name}", text, tip)
+        button.setText(text)
+        button.setAutoRaise(True)
+        button.clicked.connect(lambda: self.view_from(name))
+        return button
+
+    def _make_hint(self) -> QWidget:
+        bar = QWidget()
+        text = PlainLabel(tr("Drag: rotate   Shift+drag: pan   Wheel: zoom   Click: pin   "
+                         "Right click: menu"))  # fmt: skip
+        text.setWordWrap(True)
+        button = named(QToolButton(), "view3d.hint_seen", tr("Hide the hint"))
+        button.setText(tr("Got it"))
+        button.clicked.connect(self._hide_hint)
+        row = QHBoxLayout(bar)
+        row.setContentsMargins(8, 2, 4, 2)
+        row.addWidget(text, 1)
+        row.addWidget(button)
+        bar.hide()
+        return bar
+
+    def _hide_hint(self) -> None:
+        self._hint.hide()
+        self._settings.keep_display(HINT_SEEN, "yes")
+
+    # Called by the page
+
+    def view_from(self, name: str) -> None:
+        """View from one of the view directions, or show everything (``fit``)."""
+        if self.view is not None:
+            self.view.view_from(name)
+
+    def show_surface(self, surface: Surface | None) -> None:
+        """Show the surface of a frame. None: there is none."""
+        self._last = surface
+        if surface is None:
+            self._stack.setCurrentWidget(self._words)
+            self.set_pins(())
+        elif self.view is not None:
+            self.view.show_surface(surface)
+            self._stack.setCurrentWidget(self._frame)
+        elif self._flat is not None:
+            self._flat.set_image(surface.texture, surface.extent_mm)
+            self._stack.setCurrentWidget(self._flat)
+        else:
+            self.load()
+
+    def load(self) -> None:
+        """Load the 3D view in the background, once."""
+        if self._asked:
+            return
+        self._asked = True
+        if problem := opengl_problem():
+            advice = tr("Install the graphics driver, or Mesa (libgl1-mesa-dri).")
+            self._fall_back(f"{problem}. {advice}")
+            return
+        self._words.setText(tr("Loading the 3D view…"))
+        self._jobs.submit(
+            Job(
+                tr("Loading the 3D view"),
+                lambda _tell: _load(),
+                self._make,
+                self._fall_back,
+                self._on_stopped,
+            )
+        )
+
+    def set_exaggeration(self, factor: float) -> None:
+        """Set the scale of the depth."""
+        self.set_style(replace(self.style, exaggeration=factor))
+
+    def set_style(self, style: Style) -> None:
+        """Show or hide parts of the style, and store it."""
+        self.style = style
+        self._settings.keep_display("view3d", style_as_text(style))
+        if self.view is not None:
+            self.view.set_style(style)
+            self._draw_pins()
+
+    def show_cursor(self, x_mm: float, y_mm: float) -> None:
+        """Mark a position. NaN: none."""
+        if self.view is not None:
+            self.view.scene.show_cursor((x_mm, y_mm) if x_mm == x_mm else None)
+            self.view.update()
+        if self._flat is not None:
+            self._flat.show_cursor(x_mm, y_mm)
+
+    def show_lines(self, lines: tuple[SurfaceLine, ...]) -> None:
+        """Replace the lines on the surface."""
+        if lines == self._lines:
+            return
+        self._lines = lines
+        if self.view is not None:
+            self.view.scene.show_lines(lines)
+            self.view.update()
+
+    def show_solid(self, make: Callable[[], pv.PolyData] | None) -> None:
+        """Show a translucent solid, which is built when 3D is loaded. None: none."""
+        self._solid = make
+        if self.view is not None:
+            self.view.scene.show_solid(None if make is None else make())
+            self.view.update()
+
+    def set_pins(self, pins: tuple[Point, ...]) -> None:
+        """Replace the pins."""
+        self.pins = pins
+        self._draw_pins()
+
+    def refresh_pins(self) -> None:
+        """Update the depths of the pins."""
+        if self.pins:
+            self._draw_pins()
+
+    def image(self) -> QImage:
+        """Return an image of the view as on the screen."""
+        return QImage() if self.view is None else self.view.grabFramebuffer()
+
+    def finish(self) -> None:
+        """Release the graphics memory."""
+        if self.view is not None:
+            self.view.finish()
+            self.view = None
+
+    # Construction
+
+    def _make(self, kind: type[Interactor]) -> None:
+        view = self.view = kind()
+        view.set_style(self.style)
+        view.scene.show_lines(self._lines)
+        self.show_solid(self._solid)
+        view.pointed.connect(self.pointed)
+        view.clicked.connect(lambda x, y: self.set_pins(with_pin(self.pins, (x, y))))
+        view.fit_wanted.connect(lambda: self.view_from("fit"))
+        view.menu_wanted.connect(self._open_menu)
+        # Complete it before it is added to the window, which Qt would otherwise rebuild.
+        self._frame = QWidget()
+        box = QVBoxLayout(self._frame)
+        box.setContentsMargins(0, 0, 0, 0)
+        box.addWidget(view)
+        give_own_window(self._frame)
+        self._stack.addWidget(self._frame)
+        self._words.setText(tr("No depth yet."))
+        self._hint.setVisible(not self._settings.display(HINT_SEEN))
+        self.show_surface(self._last)
+
+    def _on_stopped(self, _sentence: str) -> None:
+        self._asked = False  # the next surface loads it
+
+    def _open_menu(self, at: QPoint) -> None:
+        if self.view is not None:
+            self.menu.popup(self.view.mapToGlobal(at))
+
+    def _draw_pins(self) -> None:
+        if self.view is None or self._last is None:
+            return
+        self.view.scene.show_pins(self.pins, pins_text(self._last, self.pins))
+        self.view.update()
+
+    def _fall_back(self, reason: str) -> None:
+        _LOG.warning("No 3D view: %s", reason)
+        self.reason = reason
+        self._why.setText(
+            tr("Shown as a shaded map, because 3D is not available. {reason}").format(reason=reason)
+        )
+        self._why.show()
+        self._tools.hide()
+        self._flat = self._make_flat()
+        self._flat.pointed.connect(self.pointed)
+        self._stack.addWidget(self._flat)
+        self._words.setText(tr("No depth yet."))
+        self.show_surface(self._last)
+
+
+def _load() -> type[Interactor]:
+    """Import the 3D view, in a background thread.
+
+    Raises
+    ------
+    InputError
+        If its libraries cannot be loaded.
+    """
+    try:
+        return importlib.import_module(MODULE).Interactor
+    except ImportError as error:
+        _LOG.exception("The 3D view cannot be loaded")
+        raise InputError(
+            tr("The library pyvista cannot be loaded"),
+            where=tr("3D view"),
+            advice=tr("Install the program again. The log contains the name of the missing part"),
+        ) from error

@@ -1,0 +1,255 @@
+"""A surface in 3D with its annotations, on the plotter of the window or of an image file.
+
+The scene's frame is x right, y up (the sensor's y with its sign turned) and z towards the viewer:
+depth times the exaggeration. From the top, the surface lies as in the camera's image.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from pyvista.core.utilities.helpers import generate_plane
+
+from app.view3d.legend import (
+    Box,
+    Plotter,
+    axes_of,
+    draw_axes,
+    draw_note,
+    draw_scale,
+    draw_scale_bar,
+)
+from app.view3d.overlays import (
+    CURSOR,
+    CUT,
+    Overlay,
+    cut_edge,
+    draw_pins,
+    draw_solid,
+    lines_mesh,
+    points_on,
+)
+from app.view3d.picking import Point
+from app.view3d.sheet import SheetActor
+from app.view3d.style import VIEWS, Ink, Style, Viewpoint
+from app.view3d.surface import LIVE_NODES, Surface, SurfaceLine
+
+# Margins for the labels of the axes: left and right, above and below.
+MARGIN_PX = np.array([90.0, 50.0])
+
+Array = NDArray[np.float64]
+Clip = tuple[Array, Array]
+
+
+class Scene:
+    """Draws a surface; camera, axes and colour scale do not move from frame to frame.
+
+    Parameters
+    ----------
+    plotter : pyvista.BasePlotter
+        Target of the drawing. Its owner decides when to render.
+
+    Attributes
+    ----------
+    surface : Surface or None
+        Current surface.
+    style : Style
+        Current style.
+    clip : (normal, origin) or None
+        Plane in the scene's frame; the side that its normal points to is hidden.
+    box : tuple of 6 floats
+        Axes box. Empty before the first surface.
+    """
+
+    def __init__(self, plotter: Plotter) -> None:
+        self._plotter = plotter
+        self.surface: Surface | None = None
+        self.style, self._ink = Style(), Ink()
+        self.clip: Clip | None = None
+        self.box: Box | tuple[()] = ()
+        self._sheet = SheetActor(plotter)
+        self._lines: tuple[SurfaceLine, ...] = ()
+        self._cursor: Point | None = None
+        self._pins: tuple[tuple[Point, ...], str] = ((), "")
+        self._solid: pv.PolyData | None = None
+        self._explained: object = None
+        self._line = Overlay(plotter, "lines", line_width=3)
+        self._cut = Overlay(plotter, "cut", color=CUT, line_width=3)
+        self._dot = Overlay(
+            plotter, "cursor", color=CURSOR, point_size=11, render_points_as_spheres=True
+        )
+
+    def show_surface(self, surface: Surface) -> None:
+        """Show the surface of a frame."""
+        first, self.surface = self.surface is None, surface
+        self._sheet.show(surface)
+        self._explain()
+        self._lay_overlays()
+        if first:
+            self.view_from("isometric")
+
+    def coarsen(self) -> None:
+        """Draw fewer nodes, to follow the mouse smoothly, until :meth:`refine`."""
+        if self.surface is not None:
+            self._sheet.coarsen(self.surface, LIVE_NODES)
+
+    def refine(self) -> None:
+        """Draw all nodes."""
+        self._sheet.refine()
+
+    def set_style(self, style: Style) -> None:
+        """Apply a style: visible parts and exaggeration of the depth."""
+        stretched, self.style = style.exaggeration != self.style.exaggeration, style
+        self._plotter.camera.parallel_projection = style.parallel
+        self._sheet.actor.prop.style = "wireframe" if style.wireframe else "surface"
+        for actor in (self._sheet.actor, self._line.actor, self._dot.actor):
+            actor.scale = (1.0, 1.0, style.exaggeration)
+        self._explain()
+        self._lay_overlays()
+        if stretched:
+            self.show_solid(self._solid)
+
+    def set_ink(self, ink: Ink) -> None:
+        """Set the colours of background and text."""
+        self._ink = ink
+        self._plotter.set_background(ink.low, top=ink.high)
+        self._explain()
+
+    def _explain(self) -> None:
+        """Redraw axes, colour bar and notes if they changed."""
+        surface, style = self.surface, self.style
+        if surface is None:
+            return
+        scale = surface.scale
+        colours = (scale.title, scale.low, scale.high, scale.names, scale.table.tobytes())
+        # By the extent, not the nodes: those of a live and a frozen frame differ.
+        shown = (surface.extent_mm, surface.range_mm, colours, style, self._ink)
+        if shown == self._explained:
+            return
+        axes = axes_of(surface, style.exaggeration)
+        self._explained, self.box = shown, axes.box
+        draw_axes(self._plotter, axes, style, self._ink)
+        draw_scale(self._plotter, scale, self._sheet.actor, style, self._ink)
+        draw_note(self._plotter, style, self._ink)
+        draw_scale_bar(self._plotter, self.box, style, self._ink)
+
+    # Overlays on the surface
+
+    def show_lines(self, lines: tuple[SurfaceLine, ...]) -> None:
+        """Replace the lines on the surface."""
+        self._lines = lines
+        self._lay_overlays()
+
+    def show_cursor(self, point: Point | None) -> None:
+        """Mark a position (x, y) in mm. None: none."""
+        self._cursor = point
+        self._dot.show(None if point is None else self._dots([point]))
+
+    def show_pins(self, pins: tuple[Point, ...], text: str) -> None:
+        """Show pins, a line between two of them, and a text with their values."""
+        self._pins = pins, text
+        if self.surface is not None:
+            points = points_on(self.surface, np.array(pins, np.float64).reshape(-1, 2))
+            whole = len(points) == len(pins)
+            points = points * (1.0, 1.0, self.style.exaggeration)
+            draw_pins(self._plotter, points if whole else points[:0], text, self._ink)
+
+    def show_solid(self, solid: pv.PolyData | None) -> None:
+        """Show a translucent solid, in the scene's frame with exaggeration 1. None: none."""
+        self._solid = solid
+        draw_solid(self._plotter, solid, self.style.exaggeration)
+
+    def clip_by(self, clip: Clip | None) -> None:
+        """Hide the side of a plane that its normal points to. None: hide nothing."""
+        self.clip = clip
+        mapper = self._sheet.actor.mapper
+        mapper.RemoveAllClippingPlanes()
+        if clip is not None:
+            mapper.AddClippingPlane(generate_plane(-np.asarray(clip[0]), clip[1]))
+        self._lay_overlays()
+
+    def _lay_overlays(self) -> None:
+        surface = self.surface
+        if surface is None:
+            return
+        self._line.show(lines_mesh(surface, self._lines))
+        self._dot.show(None if self._cursor is None else self._dots([self._cursor]))
+        cut = None
+        if self.clip is not None:
+            cut = cut_edge(surface, self.style.exaggeration, *self.clip)
+        self._cut.show(cut)
+
+    def _dots(self, positions: list[Point]) -> pv.PolyData | None:
+        if self.surface is None:
+            return None
+        points = points_on(self.surface, np.array(positions, np.float64))
+        return pv.PolyData(points.astype(np.float32)) if len(points) else None
+
+    # The camera
+
+    def view_from(self, view: str) -> None:
+        """View the whole surface from one of VIEWS."""
+        direction, up = VIEWS[view]
+        self._plotter.view_vector(direction, viewup=up, render=False, bounds=self.box or None)
+        self.fit()
+
+    def fit(self) -> None:
+        """Show the whole surface with its axes from the current camera direction."""
+        if not self.box:
+            return
+        renderer, camera = self._plotter.renderer, self._plotter.camera
+        renderer.reset_camera(render=False, bounds=self.box)
+        # VTK fits a sphere around the box. Fitting the box itself shows it larger.
+        corners = np.array(list(product(self.box[:2], self.box[2:4], self.box[4:])))
+        matrix = pv.array_from_vtkmatrix(
+            camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
+        )
+        seen = np.insert(corners, 3, 1.0, axis=1) @ matrix.T
+        reach = np.abs(seen[:, :2] / seen[:, 3:]).max(axis=0)
+        size = np.maximum(self._plotter.window_size, 1)  # 0 before the first paint
+        filled = np.clip(1.0 - 2.0 * MARGIN_PX / size, 0.4, 0.9)
+        self.zoom(float(min(filled / reach)))
+
+    def zoom(self, factor: float) -> None:
+        """Zoom by a factor."""
+        camera = self._plotter.camera
+        if camera.parallel_projection:
+            camera.parallel_scale /= factor
+        else:
+            camera.Dolly(factor)
+        self._plotter.renderer.ResetCameraClippingRange()
+
+    @property
+    def viewpoint(self) -> Viewpoint:
+        """The camera position."""
+        camera = self._plotter.camera
+        position, focus, up = (
+            tuple(float(v) for v in vector)
+            for vector in (camera.position, camera.focal_point, camera.up)
+        )
+        return Viewpoint(
+            position, focus, up, bool(camera.parallel_projection), float(camera.parallel_scale)
+        )
+
+    @viewpoint.setter
+    def viewpoint(self, viewpoint: Viewpoint) -> None:
+        camera = self._plotter.camera
+        camera.position, camera.focal_point = viewpoint.position, viewpoint.focus
+        camera.up, camera.parallel_scale = viewpoint.up, viewpoint.parallel_scale
+        camera.parallel_projection = viewpoint.parallel
+        self._plotter.renderer.ResetCameraClippingRange()
+
+    def copy_to(self, other: Scene) -> None:
+        """Show the same content in another scene, from the same viewpoint."""
+        other.set_ink(self._ink)
+        if self.surface is not None:
+            other.show_surface(self.surface)
+        other.set_style(self.style)
+        other.show_lines(self._lines)
+        other.show_pins(*self._pins)
+        other.show_solid(self._solid)
+        other.clip_by(self.clip)
+        other.viewpoint = self.viewpoint

@@ -1,0 +1,126 @@
+"""How the 3D view is drawn, as values: style, viewpoints, text colours, round numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, fields
+
+Vector = tuple[float, float, float]
+
+VIEWS: dict[str, tuple[Vector, Vector]] = {
+    "isometric": ((-0.55, -1.0, 0.8), (0.0, 0.0, 1.0)),
+    "top": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
+    "front": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    "side": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+}
+"""Direction from surface to camera, and up direction. Front is the lower edge of the image."""
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """The style of the 3D view.
+
+    Attributes
+    ----------
+    exaggeration : float
+        Scale of the drawn depth. Ticks and picked values stay true.
+    axes, colour_bar, orientation, scale_bar, wireframe : bool
+        Whether they are drawn.
+    parallel : bool
+        Parallel instead of perspective projection.
+    """
+
+    exaggeration: float = 1.0
+    axes: bool = True
+    colour_bar: bool = True
+    orientation: bool = True
+    scale_bar: bool = False
+    wireframe: bool = False
+    parallel: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Ink:
+    """Colours of the background, from bottom to top, of text and of grid lines."""
+
+    low: str = "white"
+    high: str = "white"
+    text: str = "black"
+    grid: str = "grey"
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """The camera: position, focal point and up direction, in the scene's frame (mm)."""
+
+    position: Vector
+    focus: Vector
+    up: Vector
+    parallel: bool = False
+    parallel_scale: float = 1.0
+
+
+def style_as_text(style: Style) -> str:
+    """Return a style as text for the settings file."""
+    return json.dumps(asdict(style))
+
+
+def style_from_text(text: str) -> Style:
+    """Return the style of a text. The default if the text is damaged."""
+    try:
+        kept = json.loads(text)
+        known = {field.name for field in fields(Style)} - {"exaggeration"}
+        return Style(**{name: bool(kept[name]) for name in known if name in kept})
+    except (ValueError, TypeError):
+        return Style()
+
+
+def viewpoints_as_text(viewpoints: dict[str, Viewpoint]) -> str:
+    """Return saved viewpoints as text for the settings file."""
+    return json.dumps({name: asdict(viewpoint) for name, viewpoint in viewpoints.items()})
+
+
+def viewpoints_from_text(text: str) -> dict[str, Viewpoint]:
+    """Return the viewpoints of a text. None if the text is damaged."""
+    try:
+        return {str(name): _viewpoint(kept) for name, kept in json.loads(text).items()}
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return {}
+
+
+def _viewpoint(kept: dict[str, object]) -> Viewpoint:
+    vectors = [tuple(float(v) for v in kept[name]) for name in ("position", "focus", "up")]  # type: ignore[attr-defined]
+    scale = float(kept["parallel_scale"])  # type: ignore[arg-type]
+    if any(len(v) != 3 or not all(map(math.isfinite, v)) for v in vectors) or not scale > 0.0:
+        raise ValueError("not a viewpoint")
+    return Viewpoint(*vectors, bool(kept["parallel"]), scale)  # type: ignore[arg-type]
+
+
+_FACTORS = (0.1, 0.2, 0.25, 0.4, 0.5, 1.0, 2.0, 2.5, 4.0, 5.0, 10.0, 20.0)
+
+
+def ticks(low: float, high: float, most: int) -> tuple[float, ...]:
+    """Return round values with equal steps, from at most `low` to at least `high`.
+
+    Parameters
+    ----------
+    low, high : float
+        Range to cover. `high` is greater than `low`.
+    most : int
+        Maximum number of values, 3 or more; 2 if `low` is 0.
+
+    Returns
+    -------
+    values : tuple of float
+        The values that extend least beyond the range, and of these as many as allowed.
+    """
+    power = 10.0 ** math.floor(math.log10(high - low))
+    found = []
+    for step in (power * factor for factor in _FACTORS):
+        first, last = math.floor(low / step + 1e-6), math.ceil(high / step - 1e-6)
+        if 1 <= last - first < most:
+            reach = step * (last - first) / (high - low)
+            found.append((round(reach, 6), first - last, step, first, last))
+    _, _, step, first, last = min(found)
+    return tuple(round(step * k, 12) for k in range(first, last + 1))

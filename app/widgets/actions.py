@@ -1,0 +1,52 @@
+"""Actions, shared by menus, buttons, shortcuts and the shortcut sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QWidget
+
+from app.theme.icons import icon
+from app.widgets.label import plain_tip
+
+
+def make_action(
+    parent: QWidget,
+    name: str,
+    text: str,
+    slot: Callable[[], object],
+    *,
+    keys: tuple[str, ...] = (),
+    icon_name: str = "",
+    tip: str = "",
+) -> QAction:
+    """Return an action of a widget. Its shortcut works while the widget is visible.
+
+    Parameters
+    ----------
+    parent : QWidget
+        The action belongs to it and is added to it.
+    name : str
+        A dotted path. Its first part is the action's group on the shortcut sheet.
+    text : str
+        Text with ``&`` before the mnemonic letter.
+    slot : callable
+        Called without arguments.
+    keys : tuple of str, optional
+        Shortcuts such as ``Ctrl+O``.
+    icon_name : str, optional
+        A name of :mod:`app.theme.icons`.
+    tip : str, optional
+        Tooltip.
+    """
+    action = QAction(text, parent)
+    action.setObjectName(name)
+    action.setShortcuts(list(keys))
+    if icon_name:
+        action.setIcon(icon(icon_name))
+    if tip:
+        action.setToolTip(plain_tip(tip))
+    action.triggered.connect(lambda _checked=False: slot())
+    parent.addAction(action)
+    return action

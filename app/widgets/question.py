@@ -1,0 +1,66 @@
+"""A question before something that the user might regret. It does not block the program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPushButton, QVBoxLayout, QWidget
+
+from app.widgets.label import PlainLabel
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+WIDTH = 460
+
+
+class Question(QDialog):
+    """A sentence with one button for each answer, and Cancel. Enter chooses the first answer.
+
+    Parameters
+    ----------
+    parent : QWidget
+        The window that waits for the answer.
+    title, text : str
+        What it is about, and the question.
+    answers : tuple of (label, callable)
+        What each answer does, after the question is closed.
+    """
+
+    def __init__(
+        self,
+        parent: QWidget,
+        title: str,
+        text: str,
+        answers: tuple[tuple[str, Callable[[], object]], ...],
+    ) -> None:
+        super().__init__(parent)
+        named(self, "question", title)
+        self.setWindowTitle(title)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        label = named(PlainLabel(text, self), "question.text", text)
+        label.setWordWrap(True)
+        label.setMinimumWidth(WIDTH)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel, self)
+        buttons.rejected.connect(self.reject)
+        for number, (words, act) in enumerate(answers):
+            button = named(QPushButton(words, self), f"question.answer{number}", words)
+            button.setDefault(number == 0)
+            buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
+            button.clicked.connect(self.accept)
+            button.clicked.connect(act)
+        named(
+            buttons.button(QDialogButtonBox.StandardButton.Cancel), "question.cancel", tr("Cancel")
+        )
+        column = QVBoxLayout(self)
+        column.addWidget(label)
+        column.addWidget(buttons)
+
+
+def ask(
+    parent: QWidget, title: str, text: str, *answers: tuple[str, Callable[[], object]]
+) -> Question:
+    """Ask a question in front of a window, and return it."""
+    question = Question(parent, title, text, answers)
+    question.open()
+    return question

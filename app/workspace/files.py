@@ -1,0 +1,70 @@
+"""Files of the workspace: unused names, copies and moves that are complete or not made at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from typing import BinaryIO
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import NameTakenError, write_atomically
+from gelpolight_core.io.reading import open_file
+from gelpolight_core.translation import tr
+
+COPY_BYTES = 1 << 20
+
+
+def free_path(path: Path) -> Path:
+    """Return `path`, or a similar path with a number if it exists."""
+    candidate, number = path, 1
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return candidate
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a small file completely or not at all."""
+
+    def write(stream: BinaryIO) -> None:
+        stream.write(data)
+
+    write_atomically(path, write)
+
+
+def copy_new(source: Path, wanted: Path) -> Path:
+    """Copy a file to an unused path, and return that path."""
+    while True:
+        target = free_path(wanted)
+        try:
+            copy_file(source, target, new=True)
+        except NameTakenError:
+            continue
+        return target
+
+
+def copy_file(source: Path, target: Path, *, new: bool = False) -> None:
+    """Copy a file. With `new`, the target must not exist."""
+    try:
+        stream = open_file(source)
+    except OSError as error:
+        raise _refused(error, source) from error
+    with stream:
+        write_atomically(target, lambda out: shutil.copyfileobj(stream, out, COPY_BYTES), new=new)
+
+
+def move_file(source: Path, target: Path) -> None:
+    """Move a file within the workspace."""
+    try:
+        os.replace(source, target)
+    except OSError as error:
+        raise _refused(error, source) from error
+
+
+def _refused(error: OSError, path: Path) -> InputError:
+    return InputError(
+        tr("The operating system refused it ({reason})").format(reason=error.strerror or error),
+        where=str(path),
+        advice=tr("Check the name, the permissions and the disk space"),
+    )

@@ -1,0 +1,179 @@
+"""The scenes of a calibrated sensor: library, Inspect, Measure, the evaluation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QComboBox, QSpinBox
+from screenshot_operator import Operator
+
+from app.inspect.page import InspectPage
+from app.measure.page import MeasurePage
+from app.sources.bench import Bench
+
+if TYPE_CHECKING:
+    from app.measure.press_view import PressView
+
+DRIFTED_MS = 10.3
+"""In place of 10: what LEDs that were not warm yet do to the light."""
+TRUE_MM = 5.0
+
+
+def library(operator: Operator) -> None:
+    """Show the library with its first sensor."""
+    show(operator, "sensors")
+    operator.window.context.toasts.clear()
+    operator.shot("sensors")
+
+
+def inspect(operator: Operator) -> None:
+    """Look at a coin, live; then standing, with its uncertainty."""
+    bench(operator).lay("coin")
+    show(operator, "inspect")
+    page = inspect_page(operator)
+    operator.until(lambda: page._shown is not None and page._shown.surface is not None, "depth")
+    operator.until(lambda: page.views.surface.view is not None, "the 3D view")
+    operator.pause(6.0)
+    operator.shot("inspect")
+    page.views.docks["quality"].raise_()
+    choice = page.views.quality.findChild(QComboBox, "inspect.quality.what")
+    assert choice is not None
+    choice.setCurrentIndex(choice.findData("uncertainty"))
+    operator.pause(2.0)
+    page.pause(True)
+    operator.until(
+        lambda: page._shown is not None and page._shown.quality is not None, "the uncertainty"
+    )
+    operator.pause(2.0)
+    operator.shot("inspect-standing")
+    page.pause(False)
+    page.views.docks["camera"].raise_()
+
+
+def recording(operator: Operator) -> None:
+    """Record a press, and replay it."""
+    page = inspect_page(operator)
+    bench(operator).lay("nut")
+    operator.pause(3.0)
+    page.recorder.start()
+    for step in range(12):
+        bench(operator).arrange(x_mm=0.4 * step - 2.0)
+        operator.pause(0.3)
+    page.recorder.stop()
+    operator.until(lambda: not page.recorder.busy, "the recording")
+    file = max(operator.window.context.workspace.folder.rglob("*.gplrec"))
+    operator.window.context.toasts.clear()
+    operator.window.context.source.choose_recording(file)
+    operator.pause(6.0)
+    operator.shot("inspect-replay")
+    operator.window.context.source.choose_virtual_sensor()
+
+
+def drift(operator: Operator) -> None:
+    """Look at the sensor in another light than on the day of the calibration."""
+    page = inspect_page(operator)
+    bench(operator).lay("bare")
+    bench(operator).adjust(exposure_ms=DRIFTED_MS)
+    operator.pause(3.0)
+    operator.until(lambda: page.depth.state.fault is not None, "the fault")
+    operator.shot("inspect-drift")
+    bench(operator).adjust(exposure_ms=10.0)
+    operator.pause(6.0)
+
+
+def measure(operator: Operator) -> None:
+    """Hold, measure, compare and keep a cylinder of known size, some times."""
+    bench(operator).lay("bare")
+    show(operator, "measure")
+    press_view = measure_page(operator).press_view
+    places = ((1.0, -1.5), (-3.0, 2.0), (3.5, 3.0), (-2.5, -4.0), (0.5, 4.5))
+    for number, (x_mm, y_mm) in enumerate(places):
+        press_cylinder(operator, press_view, x_mm, y_mm)
+        truth = press_view.panel.truth
+        if not number:
+            five = truth.known.findText("Cylinder 5", Qt.MatchFlag.MatchContains)
+            truth.known.setCurrentIndex(five)
+            truth.known.activated.emit(truth.known.currentIndex())
+            operator.pause(1.0)
+            operator.shot("measure")
+        operator.click("measure.keep")
+        operator.until(press_view.panel.kept.text, "the kept measurement")
+        press_view.release()
+    measure_page(operator).tabs.setCurrentWidget(measure_page(operator).results)
+    operator.pause(2.0)
+    operator.window.context.toasts.clear()
+    operator.shot("measure-records")
+
+
+def press_cylinder(operator: Operator, press_view: PressView, x_mm: float, y_mm: float) -> None:
+    """Press the cylinder in somewhere, and wait until it is held and measured."""
+    bench(operator).lay("bare")
+    operator.pause(2.0)
+    bench(operator).lay("cylinder")
+    bench(operator).arrange(x_mm=x_mm, y_mm=y_mm, size_mm=TRUE_MM)
+    operator.until(lambda: press_view.work.image is not None, "the held press")
+    operator.until(
+        lambda: press_view.work.result is not None and not press_view.work.busy, "what was measured"
+    )
+
+
+def evaluation(operator: Operator) -> None:
+    """Let the bench press a short run of the paper's protocol."""
+    view = measure_page(operator).protocol
+    measure_page(operator).tabs.setCurrentWidget(view)
+    operator.pause(1.0)
+    operator.shot("evaluation-set-up")
+    for box in view.setup.findChildren(QCheckBox):
+        name = box.objectName()
+        if name in ("protocol.size.3.0", "protocol.size.6.0", "protocol.height.0.5"):
+            box.setChecked(False)
+    for name in ("protocol.repeats", "protocol.regions"):
+        counter = view.setup.findChild(QSpinBox, name)
+        assert counter is not None
+        counter.setValue(1)
+    operator.click("protocol.begin", view)
+    operator.until(lambda: view.pressing is not None, "the run")
+    run = view.pressing
+    assert run is not None and view.work is not None
+    operator.until(lambda: run.live.stream is not None, "the camera")
+    run.panel.bench.setChecked(True)
+    work = view.work
+    operator.until(lambda: work.measured_count >= 4, "measured presses")
+    operator.shot("evaluation-press")
+    operator.until(lambda: work.run.next() is None, "all presses")
+    operator.until(lambda: view._stack.currentWidget() is view.result, "the result")
+    operator.until(lambda: "presses" in view.result.verdict.text(), "the evaluation")
+    operator.window.context.toasts.clear()
+    operator.shot("evaluation-result")
+
+
+def show(operator: Operator, name: str) -> None:
+    """Show a page."""
+    operator.window.show_page(name)
+    operator.until(lambda: operator.window.page_name == name, f"the page {name}")
+    operator.pause(1.0)
+
+
+def bench(operator: Operator) -> Bench:
+    """Return what lies on the virtual sensor."""
+    found = operator.window.context.source.bench
+    assert found is not None
+    return found
+
+
+def inspect_page(operator: Operator) -> InspectPage:
+    """Return the Inspect page."""
+    found = operator.window.page("inspect")
+    assert isinstance(found, InspectPage)
+    return found
+
+
+def measure_page(operator: Operator) -> MeasurePage:
+    """Return the Measure page."""
+    found = operator.window.page("measure")
+    assert isinstance(found, MeasurePage)
+    return found
+
+
+SCENES = (library, inspect, recording, drift, measure, evaluation)

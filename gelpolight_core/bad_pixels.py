@@ -1,0 +1,220 @@
+"""Dead and hot pixels and lines of a camera: finding them, and leaving them out of an image.
+
+A lens spreads every point of light over neighbouring pixels. A pixel that differs from all its
+neighbours, which agree with each other, is therefore a fault of the camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Places = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+
+LEAST_STEP = 0.03
+"""A bad pixel differs from its neighbours by this share of full scale at least."""
+OF_SPREAD = 1.5
+"""... and by so many times what these differ among themselves."""
+LINE_SHARE = 0.5
+"""A column (row) is bad where at least this share of its pixels differs from both sides."""
+ACROSS, DOWN = 1, 2
+REACH = 12
+"""Pixels to the nearest good one beyond which a bad pixel is no single pixel or line."""
+
+
+@dataclass(frozen=True)
+class BadPixels:
+    """Pixels of a camera that do not follow the light.
+
+    Attributes
+    ----------
+    places : (N, 2) int32
+        Row and column.
+    height, width : int
+        Size of the image.
+
+    Raises
+    ------
+    ValueError
+        If a place is not in the image.
+    """
+
+    places: Places
+    height: int
+    width: int
+
+    def __post_init__(self) -> None:
+        """Refuse places that no image has."""
+        p = self.places
+        if p.ndim != 2 or p.shape[1] != 2 or p.dtype != np.int32:
+            raise ValueError(f"bad pixels of shape {p.shape}, {p.dtype}")
+        if p.size and (p.min() < 0 or (p >= np.array([self.height, self.width])).any()):
+            raise ValueError("bad pixels outside the image")
+
+    @cached_property
+    def mask(self) -> Mask:
+        """Whether a pixel is bad, (height, width)."""
+        mask = np.zeros((self.height, self.width), np.bool_)
+        mask[self.places[:, 0], self.places[:, 1]] = True
+        return mask
+
+    @cached_property
+    def _sources(self) -> tuple[Places, Places]:
+        """Return rows and columns (2, N) of the two good pixels that a bad one is replaced by."""
+        rows, columns = (np.ascontiguousarray(p, np.int64) for p in self.places.T)
+        best = np.full(rows.size, np.iinfo(np.int64).max)
+        found = [np.stack([rows, rows]), np.stack([columns, columns])]
+        # Where two lines cross, only the diagonals have good pixels.
+        for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            before = self._nearest(rows, columns, -down, -across)
+            after = self._nearest(rows, columns, down, across)
+            # At the border the pixel's only good side counts twice.
+            one, other = np.where(before > 0, -before, after), np.where(after > 0, after, -before)
+            span = np.where((before > 0) & (after > 0), before + after, 4 * REACH)
+            span[(before == 0) & (after == 0)] = np.iinfo(np.int64).max
+            nearer = span < best
+            best[nearer] = span[nearer]
+            for at, step in enumerate((one, other)):
+                found[0][at, nearer] = (rows + down * step)[nearer]
+                found[1][at, nearer] = (columns + across * step)[nearer]
+        return np.asarray(found[0], np.int32), np.asarray(found[1], np.int32)
+
+    def _nearest(
+        self, rows: NDArray[np.int64], columns: NDArray[np.int64], down: int, across: int
+    ) -> NDArray[np.int64]:
+        """Return how many steps away the nearest good pixel is; 0 where there is none."""
+        steps = np.zeros(rows.size, np.int64)
+        for n in range(REACH, 0, -1):
+            r, c = rows + n * down, columns + n * across
+            inside = (r >= 0) & (r < self.height) & (c >= 0) & (c < self.width)
+            good = inside.copy()
+            good[inside] = ~self.mask[r[inside], c[inside]]
+            steps[good] = n
+        return steps
+
+    def left_out(self, image: NDArray[Any]) -> NDArray[Any]:
+        """Return an image with each bad pixel replaced by the mean of good neighbours.
+
+        Parameters
+        ----------
+        image : (height, width, 3)
+            Any numbers; it is not changed. Returned as it is where no pixel is bad.
+        """
+        if not self.places.size:
+            return image
+        whole = image.copy()
+        (row, other_row), (column, other_column) = self._sources
+        first, second = image[row, column], image[other_row, other_column]
+        mean = 0.5 * first + 0.5 * second
+        # As the arrays' own kind: whole numbers are rounded.
+        mean = np.rint(mean) if image.dtype.kind == "u" else mean
+        whole[self.places[:, 0], self.places[:, 1]] = mean.astype(image.dtype)
+        return whole
+
+
+def no_bad_pixels(height: int, width: int) -> BadPixels:
+    """Return that all pixels are good."""
+    return BadPixels(np.zeros((0, 2), np.int32), height, width)
+
+
+def find_bad_pixels(images: list[NDArray[np.float32]], *, noise: float) -> BadPixels:
+    """Return the pixels and lines that differ from their neighbours in each image.
+
+    Dirt differs too, but in one scene only; and it covers more than a pixel.
+
+    Parameters
+    ----------
+    images : list of (height, width, 3) float32
+        Different scenes of one camera, linear light 0..1.
+    noise : float
+        Standard deviation of a pixel, share of full scale.
+    """
+    height, width = images[0].shape[:2]
+    bad = np.ones((height, width), np.bool_)
+    light = np.tile(np.linspace(0.0, 1.0, 65536, dtype=np.float32), (3, 1))
+    for image in images:
+        code = np.rint(np.clip(np.nan_to_num(image), 0.0, 1.0) * 65535.0).astype(np.uint16)
+        marks = differing(code, light, np.arange(height), noise=noise)
+        spikes = marks == (ACROSS | DOWN)
+        spikes[:, bad_lines(marks, ACROSS)] = True
+        spikes[bad_lines(marks.T, DOWN), :] = True
+        bad &= spikes
+    return BadPixels(np.argwhere(bad).astype(np.int32), height, width)
+
+
+def bad_lines(marks: NDArray[np.uint8], side: int) -> NDArray[np.intp]:
+    """Return the columns of `marks` most of whose pixels differ from both neighbours.
+
+    Neighbouring bad lines would be texture: a camera's are single.
+    """
+    if not marks.any():
+        return np.zeros(0, np.intp)
+    return np.flatnonzero(((marks & side) > 0).sum(axis=0) >= LINE_SHARE * len(marks))
+
+
+def differing(
+    raw: NDArray[Any], light: NDArray[np.float32], rows: NDArray[np.intp], *, noise: float
+) -> NDArray[np.uint8]:
+    """Return which pixels of some rows differ from their neighbours.
+
+    Parameters
+    ----------
+    raw : (height, width, 3) uint8 or uint16
+        The image, writeable and contiguous.
+    light : (3, levels) float32
+        Linear light of every number.
+    rows : (N,) int
+        Which rows are looked at.
+    noise : float
+        Standard deviation of a pixel, share of full scale.
+
+    Returns
+    -------
+    (N, width) uint8
+        `ACROSS`: it differs from the pixels beside it; `DOWN`: from those above and below.
+    """
+    marks = np.zeros((len(rows), raw.shape[1]), np.uint8)
+    if min(raw.shape[:2]) > 4:
+        least = np.float32(max(LEAST_STEP, 8.0 * noise))
+        _differing(raw, light, np.asarray(rows, np.int64), least, marks)
+    return marks
+
+
+@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True, forceinline=True)
+def _differs(p, a, b, c, d, least):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return whether p is far from a, b, c and d, which agree."""
+    low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
+    limit = least + np.float32(OF_SPREAD) * (high - low)
+    return p > high + limit or p < low - limit
+
+
+@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+def _differing(raw, light, rows, least, marks):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Write the marks of some rows; the outermost two pixels are left out."""
+    height, width = raw.shape[0], raw.shape[1]
+    for i in range(rows.size):
+        r = rows[i]
+        inner = 2 <= r < height - 2
+        for c in range(2, width - 2):
+            mark = 0
+            for k in range(3):
+                p = light[k, raw[r, c, k]]
+                a, d = light[k, raw[r, c - 1, k]], light[k, raw[r, c + 1, k]]
+                # Most pixels lie between their neighbours, or near them.
+                if abs(p - a) > least and abs(p - d) > least:
+                    b, e = light[k, raw[r, c - 2, k]], light[k, raw[r, c + 2, k]]
+                    if _differs(p, b, a, d, e, least):
+                        mark |= ACROSS
+                if inner:
+                    a, d = light[k, raw[r - 1, c, k]], light[k, raw[r + 1, c, k]]
+                    if abs(p - a) > least and abs(p - d) > least:
+                        b, e = light[k, raw[r - 2, c, k]], light[k, raw[r + 2, c, k]]
+                        if _differs(p, b, a, d, e, least):
+                            mark |= DOWN
+            marks[i, c] = mark

@@ -1,0 +1,220 @@
+"""The calibration of a closed sensor being made: session, results, and what is out of date."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from gelpolight_core.calibration.editable_session import EditableSession
+from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
+from gelpolight_core.calibration.inputs import FOLDERS, Stage, StageInputs, changes_between
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.bare_membrane import check_bare_membrane
+from gelpolight_core.quality import QualityTable
+from gelpolight_core.session.closed import ClosedSession, read_any_session
+from gelpolight_core.session.file_hashes import CachedHashes
+from gelpolight_core.session.images import require_colour
+from gelpolight_core.translation import tr
+
+STAGES = (Stage.BACKGROUND, Stage.BALLS)
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedResults:
+    """Results of a closed sensor so far.
+
+    Attributes
+    ----------
+    background : QualityTable
+        Figures of the untouched membrane.
+    run : InPlaceRun or None
+        The newest calibration, even if out of date.
+    """
+
+    background: QualityTable = field(default_factory=QualityTable)
+    run: InPlaceRun | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Outcome:
+    inputs: StageInputs
+    fault: InputError | None
+
+
+class ClosedProject(EditableSession[ClosedSession]):
+    """The session folder of a closed sensor with its results; used as a CalibrationProject.
+
+    Parameters
+    ----------
+    folder : Path
+        A session folder whose ``session.toml`` has a table ``[in_place]``.
+
+    Raises
+    ------
+    InputError
+        If the folder is not such a session.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, _read)
+        self._hashes = CachedHashes()
+        self._results = ClosedResults()
+        self._outcomes: dict[Stage, _Outcome] = {}
+
+    @property
+    def results(self) -> ClosedResults:
+        """The newest results, even if out of date."""
+        return self._results
+
+    @property
+    def all_inputs(self) -> str:
+        """A text that changes with any input of the calibration."""
+        with self._lock:
+            balls, serial = self._inputs()[Stage.BALLS], self._session.serial
+        return hashlib.sha256(repr((balls.fingerprint, serial)).encode()).hexdigest()
+
+    def statuses(self) -> dict[Stage, StageStatus]:
+        """Return the present status of both stages."""
+        with self._lock:
+            inputs = self._inputs()
+            return {stage: self._status(stage, inputs[stage]) for stage in STAGES}
+
+    def stale(self, *, upto: Stage | None = None) -> tuple[Stage, ...]:
+        """Return the stages that can and need to be computed, in order.
+
+        Parameters
+        ----------
+        upto : Stage, optional
+            The last of them.
+        """
+        with self._lock:
+            inputs = self._inputs()
+        found = []
+        for stage in STAGES[:1] if upto is Stage.BACKGROUND else STAGES:
+            if not inputs[stage].pictures:
+                break
+            outcome = self._outcomes.get(stage)
+            if outcome is None or outcome.inputs != inputs[stage]:
+                found.append(stage)
+            elif outcome.fault is not None:
+                break
+        return tuple(found)
+
+    def compute(self, stage: Stage, tell: Callable[[float], None] | None = None) -> StageStatus:
+        """Run one stage on the present images and decisions, and store its result.
+
+        Parameters
+        ----------
+        stage : Stage
+            Background or balls.
+        tell : callable, optional
+            Called with the share done; it may raise, which leaves everything unchanged.
+        """
+        with self._lock:
+            session, results, dropped = self._session, self._results, self._dropped
+            inputs = self._inputs()[stage]
+        fault = None
+        say = tell or (lambda _share: None)
+        try:
+            if stage is Stage.BACKGROUND:
+                image = session.averaged("background")
+                require_colour(image, where=str(session.folder / "background"))
+                table = check_bare_membrane(image.rgb).quality
+                results = replace(results, background=table)
+            else:
+                run = calibrate_closed_session(session, progress=lambda _stage, share: say(share))
+                results = replace(results, run=run)
+        except InputError as error:
+            fault = error
+        with self._lock:
+            # An image that was added and removed meanwhile may be in the result, but in no input.
+            if self._dropped == dropped:
+                if fault is None:
+                    self._results = results
+                self._outcomes[stage] = _Outcome(inputs, fault)
+            return self._status(stage, self._inputs()[stage])
+
+    def finish(self) -> InPlaceRun:
+        """Return the calibration of the present images.
+
+        Raises
+        ------
+        InputError
+            If it is missing, out of date or failed.
+        """
+        with self._lock:
+            status, run = self.statuses()[Stage.BALLS], self._results.run
+            fault = self._outcomes[Stage.BALLS].fault if Stage.BALLS in self._outcomes else None
+            if fault is not None:
+                raise fault
+            if run is None or status.state in (StageState.STALE, StageState.WAITING):
+                raise InputError(
+                    tr("The stage {stage} has no up-to-date result").format(stage="balls"),
+                    where=str(self._session.folder),
+                    advice=tr("Complete the stages that are not done yet"),
+                )
+            provenance = replace(run.calibration.provenance, inputs=self.all_inputs)
+        return replace(run, calibration=replace(run.calibration, provenance=provenance))
+
+    def _inputs(self) -> dict[Stage, StageInputs]:
+        session = self._session
+        radii = sorted(session.ball_radii_mm.items()), session.ball_default_radius_mm
+        circles = sorted(session.decisions.balls.items())
+        scale = session.mm_per_px, session.mm_per_px_sd, session.pressed_scale
+        background = self._inputs_of(("background",), session.declared_response, ())
+        folders = ("balls", *session.stages[2:])
+        balls = self._inputs_of(folders, (radii, circles, scale), (background.fingerprint,))
+        return {Stage.BACKGROUND: background, Stage.BALLS: balls}
+
+    def _inputs_of(
+        self, folders: tuple[str, ...], stated: object, earlier: tuple[str, ...]
+    ) -> StageInputs:
+        files = [path for folder in folders for path in self._session.found(folder)]
+        images = tuple((path.name, self._hashes(path)) for path in files)
+        return StageInputs(images, repr(stated), earlier)
+
+    def _status(self, stage: Stage, inputs: StageInputs) -> StageStatus:
+        outcome, nothing = self._outcomes.get(stage), QualityTable()
+        if not self._session.found(FOLDERS[stage]):
+            return StageStatus(stage, StageState.EMPTY, tr("No images captured yet"), nothing)
+        if outcome is None:
+            return StageStatus(stage, StageState.WAITING, tr("Not computed yet"), nothing)
+        if outcome.inputs != inputs:
+            changes = "; ".join(changes_between(outcome.inputs, inputs))
+            sentence = tr("Out of date: {changes}").format(changes=changes)
+            return StageStatus(stage, StageState.STALE, sentence, nothing)
+        if outcome.fault is not None:
+            return StageStatus(stage, StageState.FAIL, str(outcome.fault), nothing)
+        table, run = self._results.background, self._results.run
+        if stage is Stage.BALLS and run is not None:
+            tables = run.calibration.quality.values()
+            table = QualityTable(tuple(figure for t in tables for figure in t.figures))
+        return judged_by(stage, table)
+
+
+def open_project(folder: Path) -> CalibrationProject | ClosedProject:
+    """Open a session folder, of an open or of a closed sensor.
+
+    Raises
+    ------
+    InputError
+        As :func:`~gelpolight_core.session.closed.read_any_session`.
+    """
+    if isinstance(read_any_session(folder), ClosedSession):
+        return ClosedProject(folder)
+    return CalibrationProject(folder)
+
+
+def _read(folder: Path) -> ClosedSession:
+    session = read_any_session(folder)
+    if isinstance(session, ClosedSession):
+        return session
+    raise InputError(
+        tr("The session has no table [in_place]"),
+        where=str(folder),
+        advice=tr("Open it as the session of an open sensor"),
+    )

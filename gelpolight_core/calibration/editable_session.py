@@ -1,0 +1,420 @@
+"""A session folder being edited; each capture, decision and value is written to disk at once.
+
+Everything is on disk before the call returns, so that a crash loses nothing. Two threads may use
+it: one that captures and decides, one that reads.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.image_checks import read_bytes, refuse_other_size, refuse_unfit
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
+from gelpolight_core.session.camera_settings import CameraSettings
+from gelpolight_core.session.capture import average_frames, write_picture
+from gelpolight_core.session.closed import ClosedSession
+from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
+from gelpolight_core.session.decisions import (
+    Decisions,
+    PlacedCircle,
+    Point,
+    write_decisions,
+)
+from gelpolight_core.session.description import FILE_NAME as DESCRIPTION
+from gelpolight_core.session.description import write_description
+from gelpolight_core.session.known_files import KnownFiles
+from gelpolight_core.session.session import ONE_IMAGE_STAGES, Session
+
+Described = TypeVar("Described", Session, ClosedSession)
+"""The session of an open or of a closed sensor."""
+Frame = NDArray[Any]
+Write = Callable[[Path, Path], None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Replaced:
+    """What a new view has replaced: images, and the spots set in them."""
+
+    pictures: frozenset[str] = frozenset()
+    spots_px: Mapping[int, Point] = field(default_factory=dict)
+
+
+class EditableSession(Generic[Described]):
+    """One session folder being edited.
+
+    Parameters
+    ----------
+    folder : Path
+        A session folder with ``session.toml``.
+    read : callable
+        Reads the folder.
+
+    Raises
+    ------
+    InputError
+        If the folder is not a session.
+    """
+
+    def __init__(self, folder: Path, read: Callable[[Path], Described]) -> None:
+        self._lock = threading.RLock()
+        self._read: Callable[[Path], Described] = read
+        self._files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
+        self._session: Described = read(folder)
+        self._replaced: dict[str, _Replaced] = {}
+        self._dropped = 0  # counts removed images that a running computation may have used
+
+    @property
+    def session(self) -> Described:
+        """The present session."""
+        return self._session
+
+    def add_capture(
+        self, stage: Stage, frames: Sequence[Frame], *, radius_mm: float | None = None
+    ) -> str:
+        """Store frames of one view as one image, their average, and return its name.
+
+        In a stage with a single view, a new capture replaces the earlier ones; these are kept but
+        excluded.
+
+        Parameters
+        ----------
+        stage : Stage
+            A stage with its own images.
+        frames : sequence of (rows, columns, 3) uint8 or uint16
+            RGB.
+        radius_mm : float, optional
+            Radius of the ball, for a press.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written, or its size differs from the session's images.
+        """
+        refuse_other_size(self._session, (frames[0].shape[1], frames[0].shape[0]))
+        folder = FOLDERS[stage]
+        write = partial(_write, average_frames(frames))
+        (name,) = self._keep_all(folder, [(".png", write)], radius_mm)
+        return name
+
+    def import_files(
+        self, stage: Stage, files: Sequence[Path], *, radius_mm: float | None = None
+    ) -> tuple[str, ...]:
+        """Copy image files into a stage and return their new names.
+
+        Parameters
+        ----------
+        stage : Stage
+            A stage with its own images.
+        files : sequence of Path
+            PNG or TIFF.
+        radius_mm : float, optional
+            Radius of the ball in them, for presses.
+
+        Raises
+        ------
+        InputError
+            If a file is not an image that fits into the session; then none is added.
+        """
+        refuse_unfit(self._session, stage, files)
+        pictures = [(path.suffix.lower(), partial(_copy, path)) for path in files]
+        return self._keep_all(FOLDERS[stage], pictures, radius_mm)
+
+    def take_back(self, stage: Stage, names: Sequence[str]) -> None:
+        """Undo adding images: exclude those that were added together.
+
+        The images that they had replaced are used again. The files themselves stay.
+
+        Parameters
+        ----------
+        stage : Stage
+            Their stage.
+        names : sequence of str
+            File names.
+        """
+        with self._lock:
+            files, former = self._files_and_replaced(stage, names)
+            now = self._session.decisions
+            excluded = (now.excluded | files) - former.pictures
+            spots = {**now.spots_px, **former.spots_px}
+            self.decide(replace(now, excluded=excluded, spots_px=spots))
+            self._dropped += 1
+
+    def take_again(self, stage: Stage, names: Sequence[str]) -> None:
+        """Add images again after :meth:`take_back`.
+
+        Parameters
+        ----------
+        stage, names
+            As for :meth:`take_back`.
+        """
+        with self._lock:
+            files, former = self._files_and_replaced(stage, names)
+            now = self._session.decisions
+            excluded = (now.excluded - files) | former.pictures
+            spots = {led: p for led, p in now.spots_px.items() if led not in former.spots_px}
+            self.decide(replace(now, excluded=excluded, spots_px=spots))
+
+    def _files_and_replaced(self, stage: Stage, names: Sequence[str]) -> tuple[set[str], _Replaced]:
+        files = {f"{FOLDERS[stage]}/{name}" for name in names}
+        return files, self._replaced.get(min(files), _Replaced())
+
+    def _keep_all(
+        self, folder: str, pictures: Sequence[tuple[str, Write]], radius_mm: float | None
+    ) -> tuple[str, ...]:
+        """Write images that belong together, all or none, and return their names."""
+        names: list[str] = []
+        with self._lock:
+            try:
+                for suffix, write in pictures:
+                    names.append(self._keep(folder, suffix, radius_mm, write))
+                self._replace_views(folder, set(names))
+            except InputError:
+                with contextlib.suppress(OSError, InputError):  # the first refusal is reported
+                    self._drop(folder, names)
+                raise
+        return tuple(names)
+
+    def _drop(self, folder: str, names: Sequence[str]) -> None:
+        self._dropped += bool(names)
+        for name in names:
+            (self._session.folder / folder / name).unlink(missing_ok=True)
+        radii = self._session.ball_radii_mm
+        if not radii.keys().isdisjoint(names):
+            kept = {name: radii[name] for name in radii if name not in names}
+            self._describe(replace(self._session, ball_radii_mm=kept))
+
+    def _keep(
+        self,
+        folder: str,
+        suffix: str,
+        radius_mm: float | None,
+        write: Write,
+    ) -> str:
+        """Write an image under the next free name, and return that name.
+
+        Another program that captures into the same session may use that name at the same moment.
+        """
+        while True:
+            name = self._next_name(folder, suffix)
+            save = partial(write, self._session.folder, self._session.folder / folder / name)
+            try:
+                self._keep_as(name, radius_mm, save)
+            except NameTakenError:
+                continue
+            return name
+
+    def _keep_as(self, name: str, radius_mm: float | None, write: Callable[[], None]) -> None:
+        """Write an image; its radius first, so that no press ever has another one's radius."""
+        before = self._session.ball_radii_mm.get(name)
+        if radius_mm is not None:
+            self.set_ball_radius(name, radius_mm)
+        try:
+            write()
+        except InputError:
+            if radius_mm is not None:
+                self.set_ball_radius(name, before)
+            raise
+
+    def decide(self, decisions: Decisions) -> None:
+        """Replace the present decisions by new ones, on disk first."""
+        with self._lock:
+            path = self._session.folder / DECISIONS
+            self._files.refuse_changed(path)
+            write_decisions(decisions, self._session.folder)
+            self._files.take(path)
+            self._session = replace(self._session, decisions=decisions)
+
+    def exclude(self, stage: Stage, name: str, excluded: bool = True) -> None:
+        """Exclude an image, or include it again.
+
+        Parameters
+        ----------
+        stage : Stage
+            Stage of the image.
+        name : str
+            Its file name.
+        excluded : bool, optional
+            False includes the image again.
+        """
+        with self._lock:
+            key = f"{FOLDERS[stage]}/{name}"
+            names = self._session.decisions.excluded
+            names = names | {key} if excluded else names - {key}
+            self.decide(replace(self._session.decisions, excluded=names))
+            self._dropped += excluded
+
+    def place_spot(self, led: int, place: Point | None) -> None:
+        """Set an LED's mirror spot by hand; None returns to the detected one.
+
+        Parameters
+        ----------
+        led : int
+            0, 1, 2: red, green, blue.
+        place : (u, v) or None
+            In pixels of the mirror image.
+        """
+        with self._lock:
+            spots = _with(self._session.decisions.spots_px, led, place)
+            self.decide(replace(self._session.decisions, spots_px=spots))
+
+    def place_ball(self, name: str, circle: PlacedCircle | None) -> None:
+        """Set the contact in a ball image by hand; None returns to the detected one.
+
+        Parameters
+        ----------
+        name : str
+            File name of the image.
+        circle : PlacedCircle or None
+            In pixels of the raw image.
+        """
+        with self._lock:
+            balls = _with(self._session.decisions.balls, name, circle)
+            self.decide(replace(self._session.decisions, balls=balls))
+
+    def edit_curves(self, curves: Mapping[int, tuple[Point, ...]]) -> None:
+        """Set the reflectance curves drawn by hand; the others stay as fitted."""
+        with self._lock:
+            self.decide(replace(self._session.decisions, curves=dict(curves)))
+
+    def describe(self, session: Described) -> None:
+        """Store new stated values of the sensor, its boards and the usual ball, on disk first.
+
+        Folder, decisions, the radii of single presses and the camera settings stay.
+        """
+        with self._lock:
+            kept = self._session
+            self._describe(
+                replace(
+                    session,
+                    ball_radii_mm=kept.ball_radii_mm,
+                    camera_settings=kept.camera_settings,
+                )
+            )
+
+    def set_camera(self, settings: CameraSettings | None) -> None:
+        """Store the settings of the camera that captures the images, on disk first."""
+        with self._lock:
+            if settings != self._session.camera_settings:
+                self._describe(replace(self._session, camera_settings=settings))
+
+    def set_ball_radius(self, name: str, radius_mm: float | None) -> None:
+        """Set the radius of the ball in one image; None returns to the default.
+
+        Parameters
+        ----------
+        name : str
+            File name of the image.
+        radius_mm : float or None
+            Radius of the ball, not its diameter.
+        """
+        with self._lock:
+            radii = _with(self._session.ball_radii_mm, name, radius_mm)
+            self._describe(replace(self._session, ball_radii_mm=radii))
+
+    def _describe(self, session: Described) -> None:
+        kept = replace(session, folder=self._session.folder, decisions=self._session.decisions)
+        path = kept.folder / DESCRIPTION
+        self._files.refuse_changed(path)
+        write_description(kept)
+        self._files.take(path)
+        self._session = kept
+
+    # Changes by other programs
+
+    def changed_outside(self) -> tuple[Path, ...]:
+        """Return the session's files that another program has changed since they were read.
+
+        Until :meth:`reload` or :meth:`overwrite` is called, changes that would overwrite them are
+        refused.
+        """
+        with self._lock:
+            return self._files.changed()
+
+    def reload(self) -> None:
+        """Read description and decisions again.
+
+        Raises
+        ------
+        InputError
+            If they cannot be used; then nothing changes.
+        """
+        with self._lock:
+            folder = self._session.folder
+            files = KnownFiles([folder / DESCRIPTION, folder / DECISIONS])
+            self._session = self._read(folder)
+            self._files = files
+
+    def overwrite(self) -> None:
+        """Overwrite the changed files with the description and decisions known here.
+
+        Raises
+        ------
+        InputError
+            If they cannot be written.
+        """
+        with self._lock:
+            for path in self._files.changed():
+                if path.name == DECISIONS:
+                    write_decisions(self._session.decisions, self._session.folder)
+                else:
+                    write_description(self._session)
+                self._files.take(path)
+
+    def _next_name(self, folder: str, suffix: str = ".png") -> str:
+        files = [p.stem for p in self._session.captured(folder)]
+        numbers: list[int] = [int(stem[-3:]) for stem in files if stem[-3:].isdigit()]
+        number = max([*numbers, len(files)], default=0) + 1
+        return f"{_STEMS[folder]}_{number:03d}{suffix}"
+
+    def _replace_views(self, folder: str, names: set[str]) -> None:
+        if folder in ONE_IMAGE_STAGES:
+            former = {
+                f"{folder}/{path.name}"
+                for path in self._session.found(folder)
+                if path.name not in names
+            }
+            now = self._session.decisions
+            # A spot was set in the image that is replaced.
+            spots = {} if folder == FOLDERS[Stage.LIGHTS] else now.spots_px
+            if former or spots != now.spots_px:
+                self.decide(replace(now, excluded=now.excluded | former, spots_px=spots))
+                gone = {k: v for k, v in now.spots_px.items() if k not in spots}
+                first = min(f"{folder}/{name}" for name in names)
+                self._replaced[first] = _Replaced(frozenset(former), gone)
+
+
+_STEMS = {
+    "checkerboard": "view",
+    "top_pose": "top",
+    "mirror": "mirror",
+    "whiteboard": "whiteboard",
+    "background": "background",
+    "balls": "ball",
+}
+
+
+def _copy(source: Path, session: Path, target: Path) -> None:
+    data = read_bytes(source)
+    make_folder(target.parent)
+    write_atomically(target, lambda stream: stream.write(data), new=True, inside=session)
+
+
+def _write(rgb: Frame, session: Path, target: Path) -> None:
+    write_picture(rgb, target, new=True, inside=session)
+
+
+def _with(mapping: Mapping[Any, Any], key: Any, value: Any) -> dict[Any, Any]:
+    changed = {k: v for k, v in mapping.items() if k != key}
+    if value is not None:
+        changed[key] = value
+    return changed

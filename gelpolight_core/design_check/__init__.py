@@ -1,0 +1,1 @@
+"""Check of a sensor design before it is built."""

@@ -1,0 +1,135 @@
+"""Where the camera would see mirror images of the LEDs in the flat faces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.design.parts import LayerDesign, LedDesign
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.simulation.rays import (
+    camera_points,
+    pixel_directions,
+    project_through_layers,
+    project_to_pixels,
+    radius_through_layers,
+    reflection,
+    sensor_axes,
+)
+
+Array = NDArray[np.float64]
+
+LED_NAMES = ("R", "G", "B")
+
+
+@dataclass(frozen=True, slots=True)
+class Reflection:
+    """One light path by which a mirror image of an LED may be visible.
+
+    Attributes
+    ----------
+    led : str
+        "R", "G" or "B".
+    face : str
+        "lower face", "top surface" or "top surface twice".
+    pixel : (u, v)
+        Position in the image.
+    at_mm : (x, y)
+        Last point of reflection on the face, sensor frame.
+    reflectance : float
+        Product of the Fresnel reflectances along the path with air behind each face.
+    in_picture : bool
+        Whether the pixel lies in the image and, for the top surface, in the working circle.
+    """
+
+    led: str
+    face: str
+    pixel: tuple[float, float]
+    at_mm: tuple[float, float]
+    reflectance: float
+    in_picture: bool
+
+
+def led_reflections(design: SensorDesign) -> tuple[Reflection, ...]:
+    """Return every mirror image of an LED that a flat face can show to the camera."""
+    found: list[Reflection] = []
+    for name, led in zip(LED_NAMES, design.leds, strict=True):
+        face_mm = design.layers.elastomer_thickness_mm + design.layers.window_thickness_mm
+        if led.height_mm > face_mm:
+            found.append(_below_lower_face(design, name, led, face_mm))
+        else:
+            found.extend(_by_top_surface(design, name, led, bounces) for bounces in (1, 2))
+    return tuple(found)
+
+
+def _below_lower_face(
+    design: SensorDesign, name: str, led: LedDesign, face_mm: float
+) -> Reflection:
+    """Mirror image of an LED in air below the layers: a direct path through air only."""
+    layers = design.layers
+    twin_height = 2.0 * face_mm - led.height_mm
+    pixel = project_to_pixels(
+        design.camera, camera_points(layers, np.array([led.x_mm, led.y_mm, -twin_height]))
+    )
+    distance = layers.top_distance_mm - twin_height
+    share = layers.air_gap_mm / distance
+    at = (led.x_mm * share, led.y_mm * share)
+    radius = math.hypot(led.x_mm, led.y_mm)
+    window = layers.window_thickness_mm > 0.0
+    index = layers.window_refractive_index if window else layers.elastomer_refractive_index
+    strength = reflection(np.array(radius / math.hypot(radius, distance)), 1.0, index)
+    return Reflection(
+        name, "lower face", _pair(pixel), at, float(strength), _in_image(design, pixel)
+    )
+
+
+def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, bounces: int) -> Reflection:
+    """Mirror image in the top surface; with two bounces the lower face reflects in between."""
+    layers = design.layers
+    # Unfolded, each further bounce adds the path down and up through all layers.
+    again = 2.0 * (bounces - 1)
+    unfolded = LayerDesign(
+        top_distance_mm=layers.top_distance_mm
+        + again * (layers.elastomer_thickness_mm + layers.window_thickness_mm),
+        tilt_deg=layers.tilt_deg,
+        tilt_azimuth_deg=layers.tilt_azimuth_deg,
+        elastomer_thickness_mm=layers.elastomer_thickness_mm * (1.0 + again),
+        elastomer_refractive_index=layers.elastomer_refractive_index,
+        window_thickness_mm=layers.window_thickness_mm * (1.0 + again),
+        window_refractive_index=layers.window_refractive_index,
+    )
+    twin = np.array([led.x_mm, led.y_mm, led.height_mm])
+    pixel = project_through_layers(design.camera, unfolded, twin)
+    sine = _sine_in_air(design, pixel)
+    radius = float(radius_through_layers(layers, np.array(sine)))
+    away = max(math.hypot(led.x_mm, led.y_mm), 1e-12)
+    at = (led.x_mm / away * radius, led.y_mm / away * radius)
+    top = float(reflection(np.array(sine), layers.elastomer_refractive_index, 1.0))
+    rim = 0.5 * design.membrane.working_diameter_mm
+    return Reflection(
+        name,
+        "top surface" if bounces == 1 else "top surface twice",
+        _pair(pixel),
+        at,
+        top ** (2 * bounces - 1),
+        _in_image(design, pixel) and radius <= rim,
+    )
+
+
+def _sine_in_air(design: SensorDesign, pixel: Array) -> float:
+    """Sine of the angle between a pixel's ray in air and the layers' normal."""
+    direction = pixel_directions(design.camera, np.array(pixel[0]), np.array(pixel[1]))
+    ray = sensor_axes(design.layers) @ direction
+    return float(np.hypot(ray[0], ray[1]) / np.linalg.norm(ray))
+
+
+def _pair(pixel: Array) -> tuple[float, float]:
+    return float(pixel[0]), float(pixel[1])
+
+
+def _in_image(design: SensorDesign, pixel: Array) -> bool:
+    size = np.array([design.camera.width_px, design.camera.height_px])
+    return bool((pixel >= -0.5).all() and (pixel <= size - 0.5).all())

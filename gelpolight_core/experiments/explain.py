@@ -1,0 +1,290 @@
+"""Where the full model's error comes from: images predicted at the true surface beside the images.
+
+For each press with a true depth two questions are answered. *Which step loses the height?* The
+slopes that were found are replaced by the true ones, everywhere or in part, and integrated with
+the same weights. *Which light is not explained?* At the true surface, press over background is
+compared with the direct light of the LEDs, with interreflection as the model adds it, and with one
+reflection gathered over the true surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.experiments.ablation import RIM_MM, TruePress, read_presses
+from gelpolight_core.experiments.gathered_light import Surface, gathered
+from gelpolight_core.experiments.true_view import TrueView, lit_by, true_view
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.masks import LEAST_LIGHT
+from gelpolight_core.measurement.score import TrueDepth
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.misfit import direct_light
+from gelpolight_core.reconstruction.near_light.region_solver import Solved
+from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
+from gelpolight_core.reflectance.membrane import bounce_weight
+from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.session.session import Session
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+BANDS = (3.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0)
+"""Limits of the bands of slope, degrees."""
+SIDES = ("towards", "away", "dark")
+"""A channel of a point: tilted towards its LED, away from it, or not reached by it."""
+ALL_COUNT = 0.9
+"""Weight of a node whose three channels all decide."""
+LEAST_NODES = 20
+PLATEAU = 0.98
+STEEP_DEG = 30.0
+THIN = 8
+"""Nodes between those at which membrane and white board are compared."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Height error of a press, with parts of the solution replaced by the truth, percent.
+
+    Attributes
+    ----------
+    file : str
+        The press.
+    found : float
+        As reconstructed.
+    true_slopes : float
+        True slopes, own weights: what integration and weights lose.
+    true_where_dark : float
+        True slopes where a channel is left out, own slopes elsewhere.
+    true_where_lit : float
+        True slopes where all channels decide, own slopes elsewhere.
+    """
+
+    file: str
+    found: float
+    true_slopes: float
+    true_where_dark: float
+    true_where_lit: float
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """Press over background in a band of slope, medians over all presses and channels.
+
+    Attributes
+    ----------
+    side : str
+        One of :data:`SIDES`.
+    low_deg, high_deg : float
+        Slope.
+    seen, direct, model, gathered : float
+        The image; light straight from the LED; what the model adds for interreflection; and one
+        reflection gathered over the true surface, from a membrane that absorbs nothing.
+    nodes : int
+        How many values.
+    """
+
+    side: str
+    low_deg: float
+    high_deg: float
+    seen: float
+    direct: float
+    model: float
+    gathered: float
+    nodes: int
+
+    @property
+    def left(self) -> float:
+        """What the LED's direct light does not explain."""
+        return self.seen - self.direct
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Where the errors of a session's presses come from.
+
+    Attributes
+    ----------
+    sensor : str
+        The session folder's name.
+    losses : tuple of Loss
+        For each press.
+    light : tuple of Light
+        By side and slope.
+    reflectance_needed : float
+        The share of the gathered light that explains best what is not direct light, on slopes
+        above `STEEP_DEG`; NaN without such slopes.
+    reflectance_seen : float
+        Reflectance of the membrane, in units of the white board's: background over white board.
+    """
+
+    sensor: str
+    losses: tuple[Loss, ...]
+    light: tuple[Light, ...]
+    reflectance_needed: float
+    reflectance_seen: float
+
+
+def explain(
+    calibration: Calibration,
+    session: Session,
+    *,
+    progress: Callable[[str, float], None] | None = None,
+) -> Explanation:
+    """Compare a sensor's presses with what the calibration predicts at the true surface.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        With a full model.
+    session : Session
+        With ``presses/truth.csv`` and ``truth/*.npz``.
+    progress : callable, optional
+        Called with what is being done and the share done, 0..1.
+
+    Raises
+    ------
+    InputError
+        If a press has no image or no truth.
+    """
+    full = calibration.full
+    assert full is not None
+    tell = progress or (lambda _what, _share: None)
+    radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
+    presses = read_presses(replace(session, response=calibration.response), radius_mm)
+    solver = NearLightSolver(calibration, full, workers=2)
+    losses, parts = [], []
+    for number, press in enumerate(presses):
+        tell(press.row.file, number / len(presses))
+        solved = solver.solved(press.rgb, effort="fast")
+        if solved is None:
+            continue
+        losses.append(_loss(press, solved, _view(solved, press.truth)[0], radius_mm))
+        # Walls mirror even distant membrane: light is gathered from the whole field.
+        whole = solver.solved(press.rgb, effort="fast", everywhere=True)
+        assert whole is not None
+        parts.append(_light_at(full, press.truth, whole))
+    tell("", 1.0)
+    values = np.concatenate(parts) if parts else np.empty((0, 6))
+    return Explanation(
+        session.folder.resolve().name,
+        tuple(losses),
+        _in_bands(values),
+        _needed(values),
+        membrane_reflectance(calibration, full),
+    )
+
+
+def membrane_reflectance(calibration: Calibration, full: FullModel) -> float:
+    """Return the membrane's reflectance in units of the white board's.
+
+    Both were seen under the same light; the board is Lambertian (Eq. 5), the membrane is as the
+    full model describes it.
+
+    Parameters
+    ----------
+    calibration, full
+        The sensor's.
+    """
+    grid, thin = calibration.table.grid, np.s_[::THIN, ::THIN]
+    x, y = np.meshgrid(grid.x_mm[::THIN], grid.y_mm[::THIN])
+    usable = (calibration.table.valid & (calibration.factors > 0.0).all(axis=-1))[thin]
+    points = np.stack([x, y, np.zeros_like(x)], axis=-1)[usable]
+    light, _ = light_directions(full.led_positions_mm, points)
+    cosine = -light[..., 2]
+    view = view_directions(calibration.table.drift[thin][usable].astype(np.float64))
+    up = np.broadcast_to([0.0, 0.0, -1.0], view.shape)
+    raw = (calibration.radiance[thin][usable] * cosine).astype(np.float32)
+    board = unmix(raw, calibration.crosstalk)
+    bright = full.membrane.response(light, up, view)
+    seen = full.background[thin][usable] / np.maximum(board, LEAST_LIGHT) * cosine / np.pi / bright
+    lit = (board > LEAST_LIGHT).all(axis=-1)
+    return float(np.median(seen[lit])) if lit.any() else float("nan")
+
+
+def _needed(values: Array) -> float:
+    """Return `Explanation.reflectance_needed`."""
+    steep = values[values[:, 1] >= STEEP_DEG]
+    left, thrown = steep[:, 2] - steep[:, 3], steep[:, 5]
+    size = float(thrown @ thrown)
+    return float(left @ thrown) / size if size > 0.0 else float("nan")
+
+
+def _view(solved: Solved, truth: TrueDepth) -> tuple[TrueView, Array]:
+    """Return the true surface at a region's rays, and their slopes (rows, columns, 2)."""
+    scale, (top, left) = solved.scale, solved.region.corner
+    rows, columns = solved.depth_mm.shape
+    at = np.s_[top : top + rows, left : left + columns]
+    ray_slope = np.moveaxis(scale.rays[:2], 0, -1)[at].astype(np.float64)
+    x = scale.x_mm + scale.pitch_mm * (left + np.arange(columns, dtype=np.float64))
+    y = scale.y_mm + scale.pitch_mm * (top + np.arange(rows, dtype=np.float64))
+    return true_view(truth, x, y, ray_slope), ray_slope
+
+
+def _loss(press: TruePress, solved: Solved, view: TrueView, radius_mm: float) -> Loss:
+    """Integrate found and true slopes in turn."""
+    own = solved.slopes.slope_x, solved.slopes.slope_y
+    # The true depth along the rays has the true slopes along the rays.
+    pitch = solved.scale.pitch_mm
+    true = tuple(np.asarray(np.gradient(view.depth_mm, pitch, axis=k), np.float32) for k in (1, 0))
+    dark = solved.weight < ALL_COUNT
+    top = view.known & (view.depth_mm > PLATEAU * press.row.truth.height_mm)
+    top &= np.hypot(view.points_mm[..., 0], view.points_mm[..., 1]) < radius_mm
+
+    def error(slopes: Sequence[Map]) -> float:
+        across, down = slopes
+        found = integrate_weighted(across, down, solved.weight, pitch_mm=pitch, hold=solved.hold)
+        depth = found.depth_mm
+        return 100.0 * (float(np.median(depth[top]) / np.median(view.depth_mm[top])) - 1.0)
+
+    def mixed(where: NDArray[np.bool_]) -> list[Map]:
+        return [np.where(where, t, o).astype("f4") for t, o in zip(true, own, strict=True)]
+
+    return Loss(press.row.file, error(own), error(true), error(mixed(dark)), error(mixed(~dark)))
+
+
+def _light_at(full: FullModel, truth: TrueDepth, solved: Solved) -> Array:
+    """Return side, slope, image, direct light, the model's addition and the gathered one (N, 6).
+
+    Every second node along both axes, where it is tilted.
+    """
+    view, ray_slope = _view(solved, truth)
+    picture, scale, leds = solved.compared.coarse, solved.scale, full.led_positions_mm
+    slope = np.degrees(np.arccos(np.clip(-view.normals[..., 2], 0.0, 1.0)))
+    usable = scale.kind == 2
+    seen = np.moveaxis(picture.ratio, 0, -1).astype(np.float64)
+    around = np.moveaxis(np.broadcast_to(picture.around, picture.ratio.shape), 0, -1)
+    flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
+    towards_camera = view_directions(ray_slope)
+    facets = Surface(view.points_mm, view.normals, towards_camera, seen * flat * usable[..., None])
+    where = usable & view.known & (slope >= BANDS[0])
+    thinned = np.zeros_like(where)
+    thinned[::2, ::2] = where[::2, ::2]
+    thrown = gathered(facets, thinned, leds, full.membrane, scale.pitch_mm) / flat[thinned]
+    points, normals = view.points_mm[thinned], view.normals[thinned]
+    lit = lit_by(truth, view, leds)[thinned]
+    direct = direct_light(full, points[:, :2], -points[:, 2], normals, ray_slope[thinned])
+    model = full.membrane.bounce * around[thinned] * bounce_weight(normals)[:, None]
+    light, _ = light_directions(leds, points)
+    tilted = np.einsum("nkc,nc->nk", light, normals) > -light[..., 2]
+    side = np.where(lit, np.where(tilted, 0, 1), 2)
+    steep = np.broadcast_to(slope[thinned][:, None], lit.shape)
+    parts = (side, steep, seen[thinned], np.where(lit, direct, 0.0), model, thrown)
+    return np.stack([part.ravel() for part in parts], axis=1)
+
+
+def _in_bands(values: Array) -> tuple[Light, ...]:
+    """Return medians by side and slope."""
+    found = []
+    for number, side in enumerate(SIDES):
+        for low, high in pairwise(BANDS):
+            part = values[(values[:, 0] == number) & (values[:, 1] >= low) & (values[:, 1] < high)]
+            if len(part) >= LEAST_NODES:
+                seen, direct, model, thrown = np.median(part[:, 2:], axis=0).tolist()
+                found.append(Light(side, low, high, seen, direct, model, thrown, len(part)))
+    return tuple(found)

@@ -1,0 +1,1 @@
+"""Integration alone: several integrators on surfaces with an exact formula."""

@@ -1,0 +1,1 @@
+"""Other methods from colour to depth; all learn from the same ball presses."""

@@ -1,0 +1,195 @@
+"""Check a raw image of the bare membrane: lit, not saturated, and touched by nothing.
+
+The wizard's live hint and the background stage use the same function. It works on the raw image at
+a quarter of its size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.channels import channel_name
+from gelpolight_core.errors import InputError
+from gelpolight_core.optics.raw_positions import working_area
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import Figure, QualityTable, judge
+from gelpolight_core.radiance.whiteboard import LEAST_LIGHT
+from gelpolight_core.translation import tr
+
+Float = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+Raw = NDArray[Any]
+
+SHRINK = 4
+# Half of the shading change at the edge of a shallow contact, and twice the noise.
+CHANGE = 0.10
+# A contact covers a few hundredths of the image width, and its shading is wider than specks.
+CONTACT_OF_WIDTH = 0.04
+# Any area above this share of the squared image width is larger than a speck of the membrane.
+PRESSED_OF_WIDTH = 0.015
+# Two images of the same scene differ by at most this share, due to noise and flicker.
+SAME_IMAGE = 0.02
+# Below eight steps of 8 bit, a ratio is mostly rounding error.
+LEAST_RATIO_LIGHT = 8.0 / 255.0
+END_OF_SCALE = 254.5 / 255.0
+
+
+@dataclass(frozen=True, slots=True)
+class BareMembrane:
+    """Result of the check of a bare membrane image.
+
+    Attributes
+    ----------
+    pressed : (rows / 4, columns / 4) bool
+        Areas that something seems to touch; all False without a whiteboard image for comparison.
+    quality : QualityTable
+        Light, saturation and touched area.
+    """
+
+    pressed: Mask
+    quality: QualityTable
+
+
+def check_bare_membrane(
+    image: Raw, *, table: ResamplingTable | None = None, whiteboard: Raw | None = None
+) -> BareMembrane:
+    """Judge an image of the bare membrane.
+
+    Parameters
+    ----------
+    image : (rows, columns, 3) uint8, uint16 or float32
+        As encoded by the camera; floats 0..1.
+    table : ResamplingTable, optional
+        Defines the working area; without it the whole image counts.
+    whiteboard : (rows, columns, 3), optional
+        Image of the whiteboard stage; contacts are found by comparison with it.
+
+    Raises
+    ------
+    InputError
+        If the image is that of the whiteboard, or the working area is not in it.
+    """
+    small = shrunk(image)
+    area = area_of(image.shape[:2], table)
+    pressed = np.zeros(area.shape, np.bool_)
+    if whiteboard is not None and whiteboard.shape == image.shape:
+        white = shrunk(whiteboard)
+        if is_same(small, white, area):
+            raise InputError(
+                tr("The image shows the same as the whiteboard image"),
+                where=tr("background"),
+                advice=tr(
+                    "Mount the membrane. If it is mounted, it was also mounted for the "
+                    "whiteboard image: capture that one again"
+                ),
+            )
+        pressed = _find_pressed(small, white, area)
+    figures = (
+        brightness_figure(small, area),
+        judge("saturated", tr("Saturated share"), saturated_percent(image, area), "%",
+              warn=1.0, fail=20.0, advice=tr("Shorten the exposure so that nothing is saturated")),
+        judge("pressed", tr("Area that seems to be pressed"), 100.0 * _share(pressed, area), "%",
+              fail=0.0, advice=tr("Remove anything that touches the membrane, and wipe it clean")),
+    )  # fmt: skip
+    return BareMembrane(pressed, QualityTable(figures))
+
+
+def shrunk(image: Raw) -> Float:
+    """Return an image at a quarter of its size, float32 0..1."""
+    rows, columns = image.shape[:2]
+    size = (columns // SHRINK, rows // SHRINK)
+    small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
+    return small if image.dtype.kind == "f" else small / np.float32(np.iinfo(image.dtype).max)
+
+
+def area_of(shape: tuple[int, ...], table: ResamplingTable | None) -> Mask:
+    """Return the working area at a quarter of the image size; the whole image without a table.
+
+    Raises
+    ------
+    InputError
+        If the working area is not in the image.
+    """
+    size = (shape[1] // SHRINK, shape[0] // SHRINK)
+    if table is None:
+        return np.ones(size[::-1], np.bool_)
+    area = working_area(table, (shape[0], shape[1])).astype(np.float32)
+    whole = np.asarray(cv2.resize(area, size, interpolation=cv2.INTER_AREA)) > 0.99
+    if not whole.any():
+        raise InputError(
+            tr("The working area is not in the image"),
+            where=tr("background"),
+            advice=tr("Check the working diameter and repeat the top pose"),
+        )
+    return whole
+
+
+def brightness_figure(small: Float, area: Mask) -> Figure:
+    """Judge the brightness of the dimmest channel within the area."""
+    brightest = 100.0 * np.percentile(small[area], 99.0, axis=0)
+    dimmest = int(np.argmin(brightest))
+    return judge(
+        "brightest_percent",
+        tr("Brightest {name} value, the dimmest colour").format(name=channel_name(dimmest)),
+        float(brightest[dimmest]),
+        "%",
+        warn=25.0,
+        fail=200.0 * LEAST_LIGHT,
+        higher_is_better=True,
+        advice=tr("Switch the {name} LED on, or use a longer exposure").format(
+            name=channel_name(dimmest)
+        ),
+    )
+
+
+def saturated_percent(image: Raw, area: Mask) -> float:
+    """Return the share of the area (at a quarter of the size) with a saturated channel."""
+    top = 1.0 if image.dtype.kind == "f" else float(np.iinfo(image.dtype).max)
+    full = (image.max(axis=2) >= END_OF_SCALE * top).astype(np.float32)
+    rows, columns = area.shape
+    # The share of a block's pixels, so that none is lost at a quarter of the size.
+    part = np.asarray(cv2.resize(full, (columns, rows), interpolation=cv2.INTER_AREA))
+    return 100.0 * float(part[area].mean())
+
+
+def local_change(values: Float, area: Mask, sigma_px: float) -> Float:
+    """Return |value / local mean - 1|, the largest of the channels; the mean is within the area."""
+    weight = area.astype(np.float32)
+    around = cv2.GaussianBlur(weight, (0, 0), sigma_px)
+    mean = cv2.GaussianBlur(values * weight[..., None], (0, 0), sigma_px)
+    mean = np.asarray(mean) / np.maximum(np.asarray(around), 1e-3)[..., None]
+    change = np.abs(values / np.maximum(mean, 1e-3) - 1.0)
+    return np.asarray(change.max(axis=2), np.float32)
+
+
+def is_same(small: Float, other: Float, area: Mask) -> bool:
+    """Return whether two reduced images show the same scene."""
+    lit = area & (np.minimum(small, other).min(axis=2) > LEAST_RATIO_LIGHT)
+    if not lit.any():
+        return False
+    off = np.abs(small[lit] / other[lit] - 1.0)
+    return float(np.median(off, axis=0).max()) < SAME_IMAGE
+
+
+def _share(mask: Mask, area: Mask) -> float:
+    return int(np.count_nonzero(mask & area)) / max(int(np.count_nonzero(area)), 1)
+
+
+def _find_pressed(small: Float, whiteboard: Float, area: Mask) -> Mask:
+    """Return where the membrane's reflectance changes as it does around a contact.
+
+    Division by the whiteboard removes the unevenness of the light; a median removes specks.
+    """
+    lit = area & (np.minimum(small, whiteboard).min(axis=2) > LEAST_RATIO_LIGHT)
+    ratio = small / np.maximum(whiteboard, LEAST_RATIO_LIGHT)
+    smooth = np.asarray(cv2.medianBlur(ratio, 5), np.float32)
+    changed = lit & (local_change(smooth, lit, CONTACT_OF_WIDTH * small.shape[1]) > CHANGE)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(changed.astype(np.uint8))
+    least = (PRESSED_OF_WIDTH * small.shape[1]) ** 2
+    large = [n for n in range(1, count) if stats[n, cv2.CC_STAT_AREA] >= least]
+    return np.isin(labels, large)

@@ -1,0 +1,212 @@
+"""The health check of a frame: one pass over samples, a fit, and what it means."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.bad_pixels import ACROSS, DOWN, bad_lines, differing
+from gelpolight_core.health.finding import KEYS, Finding, Health, health_of
+from gelpolight_core.health.fit import LEAST_START, CommonChange, common_change
+from gelpolight_core.health.judging import (
+    Limits,
+    bad_pixel_findings,
+    blur_finding,
+    corrected,
+    dark_finding,
+    dirt_finding,
+    far_moved_finding,
+    light_findings,
+    light_gain,
+    may_have_moved,
+    moved_finding,
+    saturated_finding,
+    stranger_finding,
+    swapped_finding,
+)
+from gelpolight_core.health.movement import FOLLOWED_PX, movement_px
+from gelpolight_core.health.samples import PARAMETERS, Samples, compare_samples, samples_of
+from gelpolight_core.masks import SATURATED
+from gelpolight_core.sensor_calibration import Calibration
+
+Map = NDArray[np.float32]
+LEAST_UNTOUCHED = 0.12
+"""Share of the field that must look as at calibration for anything to be said of the rest."""
+RIM_CHANGE, LEAST_RIM = 0.02, 0.5
+"""Or else this share of the field's rim, within so much light: a contact covers the rest."""
+UNJUDGED = tuple(key for key in KEYS if key not in ("other_sensor", "colour_order", "dark"))
+SWAPPED_UNTOUCHED = 0.4
+DARK = 0.1
+"""Share of the light at calibration below which nothing is seen."""
+STRIPE_ROWS = 12
+"""Rows of each frame that are searched for bad pixels; the next frame's are others."""
+MISSING = 65535
+"""Code of a float that is not finite: it counts as saturated."""
+ORDERS = tuple(order for order in permutations(range(3)) if order != (0, 1, 2))
+
+
+class HealthCheck:
+    """Checks frames of one sensor against the background of its calibration.
+
+    It may be called from several threads, which then wait for each other.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The sensor's.
+    """
+
+    def __init__(self, calibration: Calibration) -> None:
+        self.calibration = calibration
+        self.samples: Samples = samples_of(calibration)
+        cells, runs = self.samples.count.size, self.samples.run_cell.size
+        self._change = np.zeros((cells, PARAMETERS))
+        self._square, self._full = np.zeros(cells), np.zeros(cells)
+        self._run_change = np.zeros((3, runs))
+        self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
+        full = calibration.full
+        bounce = 0.0 if full is None else full.membrane.bounce
+        self._limits = Limits.of(bounce)
+        self._stripe = 0
+        self._lock = Lock()
+
+    def check(self, frame: NDArray[Any], *, whole: bool = False) -> Health:
+        """Return the faults of a frame, whatever is pressed into the membrane.
+
+        Parameters
+        ----------
+        frame : (height, width, 3) uint8, uint16 or float32
+            RGB; whole numbers as the camera encodes them, floats linear light 0..1.
+        whole : bool, optional
+            Whether to search all rows for bad pixels, and to follow large movements of the camera;
+            some tens of milliseconds. By default one stripe of rows is searched, and the next
+            frame's is another.
+        """
+        if not self.samples.count.size:
+            return Health(unknown=("other_sensor",), untouched=0.0)
+        with self._lock:
+            raw, light = self._coded(frame)
+            common = self._common(raw, light)
+            if common.share < LEAST_UNTOUCHED and self._rim_fits():
+                return Health(unknown=UNJUDGED, untouched=common.share)
+            if common.share < LEAST_UNTOUCHED:
+                return self._strange(raw, light, common.share, whole)
+            return self._faults(raw, light, common, whole)
+
+    def _faults(
+        self,
+        raw: NDArray[Any],
+        light: Map,
+        common: CommonChange,
+        whole: bool,
+    ) -> Health:
+        """Return what has changed on a membrane that is this sensor's."""
+        limits, samples = self._limits, self.samples
+        if (common.values[:6:2] < DARK - 1.0).all():
+            return health_of([dark_finding()], untouched=common.share)
+        full = float(self._full.sum() / samples.count.sum())
+        follow = whole and may_have_moved(common)
+        seen_px = movement_px(samples, raw, light) if follow else None
+        moved = moved_finding(common, seen_px)
+        changes = light_findings(common, limits)
+        gain = light_gain(common, changes, limits)
+        if moved is not None and moved.value > FOLLOWED_PX:
+            # The light's own fall has moved too.
+            changes, gain = [finding for finding in changes if finding.meaningless], None
+        if gain is not None:
+            changes = [corrected(change) for change in changes]
+        pixels = self._bad_pixels(raw, light, whole)
+        blurred = None if moved else blur_finding(common, samples.blur_strength)
+        if blurred is not None and blurred.meaningless and common.share < LEAST_START:
+            # None of the texture is there.
+            return health_of([stranger_finding()], untouched=common.share)
+        # Specks that have moved or faded are no dirt, nor is a bad line.
+        specks = moved or blurred or any(finding.key == "bad_line" for finding in pixels)
+        found = [
+            *changes,
+            moved,
+            blurred,
+            saturated_finding(full),
+            None if specks else dirt_finding(samples, self._run_change, common),
+            *pixels,
+        ]
+        unknown = () if samples.blur_strength.size else ("blurred",)
+        return health_of(
+            [f for f in found if f],
+            unknown=unknown,
+            untouched=common.share,
+            cells=common.change,
+            light=gain,
+        )
+
+    def _rim_fits(self) -> bool:
+        """Return whether the rim looks as at calibration, where a contact covers the rest."""
+        s = self.samples
+        at_rim = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (self._full == 0.0)
+        change = self._change[:, :6:2] / s.normal[:, [0, 2, 4], [0, 2, 4]]
+        fits = (np.abs(change[at_rim]) < RIM_CHANGE).all(axis=1)
+        return bool(fits.size and fits.mean() > LEAST_RIM)
+
+    def _strange(self, raw: NDArray[Any], light: Map, share: float, whole: bool) -> Health:
+        """Return why an image does not look like this sensor's membrane."""
+        saturated = saturated_finding(float(self._full.sum() / self.samples.count.sum()))
+        if saturated is not None and saturated.meaningless:
+            return health_of([saturated], untouched=share)
+        seen = 1.0 + self._run_change.sum(axis=1) / self.samples.run_light.sum(axis=1)
+        if (seen < DARK).all():
+            return health_of([dark_finding()], untouched=share)
+        for order in ORDERS:
+            turned = self._common(np.ascontiguousarray(raw[..., order]), light[list(order)])
+            if turned.share > SWAPPED_UNTOUCHED:
+                return health_of([swapped_finding(order)], untouched=share)
+        seen_px = movement_px(self.samples, raw, light) if whole else None
+        finding = stranger_finding() if seen_px is None else far_moved_finding(seen_px)
+        return health_of([finding], untouched=share)
+
+    def _common(self, raw: NDArray[Any], light: Map) -> CommonChange:
+        s = self.samples
+        compare_samples(
+            raw, light, np.float32(SATURATED), s.corner, s.part, s.run_cell, s.expected,
+            s.effects, s.weight, self._change, self._square, self._full, self._run_change,
+        )  # fmt: skip
+        return common_change(s, self._change, self._square, self._full)
+
+    def _bad_pixels(self, raw: NDArray[Any], light: Map, whole: bool) -> list[Finding]:
+        height = raw.shape[0]
+        if min(raw.shape[:2]) < 8:
+            return []
+        step = 1 if whole else max(height // STRIPE_ROWS, 1)
+        self._stripe = (self._stripe + 1) % step
+        rows = np.arange(0 if whole else self._stripe, height, step)
+        marks = differing(raw, light, rows, noise=float(self.calibration.noise.max()))
+        single = int(np.count_nonzero(marks == (ACROSS | DOWN)))
+        columns, lines = bad_lines(marks, ACROSS), rows[bad_lines(marks.T, DOWN)]
+        return bad_pixel_findings(single / marks.size, single, columns.tolist(), lines.tolist())
+
+    def _coded(self, frame: NDArray[Any]) -> tuple[NDArray[Any], Map]:
+        """Return a frame in whole numbers, and the linear light of each number."""
+        if frame.dtype.kind == "f":
+            finite = np.isfinite(frame)
+            code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING - 1) + 0.5
+            raw = np.where(finite, code, MISSING).astype(np.uint16)
+            return raw, self._levels(raw.dtype, True)
+        # numba would compile the kernel a second time for a read-only array.
+        return np.require(frame, requirements=["C", "W"]), self._levels(frame.dtype, False)
+
+    def _levels(self, dtype: np.dtype[Any], linear: bool) -> Map:
+        kind = (dtype, linear)
+        if kind not in self._light:
+            top, response = int(np.iinfo(dtype).max), self.calibration.response
+            numbers = np.arange(top + 1).astype(dtype)
+            if linear or response is None:
+                shares = numbers.astype(np.float32) / np.float32(top - 1 if linear else top)
+                light = np.tile(shares, (3, 1))
+            else:
+                tripled = np.repeat(numbers[:, None, None], 3, axis=2)
+                light = response.linearise(tripled)[:, 0].T
+            self._light[kind] = np.ascontiguousarray(light, np.float32)
+        return self._light[kind]

@@ -1,0 +1,164 @@
+"""What a health check finds: each fault with its cause and its remedy in one line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.quality import Verdict
+
+KEYS = (
+    "dark", "led_off", "led_weak", "exposure", "room_light", "colour_order", "other_sensor",
+    "saturated", "camera_moved", "blurred", "dirt", "bad_pixels", "bad_line", "not_recovered",
+)  # fmt: skip
+"""All that can be found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One fault of an image.
+
+    Attributes
+    ----------
+    key : str
+        One of `KEYS`.
+    cause : str
+        What is wrong, as a clause without a full stop.
+    remedy : str
+        What to do about it, as a sentence without a full stop.
+    severity : Verdict
+        ``warn``: the depth is less exact than stated; ``fail``: it is far off.
+    meaningless : bool
+        Whether the depth says nothing about the object.
+    value : float
+        How large the fault is, in `unit`.
+    unit : str
+        Such as ``%`` or ``px``.
+    corrected : bool
+        Whether the depth is corrected for it, so that it is as exact as stated.
+    """
+
+    key: str
+    cause: str
+    remedy: str
+    severity: Verdict
+    meaningless: bool = False
+    value: float = 0.0
+    unit: str = ""
+    corrected: bool = False
+
+    @property
+    def line(self) -> str:
+        """Cause and remedy in one line."""
+        return f"{self.cause[:1].upper()}{self.cause[1:]}. {self.remedy}."
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "key": self.key,
+            "cause": self.cause,
+            "remedy": self.remedy,
+            "severity": self.severity.value,
+            "depth_is_meaningless": self.meaningless,
+            "value": self.value,
+            "unit": self.unit,
+            "corrected": self.corrected,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class LightGain:
+    """How the LEDs' light, or the exposure, has changed since the calibration.
+
+    Attributes
+    ----------
+    share : (3,) float64
+        Light of each channel over that at calibration; an image is divided by it.
+    sd : (3,) float64
+        Standard deviations.
+    """
+
+    share: NDArray[np.float64]
+    sd: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What was found in an image.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        The worst first; empty where no fault was found.
+    unknown : tuple of str
+        Keys that could not be checked: too little of the membrane is untouched, or it shows no
+        texture.
+    untouched : float
+        Share of the field that looks as at calibration, 0..1.
+    cells : (cells, 3) or None
+        Change of the light of each cell of the field, less what all have in common; None where
+        that is not known.
+    light : LightGain or None
+        What the depth is corrected for; None where the light is as at calibration within its
+        noise, or cannot be corrected.
+    """
+
+    findings: tuple[Finding, ...] = ()
+    unknown: tuple[str, ...] = ()
+    untouched: float = 1.0
+    cells: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
+    light: LightGain | None = field(default=None, compare=False)
+
+    @property
+    def faults(self) -> tuple[Finding, ...]:
+        """The findings that the depth is not corrected for."""
+        return tuple(finding for finding in self.findings if not finding.corrected)
+
+    @property
+    def meaningless(self) -> Finding | None:
+        """The first finding that makes the depth meaningless; None where there is none."""
+        return next((f for f in self.findings if f.meaningless), None)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """What was found."""
+        return tuple(finding.key for finding in self.findings)
+
+    @property
+    def line(self) -> str:
+        """The worst finding in one line; empty where there is none."""
+        return self.findings[0].line if self.findings else ""
+
+
+def health_of(
+    findings: list[Finding],
+    *,
+    unknown: tuple[str, ...] = (),
+    untouched: float = 1.0,
+    cells: NDArray[np.float64] | None = None,
+    light: LightGain | None = None,
+) -> Health:
+    """Return findings in the order of their weight."""
+
+    def weight(finding: Finding) -> tuple[bool, bool, bool, int]:
+        severe = finding.severity is Verdict.FAIL
+        return not finding.meaningless, not severe, finding.corrected, KEYS.index(finding.key)
+
+    return Health(tuple(sorted(findings, key=weight)), unknown, untouched, cells, light)
+
+
+def refuse_meaningless(health: Health, *, where: str) -> None:
+    """Refuse an image whose depth would mean nothing.
+
+    Raises
+    ------
+    InputError
+        With the fault's cause and remedy.
+    """
+    fault = health.meaningless
+    if fault is not None:
+        raise InputError(fault.cause, where=where, advice=fault.remedy)

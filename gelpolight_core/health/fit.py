@@ -1,0 +1,232 @@
+"""How the light of the untouched part of the membrane has changed, and which part that is.
+
+A robust least-squares fit over cells: gain and room light of each channel, shift and blur. Cells
+that do not follow the common change are pressed, dirty, or of another sensor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.health.samples import PARAMETERS, Samples
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOLERANCES = np.array([0.03, 0.01, 0.006, 0.006])
+"""Share by which a cell's light may be off the common change, round by round."""
+SIGMAS = 4.5
+STRONG = 0.012
+"""Cells around one that is off by more are left out as well: its drape reaches them."""
+NEAR, FIRST = 0.012, 0.04
+"""Changes of a cell's light that are tried for the untouched part: as at calibration, or nearly."""
+LEAST_NEAR = 0.15
+"""Share of the field that must look so; else the common change may be of any size ..."""
+LEAST_START = 0.35
+"""... and this share of the field must follow it."""
+PRECISION = np.array([0.5, 0.05, 0.5, 0.05, 0.5, 0.05, 4.0, 4.0, 8.0]) ** -2.0
+"""Of what is known of the parameters before anything is seen."""
+PAIRS = 1500
+CORRELATED = 1.6
+"""Neighbouring samples share pixels: deviations are larger than independent ones by this."""
+ROUGHEST = 9.0
+"""A cell whose samples scatter by this variance over the usual one has another texture."""
+LEAST_CELLS = 4
+WITHOUT_OFFSETS = np.array([0, 2, 4, 6, 7, 8])
+"""Room light cannot be told from gain by much; where there is none, the gain alone is surer."""
+
+
+@dataclass(frozen=True, slots=True)
+class CommonChange:
+    """What all of the untouched membrane has in common.
+
+    Attributes
+    ----------
+    values, sd : (PARAMETERS,)
+        Gain less 1 and offset (share of full scale) of each channel, shift in px along u and v,
+        strength of the blur; with standard deviations.
+    untouched : (cells,) bool
+        Cells that follow it.
+    change : (cells, 3)
+        What is left of each cell's light, share.
+    gain, gain_sd : (3,)
+        Gain less 1 of each channel if the room light is as at calibration; standard deviations.
+    """
+
+    values: Array
+    sd: Array
+    untouched: Mask
+    change: Array
+    gain: Array
+    gain_sd: Array
+
+    @property
+    def share(self) -> float:
+        """Of the cells that follow."""
+        return float(self.untouched.mean()) if self.untouched.size else 0.0
+
+
+def common_change(samples: Samples, change: Array, square: Array, full: Array) -> CommonChange:
+    """Fit the common change of a frame.
+
+    Parameters
+    ----------
+    samples : Samples
+        The sensor's.
+    change, square, full
+        From :func:`~gelpolight_core.health.samples.compare_samples`.
+    """
+    # A saturated sample says nothing of the light.
+    usable = full == 0.0
+    values = np.zeros(PARAMETERS)
+    first = np.abs(change[:, :6:2] / samples.normal[:, [0, 2, 4], [0, 2, 4]]).max(axis=1)
+    kept = usable & (first < NEAR)
+    _outer_part(samples.beside, kept)
+    if kept.mean() < LEAST_NEAR:
+        kept = usable & (first < FIRST)
+    small = kept.mean() >= LEAST_NEAR
+    if not small and usable.sum() >= LEAST_CELLS:
+        values = _gross(samples, change, usable)
+        left = np.empty((usable.size, 3))
+        _remaining(samples.normal, change, values, left)
+        worst = np.abs(left).max(axis=1)
+        kept = usable & (worst < max(FIRST, float(np.quantile(worst[usable], LEAST_START))))
+    sd, left = np.full(PARAMETERS, np.inf), np.zeros((usable.size, 3))
+    alone, alone_sd = np.zeros(WITHOUT_OFFSETS.size), np.full(WITHOUT_OFFSETS.size, np.inf)
+    _rounds(
+        samples.normal, samples.count, samples.beside, change, square, usable,
+        TOLERANCES, PRECISION, bool(small), values, sd, alone, alone_sd, kept, left,
+    )  # fmt: skip
+    if not small and kept.mean() < LEAST_START:
+        kept[:] = False
+    return CommonChange(values, sd, kept, left, alone[:3], alone_sd[:3])
+
+
+def _gross(samples: Samples, change: Array, usable: Mask) -> Array:
+    """Return gain and offset of each channel by the medians over pairs of cells."""
+    values = np.zeros(PARAMETERS)
+    first, second = np.random.default_rng(0).choice(np.flatnonzero(usable), (2, PAIRS))
+    for k in range(3):
+        total = samples.normal[:, 2 * k + 1, 2 * k + 1]
+        light, off = samples.normal[:, 2 * k, 2 * k + 1] / total, change[:, 2 * k + 1] / total
+        apart = light[second] - light[first]
+        far = np.abs(apart) > 0.25 * np.median(light[usable])
+        if far.sum() < PAIRS // 20:
+            gain = float(np.median(off[usable] / light[usable]))
+        else:
+            gain = float(np.median((off[second] - off[first])[far] / apart[far]))
+        values[2 * k : 2 * k + 2] = gain, float(np.median((off - gain * light)[usable]))
+    return values
+
+
+@numba.njit(nogil=True, fastmath=True, cache=True, forceinline=True)
+def _remaining(normal, change, values, left):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Write each cell's change of light (cells, 3) beyond the common one, as a share."""
+    for c in range(left.shape[0]):
+        for k in range(3):
+            explained = 0.0
+            for j in range(PARAMETERS):
+                explained += normal[c, 2 * k, j] * values[j]
+            left[c, k] = (change[c, 2 * k] - explained) / normal[c, 2 * k, 2 * k]
+
+
+@numba.njit(nogil=True, cache=True)
+def _outer_part(beside, kept):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Leave only the connected part with most of the field's rim.
+
+    The middle of a flat contact looks nearly untouched.
+    """
+    cells = kept.size
+    part, waiting = np.zeros(cells, np.int64), np.empty(cells, np.int64)
+    number, best, most = 0, 0, -1
+    for start in range(cells):
+        if not kept[start] or part[start]:
+            continue
+        number += 1
+        part[start], waiting[0] = number, start
+        done, found, rim = 0, 1, 0
+        while done < found:
+            for near in beside[waiting[done]]:
+                rim += near == waiting[done]
+                if kept[near] and not part[near]:
+                    part[near], waiting[found] = number, near
+                    found += 1
+            done += 1
+        if rim * cells + found > most:
+            best, most = number, rim * cells + found
+    for c in range(cells):
+        kept[c] &= part[c] == best
+
+
+@numba.njit(nogil=True, fastmath=True, cache=True)
+def _rounds(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    normal,
+    count,
+    beside,
+    change,
+    square,
+    usable,
+    tolerances,
+    precision,
+    connected,
+    values,
+    sd,
+    alone,
+    alone_sd,
+    kept,
+    left,
+):
+    """Fit, and keep the cells that follow, in turns; the last six are written.
+
+    Where the change is large, saturated cells part the field, and it need not be `connected`.
+    """
+    cells, size = kept.size, PARAMETERS
+    scatter, strong = np.empty(cells), np.empty(cells, np.bool_)
+    for step in range(tolerances.size):
+        matrix, right, number = np.diag(precision), np.zeros(size), 0
+        for c in range(cells):
+            if kept[c]:
+                number += 1
+                for i in range(size):
+                    right[i] += change[c, i]
+                    for j in range(size):
+                        matrix[i, j] += normal[c, i, j]
+        if number < LEAST_CELLS:
+            break
+        inverse = np.linalg.inv(matrix)
+        values[:] = inverse @ right
+        for c in range(cells):
+            total = square[c]
+            for i in range(size):
+                explained = 0.0
+                for j in range(size):
+                    explained += normal[c, i, j] * values[j]
+                total += values[i] * (explained - 2.0 * change[c, i])
+            scatter[c] = total / (3.0 * count[c])
+        usual = max(np.median(scatter[kept]), 1e-6)
+        widen = CORRELATED * np.sqrt(usual)
+        sd[:] = widen * np.sqrt(np.diag(inverse))
+        if step == tolerances.size - 1:
+            part = np.linalg.inv(matrix[WITHOUT_OFFSETS][:, WITHOUT_OFFSETS])
+            alone[:] = part @ right[WITHOUT_OFFSETS]
+            alone_sd[:] = widen * np.sqrt(np.diag(part))
+        _remaining(normal, change, values, left)
+        tolerance = tolerances[step]
+        for c in range(cells):
+            strong[c] = not usable[c]
+            kept[c] = usable[c] and scatter[c] < ROUGHEST * usual
+            for k in range(3):
+                limit = tolerance + SIGMAS * widen / np.sqrt(normal[c, 2 * k, 2 * k])
+                kept[c] &= abs(left[c, k]) < limit
+                strong[c] |= abs(left[c, k]) > limit + max(STRONG, tolerance)
+        for c in range(cells):
+            if strong[c]:
+                kept[c] = False
+                for near in beside[c]:
+                    kept[near] = False
+        if connected:
+            _outer_part(beside, kept)

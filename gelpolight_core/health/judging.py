@@ -1,0 +1,366 @@
+"""From what a frame shows to faults, each with a limit that keeps the depth's error at 10 um."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.channels import channel_name
+from gelpolight_core.health.finding import Finding, LightGain
+from gelpolight_core.health.fit import LEAST_START, CommonChange
+from gelpolight_core.health.movement import FOLLOWED_PX
+from gelpolight_core.health.samples import BLUR, BLURS_PX, SHIFT_U, SHIFT_V, Samples
+from gelpolight_core.quality import Verdict
+from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+SIGMAS = 3.0
+LEAST_GAIN = 0.0014
+"""Change of all three channels; 0.22 % costs 10 um of a press 1 mm deep."""
+LEAST_CHANNEL = 0.003
+"""Change of one channel; 0.5 % costs 10 um."""
+LEAST_OFFSET, LEAST_LOSS = 0.0002, 0.0006
+"""Room light, and less of it than at calibration, share of full scale; 0.0003 costs 10 um.
+
+A shallow press over much of the field looks like a loss of up to 0.0005.
+"""
+GAIN_BY_BOUNCE = 0.004
+"""A deep press changes the light from the membrane around by so much, times its strength."""
+LEAST_CORRECTED, LEAST_MEAN_CORRECTED = 0.001, 0.0005
+"""Smaller changes of a channel, and of all, are left as they are: they cost 3 to 5 um, and shallow
+faces look like as much."""
+CLEAR_ROOM_LIGHT = 3.0
+"""Room light of so many times the limit counts although a gain may cancel it."""
+MEAN_BY_BOUNCE = 0.002
+"""As `GAIN_BY_BOUNCE`, of the mean of the channels."""
+PRESS_BY_BOUNCE = 0.0015
+"""Standard deviation of what presses change of the light around, times the interreflection."""
+CORRECTABLE = ("exposure", "led_weak")
+LEAST_SHIFT_PX = 0.5
+"""0.6 px cost 10 um."""
+LEAST_BLUR_PX = 1.0
+"""A blur of 1.4 px costs 10 um."""
+LED_OFF = -0.8
+FAR_GAIN, FAR_OFFSET = 0.05, 0.005
+"""From here on the depth is off by a third of its value and more."""
+FAR_SHIFT_PX, FAR_BLUR_PX = 10.0, 6.0
+SATURATED_SHARE, MOSTLY_SATURATED = 0.01, 0.3
+DIRT_CHANGE, DIRT_SPREAD, DIRT_RUNS = -0.06, 0.12, 2
+"""Dirt darkens the channels alike; a slope does not."""
+BAD_SHARE, LEAST_BAD = 1e-4, 3
+BACKGROUND = tr("set to zero or take the background again")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """From where on a change counts.
+
+    Attributes
+    ----------
+    gain, channel, offset : float
+        Share of the light of all channels and of one; share of full scale.
+    corrected, corrected_mean, press_sd : float
+        Shares of a channel's light, and of the mean of the channels, from which on the depth is
+        corrected; what is not known of them because of the press.
+    """
+
+    gain: float
+    channel: float
+    offset: float
+    corrected: float
+    corrected_mean: float
+    press_sd: float
+
+    @staticmethod
+    def of(bounce: float) -> Limits:
+        """Return the limits of a sensor, by the strength of its interreflection."""
+        more = GAIN_BY_BOUNCE * bounce
+        return Limits(
+            LEAST_GAIN + more,
+            LEAST_CHANNEL + more,
+            LEAST_OFFSET,
+            LEAST_CORRECTED + more,
+            LEAST_MEAN_CORRECTED + MEAN_BY_BOUNCE * bounce,
+            PRESS_BY_BOUNCE * bounce,
+        )
+
+
+def may_have_moved(common: CommonChange) -> bool:
+    """Return whether the camera may have moved by more than the fit can follow."""
+    large = math.hypot(common.values[SHIFT_U], common.values[SHIFT_V]) > 1.0
+    return bool(large or common.values[BLUR] > 1.0)
+
+
+def light_findings(common: CommonChange, limits: Limits) -> list[Finding]:
+    """Return changes of the LEDs, the exposure and the room's light."""
+    found = []
+    gains, gain_sd = common.values[:6:2], common.sd[:6:2]
+    offsets, offset_sd = common.values[1:6:2], common.sd[1:6:2]
+    # A shallow wide face in much noise looks like a gain and room light that cancel each other.
+    net, net_sd = abs(float(common.gain.mean())), float(common.gain_sd.max()) / math.sqrt(3.0)
+    single = _led_finding(gains, gain_sd, limits)
+    if single is not None:
+        found.append(single)
+    else:
+        mean, sd = float(gains.mean()), float(gain_sd.max()) / math.sqrt(3.0)
+        if abs(mean) > limits.gain + SIGMAS * sd and net > limits.gain + SIGMAS * net_sd:
+            found.append(_exposure_finding(mean))
+    worst = int(np.argmax(np.abs(offsets)))
+    mean = float(offsets.mean())
+    least, least_of_one = (
+        limits.offset if offset > 0.0 else LEAST_LOSS for offset in (mean, offsets[worst])
+    )
+    common_size = least + SIGMAS * float(offset_sd.max()) / math.sqrt(3.0)
+    own_size = 2.0 * least_of_one + SIGMAS * float(offset_sd[worst])
+    size = max(abs(mean) / common_size, float(abs(offsets[worst])) / own_size)
+    if size > (1.0 if net > SIGMAS * net_sd else CLEAR_ROOM_LIGHT):
+        found.append(_room_finding(float(offsets[worst])))
+    return found
+
+
+def light_gain(
+    common: CommonChange, changes: Sequence[Finding], limits: Limits
+) -> LightGain | None:
+    """Return what the depth is corrected for; None where the light is the same, or too different.
+
+    Parameters
+    ----------
+    common : CommonChange
+        The fit to the untouched membrane.
+    changes : sequence of Finding
+        From :func:`light_findings`. An LED that is off has no light to correct.
+    limits : Limits
+        The sensor's.
+    """
+    if any(found.meaningless for found in changes):
+        return None
+    gain, sd = common.gain, common.gain_sd
+    if any(found.key not in CORRECTABLE for found in changes):
+        if not any(found.key in CORRECTABLE for found in changes):
+            return None
+        # Beside room light, which stays a fault, the gain is what the joint fit leaves of it.
+        gain, sd = common.values[:6:2], common.sd[:6:2]
+    sure = np.abs(gain) > limits.corrected + SIGMAS * sd
+    mean, mean_sd = float(gain.mean()), float(sd.max()) / math.sqrt(3.0)
+    if not (sure.any() or abs(mean) > limits.corrected_mean + SIGMAS * mean_sd):
+        return None
+    return LightGain(1.0 + gain, np.hypot(sd, limits.press_sd))
+
+
+def corrected(change: Finding) -> Finding:
+    """Return a change of the light that the depth is corrected for; room light stays as it is."""
+    if change.key not in CORRECTABLE:
+        return change
+    remedy = tr("The depth is corrected for this. {remedy}").format(remedy=change.remedy)
+    return replace(change, remedy=remedy, severity=Verdict.WARN, corrected=True)
+
+
+def _led_finding(gains: Array, sd: Array, limits: Limits) -> Finding | None:
+    """Return the LED whose channel has changed unlike the others; None where none has."""
+    middle = float(np.median(gains))
+    k = int(np.argmax(np.abs(gains - middle)))
+    change = float(gains[k])
+    if abs(change - middle) < limits.channel + SIGMAS * float(sd[k]):
+        return None
+    if change < LED_OFF:
+        return Finding(
+            "led_off",
+            tr("the {name} LED is off").format(name=channel_name(k)),
+            tr("Check its cable and driver, then calibrate again"),
+            Verdict.FAIL, True, 100.0 * change, "%",
+        )  # fmt: skip
+    far = abs(change - middle) > 2.0 * FAR_GAIN
+    text = tr("the {name} LED is {p:.1f} % {how} than at calibration").format(
+        name=channel_name(k),
+        p=100.0 * abs(change),
+        how=tr("weaker") if change < 0.0 else tr("brighter"),
+    )
+    remedy = tr("Let the LEDs warm up and check their current; then {again}")
+    return Finding(
+        "led_weak", text, remedy.format(again=BACKGROUND), _severity(far), far, 100.0 * change, "%"
+    )
+
+
+def _exposure_finding(change: float) -> Finding:
+    text = tr("the light is {p:.1f} % {how} than at calibration: exposure, gain or LEDs changed")
+    remedy = tr("Restore the camera settings of the calibration, or {again}")
+    far = abs(change) > FAR_GAIN
+    return Finding(
+        "exposure",
+        text.format(
+            p=100.0 * abs(change), how=tr("brighter") if change > 0.0 else tr("darker")
+        ),
+        remedy.format(again=BACKGROUND),
+        _severity(far), far, 100.0 * change, "%",
+    )  # fmt: skip
+
+
+def _room_finding(offset: float) -> Finding:
+    far = abs(offset) > FAR_OFFSET
+    text = tr("room light reaches the membrane ({p:.2f} % of full scale)")
+    if offset < 0.0:
+        text = tr("there is less room light than at calibration ({p:.2f} % of full scale)")
+    return Finding(
+        "room_light",
+        text.format(p=100.0 * abs(offset)),
+        tr("Shade the sensor as at calibration, and check the camera's black level"),
+        _severity(far), far, 100.0 * offset, "%",
+    )  # fmt: skip
+
+
+def moved_finding(common: CommonChange, seen_px: tuple[float, float] | None) -> Finding | None:
+    """Return that the camera has moved.
+
+    Parameters
+    ----------
+    common : CommonChange
+        The fit, which follows a pixel or two.
+    seen_px : (float, float) or None
+        By a search, where one was made.
+    """
+    if seen_px is not None and math.hypot(*seen_px) > LEAST_SHIFT_PX:
+        return far_moved_finding(seen_px)
+    shift = (float(common.values[SHIFT_U]), float(common.values[SHIFT_V]))
+    sd = float(np.hypot(common.sd[SHIFT_U], common.sd[SHIFT_V]))
+    size = math.hypot(*shift)
+    if size <= LEAST_SHIFT_PX + SIGMAS * sd:
+        return None
+    text = tr("the camera has moved against the membrane by {n:.1f} px")
+    if size > FOLLOWED_PX:
+        text = tr("the camera has moved against the membrane by {n:.1f} px or more")
+    far = common.share < LEAST_START and size > FOLLOWED_PX
+    return _moved(text.format(n=size), size, far)
+
+
+def far_moved_finding(shift_px: tuple[float, float]) -> Finding:
+    """Return that the camera has moved, by a search."""
+    size = math.hypot(*shift_px)
+    text = tr("the camera has moved against the membrane by {n:.1f} px")
+    return _moved(text.format(n=size), size, size > FAR_SHIFT_PX)
+
+
+def _moved(text: str, size: float, far: bool) -> Finding:
+    remedy = tr("Seat the camera and the elastomer as at calibration, or calibrate again")
+    return Finding("camera_moved", text, remedy, _severity(far), far, size, "px")
+
+
+def blur_finding(common: CommonChange, strength: Array) -> Finding | None:
+    """Return that the image is blurred; None where it is not, or no texture shows it."""
+    if not strength.size:
+        return None
+    seen, sd = float(common.values[BLUR]), float(common.sd[BLUR])
+    sizes = (0.0, *BLURS_PX)
+    if seen < float(np.interp(LEAST_BLUR_PX, sizes, strength)) + SIGMAS * sd:
+        return None
+    size = float(np.interp(seen, strength, sizes))
+    far = size > FAR_BLUR_PX
+    return Finding(
+        "blurred",
+        tr("the image is blurred by {n:.1f} px more than at calibration").format(n=size),
+        tr("Focus the lens and clean it; calibrate again if the focus was changed"),
+        _severity(far), far, size, "px",
+    )  # fmt: skip
+
+
+def saturated_finding(share: float) -> Finding | None:
+    """Return that much of the field is saturated."""
+    if share < SATURATED_SHARE:
+        return None
+    far = share > MOSTLY_SATURATED
+    return Finding(
+        "saturated",
+        tr("{p:.0f} % of the membrane is saturated").format(p=100.0 * share),
+        tr("Restore the exposure of the calibration, and shade the sensor"),
+        _severity(far), far, 100.0 * share, "%",
+    )  # fmt: skip
+
+
+def dirt_finding(samples: Samples, run_change: Array, common: CommonChange) -> Finding | None:
+    """Return that something dark lies on the membrane or in the light's path."""
+    red, green, blue = (
+        run_change[k] / samples.run_light[k] - common.values[2 * k] for k in range(3)
+    )
+    most = np.maximum(np.maximum(red, green), blue)
+    least = np.minimum(np.minimum(red, green), blue)
+    dark = (most < DIRT_CHANGE) & (most - least < -DIRT_SPREAD * most)
+    if not dark.any():
+        return None
+    dark &= ~common.untouched[samples.run_cell]
+    runs = np.bincount(samples.run_cell[dark], minlength=samples.count.size)
+    around = runs + runs[samples.beside].sum(axis=1)
+    if around.max() < DIRT_RUNS:
+        return None
+    cells = int(np.count_nonzero(runs))
+    return Finding(
+        "dirt",
+        tr("something dark lies on the membrane, the window or the lens"),
+        tr("Clean the sensor and the lens"),
+        Verdict.WARN, False, float(cells), "mm2",
+    )  # fmt: skip
+
+
+def bad_pixel_findings(
+    share: float, count: int, columns: Sequence[int], rows: Sequence[int]
+) -> list[Finding]:
+    """Return lines and single pixels that do not follow the light."""
+    remedy = tr("Calibrate again, which leaves them out, or replace the camera")
+    found = []
+    for kind, places in ((tr("column"), columns), (tr("row"), rows)):
+        if places:
+            text = tr("the camera has a dead or hot {kind} at {places}")
+            named = ", ".join(str(n) for n in places[:5])
+            found.append(
+                Finding(
+                    "bad_line", text.format(kind=kind, places=named), remedy, Verdict.FAIL,
+                    False, float(len(places)), "",
+                )
+            )  # fmt: skip
+    if share > BAD_SHARE and count >= LEAST_BAD:
+        text = tr("{p:.2g} % of the pixels are dead or hot").format(p=100.0 * share)
+        found.append(Finding("bad_pixels", text, remedy, Verdict.WARN, False, 100.0 * share, "%"))
+    return found
+
+
+def dark_finding() -> Finding:
+    """Return that there is no light."""
+    return Finding(
+        "dark",
+        tr("the image is dark: the LEDs are off, or the lens is covered"),
+        tr("Switch the LEDs on and uncover the lens"),
+        Verdict.FAIL, True,
+    )  # fmt: skip
+
+
+def swapped_finding(order: Sequence[int]) -> Finding:
+    """Return that the channels come in another order."""
+    letters = "".join("RGB"[k] for k in order)
+    return Finding(
+        "colour_order",
+        tr("the colours come in the order {letters} instead of RGB").format(letters=letters),
+        tr("Set the camera's colour order as at calibration"),
+        Verdict.FAIL, True,
+    )  # fmt: skip
+
+
+def stranger_finding() -> Finding:
+    """Return that nothing of this sensor's untouched membrane is seen."""
+    return Finding(
+        "other_sensor",
+        tr("the image does not look like this sensor's membrane"),
+        tr(
+            "Use the calibration of the sensor that the image is from; if it is the right one, "
+            "lift off what covers the field and seat camera and elastomer"
+        ),
+        Verdict.FAIL, True,
+    )  # fmt: skip
+
+
+def _severity(far: bool) -> Verdict:
+    return Verdict.FAIL if far else Verdict.WARN

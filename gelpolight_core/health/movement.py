@@ -1,0 +1,80 @@
+"""How far the camera has moved against the membrane, where that is too far for the fit.
+
+The samples are looked up beside their places: first on a coarse lattice of shifts, then on finer
+ones about the best. What is left is followed by the fit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.health.fit import CommonChange, common_change
+from gelpolight_core.health.samples import (
+    PARAMETERS,
+    SHIFT_U,
+    SHIFT_V,
+    Samples,
+    compare_samples,
+)
+from gelpolight_core.masks import SATURATED
+
+Map = NDArray[np.float32]
+Lattice = tuple[int, int]
+LATTICES: tuple[Lattice, ...] = ((64, 8), (4, 2), (1, 1))
+"""Reach and step in px: within 4 px the membrane still looks like itself."""
+FOLLOWED_PX = 1.5
+"""What the fit follows."""
+EXPLAINED_SHARE = 0.4
+"""Share of the field that must look as at calibration after the shift."""
+
+
+def movement_px(samples: Samples, raw: NDArray[Any], light: Map) -> tuple[float, float] | None:
+    """Return how far the membrane has moved in the image; None where no shift explains it.
+
+    Parameters
+    ----------
+    samples : Samples
+        The sensor's.
+    raw : (height, width, 3) uint8 or uint16
+        The frame.
+    light : (3, levels) float32
+        Linear light of every number.
+
+    Returns
+    -------
+    (float, float) or None
+        Along u and v, px.
+    """
+    cells, runs = samples.count.size, samples.run_cell.size
+    change, square, full = np.zeros((cells, PARAMETERS)), np.zeros(cells), np.zeros(cells)
+    run_change = np.zeros((3, runs))
+    most = np.array(raw.shape[:2], np.int32) - 2
+
+    def off(u: int, v: int) -> float:
+        """Return how unlike the background the image is after a shift."""
+        corner = np.clip(samples.corner + np.array([v, u], np.int32), 0, most)
+        compare_samples(
+            raw, light, np.float32(SATURATED), corner, samples.part, samples.run_cell,
+            samples.expected, samples.effects, samples.weight, change, square, full, run_change,
+        )  # fmt: skip
+        # Whatever is pressed: most cells decide.
+        return float(np.median(square / samples.count))
+
+    u, v = 0, 0
+    for reach, step in LATTICES:
+        steps = range(-reach, reach + 1, step)
+        u, v = min(((u + i, v + j) for i in steps for j in steps), key=lambda at: off(*at))
+    off(u, v)
+    found = common_change(samples, change, square, full)
+    return _whole_shift(u, v, found) if found.share > EXPLAINED_SHARE else None
+
+
+def _whole_shift(u: int, v: int, found: CommonChange) -> tuple[float, float]:
+    """Return a shift together with what the fit still finds."""
+    rest = found.values[[SHIFT_U, SHIFT_V]]
+    if np.hypot(*rest) > FOLLOWED_PX:
+        rest = np.zeros(2)
+    return float(u + rest[0]), float(v + rest[1])

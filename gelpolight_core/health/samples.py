@@ -1,0 +1,297 @@
+"""Which places of the membrane a frame is checked at, and what is expected there.
+
+The field is parted into cells of about a millimetre. In each, a few short runs of grid nodes are
+sampled from the raw frame, by the same interpolation as the background was. How a change of light,
+room light, a shift and a blur would show is known from the background, so that the least-squares
+sums of each cell need one pass over the samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.health.expected import raw_background
+from gelpolight_core.masks import SATURATED, lit
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.sensor_calibration import Calibration
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+Index = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+
+CELL_MM = 1.15
+CELL_NODES = 10
+"""A cell is at least so many nodes wide."""
+RUN = 8
+"""Neighbouring nodes that are sampled together: they share the camera's rows."""
+RUNS_OF_CELL = 4
+SMOOTH_NODES = 1.5
+"""Over which the background's roughness is taken."""
+FINE_NODES = 0.7
+"""Over which its slopes are taken: wider, and a shift of specks comes out too large."""
+TEXTURE = 20.0
+"""A run shows a blur where it is so many times as rough as most: noise is rough too."""
+LEAST_TEXTURE_RUNS = 8
+BLURS_PX = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Blurs (standard deviation) that are tried on the background, to know what they look like."""
+LEAST_NOISE = 0.4 / 255.0
+"""Rounding to 8 bits alone is noise of 0.3 steps."""
+ROUGH = 0.02
+"""Share of the light's change from pixel to pixel that interpolation may get wrong."""
+EFFECTS = 5
+"""What may change a channel: gain, offset, shift along u and v, blur."""
+PARAMETERS = 9
+"""Gain and offset of each channel; shift along u, along v; blur."""
+SHIFT_U, SHIFT_V, BLUR = 6, 7, 8
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Places, what is expected there, and how faults would show; N is `RUN` for each run.
+
+    Attributes
+    ----------
+    corner : (N, 2) int32
+        Raw row and column of the first of four pixels around each sample.
+    part : (N, 2) float32
+        How far it is from there, in rows and columns.
+    expected : (N, 3) float32
+        Linear light of the untouched membrane.
+    effects : (N, 3, EFFECTS) float32
+        Change of the light by each effect at strength 1, over the variance of the light.
+    weight : (N, 3) float32
+        1 over the variance.
+    normal : (cells, PARAMETERS, PARAMETERS) float64
+        Sums of products of the effects.
+    count : (cells,) float64
+        Samples of each cell.
+    run_light : (3, runs) float64
+        Sum of the expected light.
+    beside : (cells, 8) int32
+        Neighbours of each cell; itself where there is none.
+    run_cell : (runs,) int32
+        Cell of each run.
+    blur_strength : (1 + blurs,) float64
+        What the fit of the blur gives for no blur and for `BLURS_PX`; empty where the membrane has
+        too little texture to show one.
+    """
+
+    corner: Index
+    part: Map
+    expected: Map
+    effects: Map
+    weight: Map
+    normal: Array
+    count: Array
+    run_light: Array
+    beside: Index
+    run_cell: Index
+    blur_strength: Array
+
+
+def samples_of(calibration: Calibration) -> Samples:
+    """Choose the samples of a calibrated sensor."""
+    base, table = raw_background(calibration), calibration.table
+    inside = table.valid & lit(base) & (base < SATURATED).all(axis=2)
+    reach = int(np.ceil(3.0 * SMOOTH_NODES)) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    core = cv2.erode(inside.astype(np.uint8), disc, borderValue=0) > 0
+    smooth = np.asarray(cv2.GaussianBlur(base, (0, 0), SMOOTH_NODES), np.float32)
+    rough = np.asarray(cv2.Laplacian(smooth, cv2.CV_32F, ksize=1), np.float32)
+    row, first, cell, textured = _runs(
+        core, np.asarray(rough / np.maximum(smooth, np.float32(1e-3)), np.float32), table
+    )
+    rows = np.repeat(row, RUN)
+    columns = (first[:, None] + np.arange(RUN)).ravel()
+    fine = np.asarray(cv2.GaussianBlur(base, (0, 0), FINE_NODES), np.float32)
+    by_u, by_v = _per_pixel(fine, rows, columns, table)
+    expected = base[rows, columns]
+    by_blur = np.where(np.repeat(textured, RUN)[:, None], rough[rows, columns], 0.0)
+    noise = np.maximum(calibration.noise, LEAST_NOISE)
+    median = np.maximum(np.median(expected, axis=0), 1e-3) if rows.size else np.ones(3)
+    # Read noise and shot noise; stated at the median brightness.
+    variance = noise**2 * (0.3 + 0.7 * expected / median)
+    variance += ROUGH**2 * (by_u**2 + by_v**2)
+    weight = (1.0 / variance).astype(np.float32)
+    plain = np.stack([expected, np.ones_like(expected), -by_u, -by_v, by_blur], -1)
+    used, lattice = np.unique(cell, return_inverse=True)
+    u, v = table.u_px[rows, columns], table.v_px[rows, columns]
+    camera = calibration.camera
+    corner = np.stack(
+        [np.clip(v.astype(np.int32), 0, camera.height - 2),
+         np.clip(u.astype(np.int32), 0, camera.width - 2)], axis=-1
+    )  # fmt: skip
+    of_sample = np.repeat(lattice.astype(np.int32), RUN)
+    across = core.shape[1] // _cell_nodes(table) + 1
+    return Samples(
+        corner=np.ascontiguousarray(corner, np.int32),
+        part=np.ascontiguousarray(np.stack([v, u], -1) - corner, np.float32),
+        expected=np.ascontiguousarray(expected, np.float32),
+        effects=np.ascontiguousarray(plain * weight[..., None], np.float32),
+        weight=weight,
+        normal=_normal(plain.astype(np.float64), weight, of_sample, used.size),
+        count=np.bincount(of_sample, minlength=used.size).astype(np.float64),
+        run_light=np.ascontiguousarray(expected.reshape(-1, RUN, 3).sum(axis=1).T, np.float64),
+        beside=_neighbours(used, across),
+        run_cell=lattice.astype(np.int32),
+        blur_strength=_blur_strength(base, (rows, columns), by_blur, weight)
+        if textured.any()
+        else np.zeros(0),
+    )
+
+
+def _blur_strength(
+    base: Map, nodes: tuple[NDArray[np.intp], NDArray[np.intp]], by_blur: Array, weight: Map
+) -> Array:
+    """Return `Samples.blur_strength`, by the green channel."""
+    green, effect = base[..., 1], by_blur[:, 1]
+    size = float((weight[:, 1] * effect**2).sum())
+    found = [0.0]
+    for sigma in BLURS_PX:
+        change = cv2.GaussianBlur(green, (0, 0), sigma)[nodes] - green[nodes]
+        found.append(float((weight[:, 1] * effect * change).sum()) / size)
+    return np.maximum.accumulate(found)
+
+
+def _neighbours(used: NDArray[np.intp], across: int) -> Index:
+    """Return the indices (cells, 8) of the cells around each."""
+    steps = [i * across + j for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
+    wanted = used[:, None] + np.array(steps)
+    at = np.clip(np.searchsorted(used, wanted), 0, max(used.size - 1, 0))
+    own = np.broadcast_to(np.arange(used.size)[:, None], wanted.shape)
+    return np.asarray(np.where(used[at] == wanted, at, own), np.int32)
+
+
+def _cell_nodes(table: ResamplingTable) -> int:
+    return max(round(CELL_MM / table.grid.pitch_mm), CELL_NODES)
+
+
+def _runs(
+    core: Mask, rough: Map, table: ResamplingTable
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], Mask]:
+    """Return row, first column and cell of the runs, by cell, and whether they are textured.
+
+    One run of each cell is where the membrane has most texture, for shift and blur show there; the
+    others are anywhere.
+    """
+    size, (rows, columns) = _cell_nodes(table), core.shape
+    blocks = columns // RUN
+    cut = np.s_[:, : blocks * RUN]
+    whole = core[cut].reshape(rows, blocks, RUN).all(axis=2)
+    energy = (rough[cut] ** 2).sum(axis=2).reshape(rows, blocks, RUN).sum(axis=2)
+    row, block = np.nonzero(whole)
+    across = columns // size + 1
+    cell = (row // size) * across + (block * RUN + RUN // 2) // size
+    chance = np.random.default_rng(0).random(row.size)
+    rank = np.empty(row.size, np.intp)
+    order = np.lexsort((-energy[row, block], cell))
+    starts = np.r_[True, np.diff(cell[order]) != 0] if row.size else np.zeros(0, bool)
+    chance[order[starts]] = -1.0
+    order = np.lexsort((chance, cell))
+    starts = np.flatnonzero(np.r_[True, np.diff(cell[order]) != 0]) if row.size else order
+    lengths = np.diff(np.r_[starts, row.size])
+    rank[order] = np.arange(row.size) - np.repeat(starts, lengths)
+    # A cell with fewer runs lies at the rim.
+    few = np.repeat(lengths < RUNS_OF_CELL, lengths)
+    keep = order[(rank[order] < RUNS_OF_CELL) & ~few]
+    row, block, cell = row[keep], block[keep], cell[keep]
+    textured = energy[row, block] > TEXTURE * np.median(energy[whole]) if row.size else row > 0
+    if textured.sum() < LEAST_TEXTURE_RUNS:
+        textured[:] = False
+    return row, block * RUN, cell, textured
+
+
+def _per_pixel(
+    smooth: Map, rows: NDArray[np.intp], columns: NDArray[np.intp], table: ResamplingTable
+) -> tuple[Array, Array]:
+    """Return the change (N, 3) of the background from one raw pixel to the next, along u and v."""
+
+    def steps(values: Map) -> tuple[Map, Map]:
+        along = 0.5 * (values[rows, columns + 1] - values[rows, columns - 1])
+        down = 0.5 * (values[rows + 1, columns] - values[rows - 1, columns])
+        return along, down
+
+    (u_x, u_y), (v_x, v_y) = steps(table.u_px), steps(table.v_px)
+    light_x, light_y = steps(smooth)
+    area = (u_x * v_y - u_y * v_x)[:, None]
+    by_u = (light_x * v_y[:, None] - light_y * v_x[:, None]) / area
+    by_v = (light_y * u_x[:, None] - light_x * u_y[:, None]) / area
+    return np.asarray(by_u, np.float64), np.asarray(by_v, np.float64)
+
+
+def _normal(plain: Array, weight: Map, cell: Index, cells: int) -> Array:
+    normal = np.zeros((cells, PARAMETERS, PARAMETERS))
+    for k in range(3):
+        at = [2 * k, 2 * k + 1, SHIFT_U, SHIFT_V, BLUR]
+        for i, to in enumerate(at):
+            for j, other in enumerate(at):
+                products = weight[:, k] * plain[:, k, i] * plain[:, k, j]
+                normal[:, to, other] += np.bincount(cell, products, minlength=cells)
+    return normal
+
+
+@numba.njit(nogil=True, fastmath=True, cache=True)
+def compare_samples(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    raw, light, limit, corner, part, run_cell, expected, effects, weight,
+    change, square, full, run_change,
+):  # fmt: skip
+    """Sum up a frame less what is expected, in one pass.
+
+    Parameters
+    ----------
+    raw : (height, width, 3) uint8 or uint16
+        The frame.
+    light : (3, levels) float32
+        Linear light of every number.
+    limit : float
+        Light from which on a channel is saturated.
+    corner, part, run_cell, expected, effects, weight
+        Of :class:`Samples`.
+    change : (cells, PARAMETERS) float64
+        Sums of products of the difference and the effects; written.
+    square : (cells,) float64
+        Sums of squares of the difference over its variance; written.
+    full : (cells,) float64
+        Samples with a saturated channel; written.
+    run_change : (3, runs) float64
+        Sums of the difference; written.
+    """
+    change[:], square[:], full[:] = 0.0, 0.0, 0.0
+    zero = np.float32(0.0)
+    topped = np.empty(RUN, np.bool_)
+    for run in range(run_cell.size):
+        at, first = run_cell[run], run * RUN
+        topped[:] = False
+        squares = zero
+        for k in range(3):
+            gain, offset, by_u, by_v, blur, total = zero, zero, zero, zero, zero, zero
+            for i in range(RUN):
+                n = first + i
+                r, c, fv, fu = corner[n, 0], corner[n, 1], part[n, 0], part[n, 1]
+                p00, p01 = light[k, raw[r, c, k]], light[k, raw[r, c + 1, k]]
+                p10, p11 = light[k, raw[r + 1, c, k]], light[k, raw[r + 1, c + 1, k]]
+                upper, lower = p00 + fu * (p01 - p00), p10 + fu * (p11 - p10)
+                topped[i] |= max(max(p00, p01), max(p10, p11)) >= limit
+                off = upper + fv * (lower - upper) - expected[n, k]
+                gain += off * effects[n, k, 0]
+                offset += off * effects[n, k, 1]
+                by_u += off * effects[n, k, 2]
+                by_v += off * effects[n, k, 3]
+                blur += off * effects[n, k, 4]
+                squares += off * off * weight[n, k]
+                total += off
+            change[at, 2 * k] += gain
+            change[at, 2 * k + 1] += offset
+            change[at, SHIFT_U] += by_u
+            change[at, SHIFT_V] += by_v
+            change[at, BLUR] += blur
+            run_change[k, run] = total
+        square[at] += squares
+        for i in range(RUN):
+            full[at] += topped[i]

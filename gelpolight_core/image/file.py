@@ -1,0 +1,86 @@
+"""Check that an image file is complete before a decoder reads what it can of it."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.image.header import PNG_HEAD, TIFF_HEADS, declared_sizes
+from gelpolight_core.io.reading import read_file
+from gelpolight_core.translation import tr
+
+MAX_PIXELS = 64_000_000
+# Three channels of 16 bit, and some overhead.
+FILE_LIMIT = 6 * MAX_PIXELS + (1 << 20)
+
+
+def is_complete_image(data: bytes) -> bool:
+    """Return whether the bytes are a PNG with intact chunks, or a TIFF.
+
+    Other formats such as JPEG are lossy or not linear and are refused even under a wrong file
+    extension. TIFF has no checksums; its decoder reports missing data.
+
+    References
+    ----------
+    PNG specification (third edition), 5.3 "Chunk layout".
+    """
+    if data.startswith(TIFF_HEADS):
+        return True
+    if not data.startswith(PNG_HEAD):
+        return False
+    view, position = memoryview(data), len(PNG_HEAD)
+    while position + 12 <= len(data):
+        end = position + 8 + int.from_bytes(view[position : position + 4], "big")
+        if zlib.crc32(view[position + 4 : end]) != int.from_bytes(view[end : end + 4], "big"):
+            return False
+        if data[position + 4 : position + 8] == b"IEND":
+            return True
+        position = end + 4
+    return False
+
+
+def decode_picture(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[Any, Any] | None:
+    """Return the values of an image file in OpenCV's order; None if the file is not complete.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    flags : int, optional
+        Flags for OpenCV, such as those for a reduced size.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, cannot be read, or declares more pixels than any camera has.
+    """
+    try:
+        data = read_file(path, FILE_LIMIT)
+    except FileNotFoundError as error:
+        raise InputError(
+            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
+        ) from error
+    _check_declared_size(path, data)
+    if not is_complete_image(data):
+        return None
+    try:
+        raw = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error:
+        return None
+    return None if raw is None or (raw.ndim == 3 and raw.shape[2] not in (3, 4)) else raw
+
+
+def _check_declared_size(path: Path, data: bytes) -> None:
+    """Refuse an image that declares more pixels than any camera has, before memory is allocated."""
+    for width, height in declared_sizes(data):
+        if width * height > MAX_PIXELS:
+            raise InputError(
+                tr("The image declares {w} x {h} pixels").format(w=width, h=height),
+                where=str(path),
+                advice=tr("Use images of at most {n} megapixels").format(n=MAX_PIXELS // 10**6),
+            )

@@ -1,0 +1,386 @@
+"""Noise-scaled difference between a press and the picture without contact.
+
+A difference means something only against the noise and the drift of the light that two pictures
+of the same membrane always show, so both are measured on the pictures themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.masks import SATURATED
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+# Two pictures taken one after the other repeat to about this share of their brightness (flicker of
+# the light, settling of the membrane); smaller differences are no indentation even without noise.
+REPEATABILITY = 0.01
+# Rounding two 8-bit pictures leaves this much, however quiet the camera is.
+ROUNDING = float(np.sqrt(2.0 / 12.0) / 255.0)
+# Below this brightness a ratio of two pictures is mostly rounding.
+DARK = 4.0 / 255.0
+# Beyond a quarter, the exposure or a light was changed and not merely warm.
+LARGEST_GAIN_CHANGE = 0.25
+# Medians of this many pixels are known to about half a percent; more only cost time.
+_ENOUGH = 60_000
+
+
+@dataclass(frozen=True, slots=True)
+class ScaledDifference:
+    """What changed between two pictures, in units of what changes without a press.
+
+    Attributes
+    ----------
+    difference : (rows, columns, 3) float32
+        Press minus gain times background, 0 outside the working area.
+    scaled : (small rows, small columns) float32
+        Root of the summed squares of the smoothed difference over its noise, on a grid `factor`
+        times coarser; about 1.7 where nothing changed.
+    valid_small : (small rows, small columns) bool
+        The working area on that grid.
+    factor : int
+        How many pixels of the picture make one of `scaled`.
+    gain : tuple of 3 floats
+        Brightness of the press over that of the background where nothing touches, per channel.
+    noise : tuple of 3 floats
+        Standard deviation of the difference from pixel to pixel, per channel.
+    relative : (small rows, small columns, 3) float32
+        Logarithm of the smoothed press over gain times background; dark pixels count less.
+    relative_noise : float
+        Standard deviation of `relative` where nothing changed, mean over channels.
+    """
+
+    difference: Array
+    scaled: Array
+    valid_small: Mask
+    factor: int
+    gain: tuple[float, float, float]
+    noise: tuple[float, float, float]
+    relative: Array
+    relative_noise: float
+
+
+def prepare_pair(
+    press: Array,
+    background: Array,
+    valid: Mask | None,
+    *,
+    name: str = "press",
+    background_name: str = "background",
+) -> tuple[Array, Array, Mask]:
+    """Return two pictures without holes, and the area in which they can be compared.
+
+    Parameters
+    ----------
+    press, background : (rows, columns, 3)
+        Pictures; pixels that are not finite are left out of the area and set to 0.
+    valid : (rows, columns) bool or None
+        The working area; without it, the lit part of `background`.
+    name, background_name : str, optional
+        What to call the pictures in messages.
+
+    Returns
+    -------
+    press, background : (rows, columns, 3) float32
+        Finite pictures.
+    area : (rows, columns) bool
+        Where they count.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit or a picture is black or saturated.
+    """
+    _check_shapes(press, background, valid, name, background_name)
+    # One sum is finite only where all six values are.
+    with np.errstate(invalid="ignore", over="ignore"):
+        finite = np.asarray(np.isfinite((press + background) @ np.ones(3, np.float32)))
+    press, background = _without_holes(press, finite), _without_holes(background, finite)
+    area = finite & (lit_area(background, background_name) if valid is None else valid)
+    _check_exposure(background, area, background_name)
+    _check_exposure(press, area, name)
+    return press, background, area
+
+
+def lit_area(background: Array, name: str = "background") -> Mask:
+    """Return the lit part of a picture without contact: its largest bright region, holes filled.
+
+    Parameters
+    ----------
+    background : (rows, columns, 3)
+        Picture without contact, finite.
+    name : str, optional
+        What to call it in messages.
+
+    Raises
+    ------
+    InputError
+        If nothing is lit.
+    """
+    red, green, blue = cv2.split(background)
+    light = cv2.GaussianBlur(cv2.max(cv2.max(red, green), blue), (0, 0), 2.0)
+    # Some twentieth of the brightest is where a dark rim begins and a ratio stops to mean anything.
+    bright = light > max(0.05 * float(np.quantile(light[::3, ::3], 0.99)), 0.5 * DARK)
+    regions, _ = cv2.findContours(bright.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if not regions:
+        raise InputError(
+            tr("the picture is all black"),
+            where=name,
+            advice=tr("Switch the lights on and check the exposure"),
+        )
+    filled = np.zeros(bright.shape, np.uint8)
+    cv2.drawContours(filled, [max(regions, key=cv2.contourArea)], -1, 1, cv2.FILLED)
+    return filled > 0
+
+
+def _check_shapes(
+    press: Array, background: Array, valid: Mask | None, name: str, background_name: str
+) -> None:
+    for picture, what in ((press, name), (background, background_name)):
+        if picture.ndim != 3 or picture.shape[2] != 3 or min(picture.shape[:2]) < 32:
+            raise InputError(
+                tr("the array has shape {shape}").format(shape=picture.shape),
+                where=what,
+                advice=tr("Give a colour picture of at least 32x32 pixels"),
+            )
+    for other, what in ((background, background_name), (valid, tr("working area"))):
+        if other is not None and other.shape[:2] != press.shape[:2]:
+            raise InputError(
+                tr("the picture is {w}x{h} pixels and {other} is {ow}x{oh}").format(
+                    w=press.shape[1],
+                    h=press.shape[0],
+                    other=what,
+                    ow=other.shape[1],
+                    oh=other.shape[0],
+                ),
+                where=name,
+                advice=tr("Capture both with the same camera settings"),
+            )
+
+
+def _check_exposure(picture: Array, area: Mask, name: str) -> None:
+    step = max(1, min(picture.shape[:2]) // 256)
+    inside = picture[::step, ::step][area[::step, ::step]]
+    if len(inside) == 0:
+        raise InputError(
+            tr("the working area is empty"),
+            where=name,
+            advice=tr("Check the working area and the pictures"),
+        )
+    brightest = inside.max(axis=1)
+    if float(np.median(brightest)) < DARK:
+        raise InputError(
+            tr("the picture is all black"),
+            where=name,
+            advice=tr("Switch the lights on and check the exposure"),
+        )
+    share = float(np.mean(brightest >= SATURATED))
+    if share > 0.5:
+        raise InputError(
+            tr("{share:.0f} % of the picture is saturated").format(share=100.0 * share),
+            where=name,
+            advice=tr("Shorten the exposure and capture it again"),
+        )
+
+
+def _without_holes(picture: Array, finite: Mask) -> Array:
+    if not finite.all():
+        picture = np.where(finite[..., None], picture, np.float32(0.0))
+    return picture.astype(np.float32, copy=False)
+
+
+def pixel_noise(difference: Array, inside: Mask) -> Array:
+    """Return the standard deviation (3,) of a difference from pixel to pixel.
+
+    The checkerboard difference of 2x2 pixels cancels every smooth shading; its median is
+    indifferent to edges and specks.
+
+    Parameters
+    ----------
+    difference : (rows, columns, 3)
+        Any picture.
+    inside : (rows, columns) bool
+        Which pixels count.
+    """
+    upper, lower = difference[:-1:2], difference[1::2]
+    block = upper[:, :-1] - upper[:, 1:] - lower[:, :-1] + lower[:, 1:]
+    both = inside[:-1:2] & inside[1::2]
+    keep = both[:, :-1] & both[:, 1:]
+    size = np.abs(thin_out(block[keep])) / 2.0
+    sigma = np.median(size, axis=0) / 0.6745 if len(size) else np.zeros(3)
+    return np.asarray(np.maximum(sigma, ROUNDING), dtype=np.float32)
+
+
+def match_gain(press: Array, background: Array, inside: Mask) -> Array:
+    """Return the brightness (3,) of `press` over `background` where nothing touches.
+
+    A channel without light has gain 1.
+
+    Parameters
+    ----------
+    press, background : (rows, columns, 3)
+        Pictures of equal size, already averaged over a few pixels.
+    inside : (rows, columns) bool
+        Which pixels count.
+    """
+    gain = np.ones(3, dtype=np.float32)
+    # Broad means: a ratio of noisy pixels is neither unbiased nor a narrow peak.
+    before, after = (
+        np.asarray(cv2.GaussianBlur(p, (0, 0), 3.0), np.float32) for p in (background, press)
+    )
+    for k in range(3):
+        total = before[..., k] + after[..., k]
+        # Chosen by the sum: choosing by one picture's noise would bias the ratio.
+        lit = inside & (total > max(2.0 * DARK, 0.2 * float(total[inside].max(initial=0.0))))
+        if np.count_nonzero(lit) >= 16:
+            below = np.maximum(thin_out(before[..., k][lit]), np.float32(0.25 * DARK))
+            gain[k] = _densest(np.asarray(thin_out(after[..., k][lit]) / below, np.float32))
+    return gain
+
+
+def _densest(ratio: Array) -> float:
+    """Return where values crowd most: the shortest fifth, polished by Tukey's biweight.
+
+    The undisturbed membrane is a narrow peak, whatever share of the picture it is; an indentation
+    spreads over all brightnesses.
+    """
+    ordered = np.sort(ratio)
+    count = max(2, len(ordered) // 5)
+    start = int(np.argmin(ordered[count - 1 :] - ordered[: len(ordered) - count + 1]))
+    fifth = ordered[start : start + count]
+    centre = float(np.median(fifth))
+    # A fifth about the middle of a normal distribution spans half a standard deviation.
+    spread = max(2.0 * float(fifth[-1] - fifth[0]), 0.1 * REPEATABILITY)
+    for _ in range(10):
+        away = ratio - centre
+        weight = np.clip(1.0 - (away / (4.0 * spread)) ** 2, 0.0, None) ** 2
+        centre += float((weight * away).sum() / weight.sum())
+    return centre
+
+
+def scale_difference(
+    press: Array, background: Array, valid: Mask, *, widest_px: int = 640
+) -> ScaledDifference:
+    """Return the difference of two pictures in units of its own noise.
+
+    Parameters
+    ----------
+    press, background : (rows, columns, 3)
+        Pictures of equal size, finite.
+    valid : (rows, columns) bool
+        The working area.
+    widest_px : int, optional
+        The coarser grid is no larger than this along its longer side: averaging is the cheapest
+        way to lift a faint indentation out of the noise.
+    """
+    factor = max(1, -(-max(valid.shape) // widest_px))
+    press_small, background_small = _shrink(press, factor), _shrink(background, factor)
+    valid_small = _shrink(valid.astype(np.float32), factor) > 0.99
+    gain = match_gain(press_small, background_small, valid_small)
+    difference = np.where(valid[..., None], press - gain * background, np.float32(0.0))
+    small = np.where(valid_small[..., None], press_small - gain * background_small, np.float32(0.0))
+    # A median over 3x3 takes specks and hot pixels away, where a mean would spread them.
+    smooth = np.asarray(cv2.GaussianBlur(cv2.medianBlur(small, 3), (0, 0), 1.0), np.float32)
+    noise = _smooth_noise(smooth, valid_small)
+    variance = noise**2 + (REPEATABILITY * background_small) ** 2
+    scaled = np.sqrt((smooth**2 / variance).sum(axis=2)) * valid_small
+    sigma = pixel_noise(difference, valid)
+    relative = _relative_change(press_small, gain * background_small, valid_small)
+    relative_noise = _smooth_noise(relative[::3], valid_small[::3])
+    return ScaledDifference(
+        difference.astype(np.float32, copy=False),
+        scaled.astype(np.float32),
+        valid_small,
+        factor,
+        (float(gain[0]), float(gain[1]), float(gain[2])),
+        (float(sigma[0]), float(sigma[1]), float(sigma[2])),
+        relative,
+        float(np.sqrt(np.mean(relative_noise**2))),
+    )
+
+
+def _relative_change(press: Array, background: Array, valid: Mask) -> Array:
+    """Return the smoothed logarithm of press over background, 0 outside the working area."""
+    dim = np.float32(2.0 * DARK)
+    ratio = (press + dim) / (background + dim)
+    change = np.asarray(cv2.log(ratio), np.float32)
+    change[~valid] = 0.0
+    return np.asarray(cv2.GaussianBlur(change, (0, 0), 1.0), np.float32)
+
+
+def change_where(change: ScaledDifference, background: Array, where: Mask) -> float:
+    """Return the typical change of brightness somewhere, as a share of it; 0 where it is dark.
+
+    Parameters
+    ----------
+    change : ScaledDifference
+        Of these pictures.
+    background : (rows, columns, 3)
+        Picture without contact.
+    where : (rows, columns) bool
+        Which pixels count.
+    """
+    step = change.factor
+    light = background[::step, ::step].sum(axis=2)
+    moved = cv2.GaussianBlur(change.difference, (0, 0), 2.0)[::step, ::step]
+    keep = where[::step, ::step] & (light > 3.0 * DARK)
+    if np.count_nonzero(keep) < 16:
+        return 0.0
+    return float(np.median(np.abs(moved[keep]).sum(axis=1) / light[keep]))
+
+
+def check_gain(gain: tuple[float, float, float], name: str) -> None:
+    """Refuse a press whose light is not the background's.
+
+    Raises
+    ------
+    InputError
+        If a channel's gain is beyond `LARGEST_GAIN_CHANGE`.
+    """
+    worst = max(gain, key=lambda g: abs(g - 1.0))
+    if abs(worst - 1.0) > LARGEST_GAIN_CHANGE:
+        raise InputError(
+            tr("a colour channel is {gain:.2f} times as bright as in the background").format(
+                gain=worst
+            ),
+            where=name,
+            advice=tr("Fix exposure and lights, then capture background and press again"),
+        )
+
+
+def thin_out(values: Array) -> Array:
+    """Return every n-th of `values` along the first axis, enough of them for a median."""
+    return values[:: max(1, len(values) // _ENOUGH)]
+
+
+def _shrink(picture: Array, factor: int) -> Array:
+    """Return block means; rows and columns that do not fill a block are left out."""
+    if factor == 1:
+        return picture
+    rows, columns = picture.shape[0] // factor, picture.shape[1] // factor
+    cropped = picture[: rows * factor, : columns * factor]
+    return np.asarray(cv2.resize(cropped, (columns, rows), interpolation=cv2.INTER_AREA))
+
+
+def _smooth_noise(smooth: Array, inside: Mask) -> Array:
+    """Return the noise (3,) that smoothing has left.
+
+    Second differences over a few pixels, so that noise which was already correlated (resampling,
+    demosaicing) is seen in full; the lower quartile, so that an indentation over half of the
+    picture does not count as noise.
+    """
+    lag = 4
+    if inside.shape[1] <= 2 * lag:
+        return np.full(3, ROUNDING, dtype=np.float32)
+    second = smooth[:, : -2 * lag] - 2.0 * smooth[:, lag:-lag] + smooth[:, 2 * lag :]
+    keep = inside[:, : -2 * lag] & inside[:, lag:-lag] & inside[:, 2 * lag :]
+    size = np.abs(thin_out(second[keep])) / np.sqrt(6.0)
+    quartile = np.quantile(size, 0.25, axis=0) / 0.3186 if len(size) else np.zeros(3)
+    return np.asarray(np.maximum(quartile, 0.3 * ROUNDING), dtype=np.float32)

@@ -1,0 +1,1 @@
+"""Calibration of closed sensors from a background and a few ball presses."""

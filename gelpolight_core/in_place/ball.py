@@ -1,0 +1,151 @@
+"""The slopes of a pressed ball, and where a ball lies by the slopes that are seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reflectance.contour import Circle
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+
+MOST_CONTACT = 0.95
+"""Largest contact radius over the ball's: beyond, the slope grows without limit."""
+CENTRE_SHARE = 0.85
+"""Share of the contact radius within which slopes place the centre."""
+CENTRE_ROUNDS = 4
+SLOPE_SCALE = 0.15
+"""Slopes that differ by more count less and less."""
+DECAYS = (0.08, 0.15, 0.25, 0.4, 0.6, 0.9)
+"""Decay lengths of the membrane around the contact that are tried, in contact radii."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ball:
+    """A ball in an image; lengths in nodes of the working grid.
+
+    Attributes
+    ----------
+    x, y : float
+        Its centre.
+    contact : float
+        Radius of the contact.
+    radius : float
+        Of the ball.
+    """
+
+    x: float
+    y: float
+    contact: float
+    radius: float
+
+    @property
+    def circle(self) -> Circle:
+        """The contact's edge."""
+        return Circle(self.x, self.y, self.contact)
+
+    def limited(self) -> Ball:
+        """Return the ball with a contact that its radius allows."""
+        return replace(self, contact=min(self.contact, MOST_CONTACT * self.radius))
+
+
+def distances(shape: tuple[int, int], ball: Ball) -> tuple[Map, Map, Map]:
+    """Return x, y and distance (rows, columns) from a ball's centre."""
+    x = np.arange(shape[1], dtype=np.float32)[None, :] - np.float32(ball.x)
+    y = np.arange(shape[0], dtype=np.float32)[:, None] - np.float32(ball.y)
+    x, y = np.broadcast_arrays(x, y)
+    return x, y, np.hypot(x, y)
+
+
+def ball_slopes(x: Array, y: Array, radius: float) -> Array:
+    """Return the depth's slopes (N, 2) on a ball at places (N,) from its centre.
+
+    d = sqrt(R^2 - rho^2) + constant, so that the slope is -(x, y) / sqrt(R^2 - rho^2).
+    """
+    root = np.sqrt(np.maximum(radius**2 - x**2 - y**2, (0.2 * radius) ** 2))
+    return np.stack([-x / root, -y / root], axis=-1)
+
+
+def placed_by_slopes(slope_x: Map, slope_y: Map, ball: Ball) -> Ball:
+    """Return the ball with its centre where the slopes inside the contact put it."""
+    x, y = ball.x, ball.y
+    reach = CENTRE_SHARE * ball.contact
+    for _ in range(CENTRE_ROUNDS):
+        from_x, from_y, rho = distances(slope_x.shape, replace(ball, x=x, y=y))
+        inside = rho < reach
+        if np.count_nonzero(inside) < 12:
+            break
+        dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
+        wanted = ball_slopes(dx, dy, ball.radius)
+        left = np.stack([slope_x[inside], slope_y[inside]], axis=-1) - wanted
+        # Moving the centre by c changes the slopes by about c / root.
+        gain = 1.0 / np.sqrt(np.maximum(ball.radius**2 - dx**2 - dy**2, 1.0))[:, None]
+        weight = gain / (1.0 + (left / SLOPE_SCALE) ** 2)
+        step = (weight * left).sum(axis=0) / (weight * gain).sum(axis=0)
+        step = np.clip(step, -0.2 * ball.contact, 0.2 * ball.contact)
+        x, y = x + float(step[0]), y + float(step[1])
+    return replace(ball, x=x, y=y)
+
+
+def contact_by_slopes(slope_x: Map, slope_y: Map, ball: Ball, *, smoothing: float) -> float:
+    """Return the contact's radius: where the slope ceases to be the ball's.
+
+    The mean slope towards the centre is compared with the ball's up to the edge, and one that
+    falls off exponentially beyond; both smoothed as the image was.
+
+    Parameters
+    ----------
+    slope_x, slope_y : (rows, columns)
+        As seen.
+    ball : Ball
+        About right.
+    smoothing : float
+        Standard deviation of the image's smoothing, nodes.
+    """
+    from_x, from_y, rho = distances(slope_x.shape, ball)
+    inward = -(slope_x * from_x + slope_y * from_y) / np.maximum(rho, 1e-6)
+    near = rho < 2.0 * ball.contact
+    ring = rho[near].astype(np.intp)
+    order = np.argsort(ring, kind="stable")
+    edges = np.searchsorted(ring[order], np.arange(ring.max(initial=0) + 2))
+    values = inward[near][order]
+    count = np.diff(edges)
+    profile = np.array(
+        [np.median(values[a:b]) if b - a > 5 else np.nan for a, b in pairwise(edges)]
+    )
+    radius = np.arange(len(profile)) + 0.5
+    used = np.isfinite(profile) & (radius > 0.4 * ball.contact)
+    if np.count_nonzero(used) < 8:
+        return ball.contact
+    table, contacts = _profiles(ball, radius[used], smoothing)
+    weight = np.sqrt(count[used])
+    cost = (weight * np.minimum(np.abs(table - profile[used]), 0.3)).sum(axis=-1)
+    return float(contacts[int(cost.min(axis=1).argmin())])
+
+
+def _profiles(ball: Ball, radius: Array, smoothing: float) -> tuple[Array, Array]:
+    """Return the slopes (contacts, decays, radii) of contacts that are tried, and these."""
+    most = min(1.35 * ball.contact, 0.97 * ball.radius)
+    contacts = np.arange(0.6 * ball.contact, most, 0.5)
+    step = 0.5
+    fine = np.arange(0.0, radius[-1] + 4.0 * smoothing, step)
+    on_ball = fine / np.sqrt(np.maximum(ball.radius**2 - fine**2, (0.1 * ball.radius) ** 2))
+    edge = (contacts / np.sqrt(ball.radius**2 - contacts**2))[:, None, None]
+    beyond = (fine - contacts[:, None])[:, None] / (
+        np.array(DECAYS)[:, None] * contacts[:, None, None]
+    )
+    slopes = np.where(beyond < 0.0, on_ball, edge * np.exp(-np.maximum(beyond, 0.0)))
+    flat = slopes.reshape(-1, len(fine)).astype(np.float32)
+    smooth = cv2.GaussianBlur(
+        flat, (0, 0), sigmaX=smoothing / step, sigmaY=1e-6, borderType=cv2.BORDER_REPLICATE
+    )
+    place = np.clip(radius / step, 0, len(fine) - 2)
+    low = place.astype(np.intp)
+    part = place - low
+    at = smooth[:, low] * (1.0 - part) + smooth[:, low + 1] * part
+    return at.reshape(len(contacts), len(DECAYS), -1), contacts

@@ -1,0 +1,370 @@
+"""Calibration of a closed sensor: from a background and ball presses to slopes.
+
+The contacts' edges give a first place for each ball. Then polynomial and places are refined in
+turn: each press is placed by the slopes that the other presses give, half drawn back to its edge,
+because slopes and places could else drift together. Presses that the others do not explain are
+left out and named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import compress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.in_place.ball import Ball, contact_by_slopes, distances, placed_by_slopes
+from gelpolight_core.in_place.fit import (
+    FIRST_RIDGE,
+    INSIDE,
+    PressSums,
+    Ridge,
+    choose_ridge,
+    left_out,
+    mean_squared_error,
+    press_sums,
+    solve,
+)
+from gelpolight_core.in_place.held_out import (
+    HeldOutPress,
+    amplitude_of,
+    error_curve,
+    held_out_presses,
+)
+from gelpolight_core.in_place.next_ball import learning_curve, next_place
+from gelpolight_core.in_place.press import find_contact
+from gelpolight_core.in_place.same_view import refuse_other_view
+from gelpolight_core.parallel import in_parallel
+from gelpolight_core.reconstruction.in_place.change import (
+    SMOOTHING_NODES,
+    ColourChange,
+    Reference,
+    colour_change,
+    reference,
+)
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
+from gelpolight_core.reconstruction.in_place.model import (
+    COLOUR_CELLS,
+    InPlaceModel,
+    colour_cells,
+    evaluate,
+)
+from gelpolight_core.reflectance.contour import Circle
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+
+LEAST_PRESSES = 3
+ROUNDS = 3
+TRUST_SLOPES = 0.4
+"""How far a press follows the slopes, the rest its edge, once there are `MANY_PRESSES`."""
+MANY_PRESSES = 20
+DISAGREES = 0.3
+"""Share of the contact radius from which edge and slopes disagree, and the slopes decide."""
+OUTLIER = 3.0
+"""A press is left out whose error is so many times the median's ..."""
+LEAST_OUTLIER = 0.12
+"""... and above this root mean square slope."""
+WANDERS = 0.01
+"""Scatter of the images' common brightness from which it is divided out."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressImage:
+    """An image of a pressed ball.
+
+    Attributes
+    ----------
+    name : str
+        Its file.
+    rgb : (height, width, 3) float32
+        Linear light.
+    radius_mm : float
+        Of the ball.
+    placed : Circle or None
+        Contact drawn by hand, camera pixels.
+    """
+
+    name: str
+    rgb: Map
+    radius_mm: float
+    placed: Circle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FoundPress:
+    """A press as the calibration used it.
+
+    Attributes
+    ----------
+    name : str
+        Its file.
+    ball : Ball
+        Place and contact, nodes of the working grid.
+    held_out : HeldOutPress
+        What the calibration without it makes of it.
+    """
+
+    name: str
+    ball: Ball
+    held_out: HeldOutPress
+
+
+@dataclass(frozen=True, slots=True)
+class InPlaceResult:
+    """A calibration in place with its presses.
+
+    Attributes
+    ----------
+    model : InPlaceModel
+        Background and slopes.
+    presses : tuple of FoundPress
+        As used, in the order given.
+    refused : mapping of str to InputError
+        Presses that were left out, with the reason.
+    ridge : Ridge
+        Chosen by presses that were left out.
+    learning : tuple of (int, float)
+        Number of balls, and root mean square slope error of other presses with so many.
+    next_place_mm : tuple of 2 floats
+        Where the next ball would help most: farthest from all presses.
+    """
+
+    model: InPlaceModel
+    presses: tuple[FoundPress, ...]
+    refused: Mapping[str, InputError] = field(default_factory=dict)
+    ridge: Ridge = FIRST_RIDGE
+    learning: tuple[tuple[int, float], ...] = ()
+    next_place_mm: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(slots=True)
+class _Work:
+    """The presses while places and polynomial are refined."""
+
+    names: list[str]
+    seen: list[ColourChange]
+    start: list[Ball]
+    balls: list[Ball]
+    refused: dict[str, InputError]
+
+    def keep(self, kept: Sequence[bool]) -> None:
+        """Drop the other presses."""
+        self.names = list(compress(self.names, kept))
+        self.seen = list(compress(self.seen, kept))
+        self.start = list(compress(self.start, kept))
+        self.balls = list(compress(self.balls, kept))
+
+
+def calibrate_in_place(
+    background: Map,
+    presses: Sequence[PressImage],
+    grid: WorkingGrid,
+    *,
+    scale_sd: float = 0.0,
+    towards: Array | None = None,
+    tell: Callable[[float], None] | None = None,
+) -> InPlaceResult:
+    """Calibrate a closed sensor.
+
+    Parameters
+    ----------
+    background : (height, width, 3) float32
+        Linear light of the untouched membrane.
+    presses : sequence of PressImage
+        Images of pressed balls.
+    grid : WorkingGrid
+        Nodes and scale.
+    scale_sd : float, optional
+        Relative standard deviation of the scale.
+    towards : (terms, 2), optional
+        Coefficients of an earlier calibration that few presses are to correct.
+    tell : callable, optional
+        Told the share done.
+
+    Raises
+    ------
+    InputError
+        If fewer than 3 images show a ball that the others explain, or the background is of
+        another gel, crop or exposure.
+    """
+    say = tell or (lambda _share: None)
+    reduced = grid.reduce(background)
+    base = reference(reduced)
+    images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))
+    refuse_other_view(images, reduced)
+    follow = _wanders(images, base)
+    work = _begin(presses, images, base, grid, follow, say)
+    sums, ridge = _sums(work), FIRST_RIDGE
+    for turn in range(ROUNDS):
+        if turn == 0:
+            ridge = choose_ridge(sums, towards=towards)
+        else:
+            sums = _explained(work, sums, left_out(sums, ridge, towards=towards))
+        say(0.35 + 0.15 * turn)
+        _place(work, left_out(sums, ridge, towards=towards))
+        sums = _sums(work)
+    ridge = choose_ridge(sums, towards=towards)
+    sums = _explained(work, sums, left_out(sums, ridge, towards=towards))
+    say(0.85)
+    without = left_out(sums, ridge, towards=towards)
+    share = amplitude_of(work.seen, work.balls, without)
+    held_out = held_out_presses(work.seen, work.balls, [c / share for c in without])
+    model = InPlaceModel(
+        grid,
+        reduced,
+        solve(sums, ridge, towards=towards) / share,
+        _seen_colours(work),
+        max(_steepest(ball) for ball in work.balls),
+        error_curve(held_out, pitch_mm=grid.pitch_mm),
+        follow,
+        scale_sd,
+    )
+    say(1.0)
+    return InPlaceResult(
+        model,
+        tuple(FoundPress(*item) for item in zip(work.names, work.balls, held_out, strict=True)),
+        work.refused,
+        ridge,
+        learning_curve(sums, ridge),
+        next_place(work.balls, grid, base.known),
+    )
+
+
+def _wanders(images: Sequence[Map], base: Reference) -> bool:
+    """Return whether the images' common brightness scatters."""
+    changes = in_parallel(lambda image: colour_change(image, base, follow_gain=True), images)
+    gains = [seen.gain for seen in changes]
+    return bool(gains) and float(np.std(gains, axis=0).max()) > WANDERS
+
+
+def _begin(
+    presses: Sequence[PressImage],
+    images: Sequence[Map],
+    base: Reference,
+    grid: WorkingGrid,
+    follow: bool,
+    say: Callable[[float], None],
+) -> _Work:
+    """Find the contact in each reduced image."""
+
+    def find(item: tuple[PressImage, Map]) -> tuple[ColourChange, Ball] | InputError:
+        press, image = item
+        radius = press.radius_mm / grid.pitch_mm
+        try:
+            if press.placed is not None:
+                edge = grid.on_nodes(press.placed)
+            else:
+                edge, _ = find_contact(image, base, ball_radius=radius, name=press.name)
+        except InputError as fault:
+            return fault
+        seen = colour_change(image, base, follow_gain=follow)
+        return seen, Ball(edge.x, edge.y, edge.radius, radius).limited()
+
+    work = _Work([], [], [], [], {})
+    contacts = in_parallel(find, list(zip(presses, images, strict=True)))
+    for index, (press, found) in enumerate(zip(presses, contacts, strict=True)):
+        say(0.3 * (index + 1) / len(presses))
+        if isinstance(found, InputError):
+            work.refused[press.name] = found
+            continue
+        work.names.append(press.name)
+        work.seen.append(found[0])
+        work.start.append(found[1])
+        work.balls.append(found[1])
+    _require_presses(work)
+    return work
+
+
+def _require_presses(work: _Work) -> None:
+    if len(work.names) >= LEAST_PRESSES:
+        return
+    total = len(work.names) + len(work.refused)
+    reasons = sorted({fault.found for fault in work.refused.values()})
+    found = tr("{n} of {total} images show a pressed ball, {least} are needed").format(
+        n=len(work.names), total=total, least=LEAST_PRESSES
+    )
+    raise InputError(
+        f"{found} ({'; '.join(reasons[:2])})" if reasons else found,
+        where="balls",
+        advice=tr("Press a ball of known size at different places, and check the background"),
+    )
+
+
+def _sums(work: _Work) -> list[PressSums]:
+    return list(
+        in_parallel(lambda item: press_sums(*item), list(zip(work.seen, work.balls, strict=True)))
+    )
+
+
+def _place(work: _Work, coefficients: Sequence[Array]) -> None:
+    """Move each ball to where the slopes of the others put it, half drawn back to its edge."""
+    trust = TRUST_SLOPES * min(1.0, len(work.balls) / MANY_PRESSES)
+
+    def moved(item: tuple[ColourChange, Ball, Ball, Array]) -> Ball:
+        seen, ball, start, coefficient = item
+        slope_x, slope_y = evaluate(coefficient, seen.change)
+        by_slopes = placed_by_slopes(slope_x, slope_y, ball)
+        away = float(np.hypot(by_slopes.x - start.x, by_slopes.y - start.y))
+        edge = (1.0 - trust) / (1.0 + (away / (DISAGREES * start.contact)) ** 2)
+        x, y = (
+            edge * a + (1.0 - edge) * b for a, b in ((start.x, by_slopes.x), (start.y, by_slopes.y))
+        )
+        placed = replace(ball, x=x, y=y)
+        contact = contact_by_slopes(slope_x, slope_y, placed, smoothing=SMOOTHING_NODES)
+        return replace(placed, contact=0.5 * (start.contact + contact)).limited()
+
+    items = list(zip(work.seen, work.balls, work.start, coefficients, strict=True))
+    work.balls = list(in_parallel(moved, items))
+
+
+def _explained(
+    work: _Work, sums: Sequence[PressSums], coefficients: Sequence[Array]
+) -> list[PressSums]:
+    """Leave out presses whose slopes the others do not explain; return the others' sums."""
+    errors = np.sqrt(
+        [mean_squared_error(press, c) for press, c in zip(sums, coefficients, strict=True)]
+    )
+    limit = max(OUTLIER * float(np.median(errors)), LEAST_OUTLIER)
+    kept = [bool(error <= limit) for error in errors]
+    for name, stays, error in zip(work.names, kept, errors, strict=True):
+        if not stays:
+            work.refused[name] = InputError(
+                tr(
+                    "its shading is not that of a ball of the stated radius, by the other presses "
+                    "(slopes off by {e:.2f}, the others by {m:.2f})"
+                ).format(e=error, m=float(np.median(errors))),
+                where=name,
+                advice=tr("Check the ball's radius and that one clean ball is pressed straight"),
+            )
+    work.keep(kept)
+    _require_presses(work)
+    return list(compress(sums, kept))
+
+
+def _seen_colours(work: _Work) -> Map:
+    """Return which changes of colour the presses and the flat membrane have shown."""
+    cells = np.zeros((COLOUR_CELLS,) * 3, np.float32)
+    for seen, ball in zip(work.seen, work.balls, strict=True):
+        rho = distances((seen.trusted.shape[0], seen.trusted.shape[1]), ball)[2]
+        shown = seen.change[seen.trusted & ((rho < ball.contact) | (rho > 1.4 * ball.contact))]
+        cell = colour_cells(shown)
+        cells[cell[:, 0], cell[:, 1], cell[:, 2]] = 1.0
+    grown = cells.copy()
+    for axis in range(3):
+        for shift in (-1, 1):
+            moved = np.roll(cells, shift, axis)
+            edge: list[slice | int] = [slice(None)] * 3
+            edge[axis] = 0 if shift == 1 else -1
+            moved[tuple(edge)] = 0.0
+            grown = np.maximum(grown, moved)
+    return grown
+
+
+def _steepest(ball: Ball) -> float:
+    reach = INSIDE * ball.contact
+    return float(reach / np.sqrt(ball.radius**2 - reach**2))

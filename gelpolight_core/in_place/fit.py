@@ -1,0 +1,217 @@
+"""Fitting the polynomial to ball presses: sums of each press, ridge, and the choice of the ridge.
+
+Each press is reduced to its normal equations once. Leaving a press out, taking more of them or
+another ridge is then a matter of adding and solving small matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from gelpolight_core.in_place.ball import Ball, ball_slopes, distances
+from gelpolight_core.reconstruction.in_place.change import ColourChange
+from gelpolight_core.reconstruction.in_place.terms import design_rows, penalty, place_axes
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+_Totals = tuple[Array, Array, int]
+
+INSIDE = 0.95
+"""Share of the contact radius in which the membrane is the ball's surface."""
+FLAT_FROM = 1.4
+"""Contact radii from the centre, and `FLAT_MARGIN` nodes, from which the membrane is flat."""
+FLAT_MARGIN = 6.0
+FLAT_NODES = 800
+FLAT_WEIGHT = 0.1
+STEP = 2
+"""Every second node is used: the image is smooth over two."""
+RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+GROWTHS = (1.0, 4.0, 16.0)
+MOST_FOLDS = 8
+LOSS_CAP = 0.3
+"""Mean squared slope error from which a press counts no further."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressSums:
+    """A press in the normal equations of the polynomial.
+
+    Attributes
+    ----------
+    squares : (terms, terms)
+        Of the terms, over nodes inside the contact and where the membrane is flat.
+    products : (terms, 2)
+        Of terms and slopes.
+    inside : (terms, terms)
+        As `squares`, inside the contact only.
+    nodes : int
+        Inside the contact.
+    energy : float
+        Sum of the squared slopes.
+    """
+
+    squares: Array
+    products: Array
+    inside: Array
+    nodes: int
+    energy: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ridge:
+    """How much the polynomial is held back.
+
+    Attributes
+    ----------
+    strength : float
+        Relative to the data.
+    place_growth, colour_growth : float
+        As for :func:`~gelpolight_core.reconstruction.in_place.terms.penalty`.
+    """
+
+    strength: float
+    place_growth: float
+    colour_growth: float
+
+    @property
+    def penalty(self) -> Array:
+        """What it costs each term."""
+        return self.strength * penalty(
+            place_growth=self.place_growth, colour_growth=self.colour_growth
+        )
+
+
+FIRST_RIDGE = Ridge(1e-3, 4.0, 4.0)
+
+
+def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
+    """Return a press's part of the normal equations."""
+    shape = seen.trusted.shape
+    from_x, from_y, rho = distances((shape[0], shape[1]), ball)
+    thin = np.zeros(shape, np.bool_)
+    thin[::STEP, ::STEP] = True
+    inside = thin & seen.trusted & (rho < INSIDE * ball.contact)
+    flat = thin & seen.trusted & (rho > FLAT_FROM * ball.contact + FLAT_MARGIN)
+    some = np.flatnonzero(flat)
+    some = some[:: max(some.size // FLAT_NODES, 1)]
+    terms = _terms(seen.change, np.flatnonzero(inside))
+    around = _terms(seen.change, some)
+    slopes = ball_slopes(
+        from_x[inside].astype(np.float64), from_y[inside].astype(np.float64), ball.radius
+    )
+    own = (terms.T @ terms).astype(np.float64)
+    rest = (around.T @ around).astype(np.float64)
+    # The flat membrane weighs as much as the contact, times FLAT_WEIGHT squared.
+    return PressSums(
+        own + FLAT_WEIGHT**2 * rest,
+        (terms.T @ slopes.astype(np.float32)).astype(np.float64),
+        own,
+        len(terms),
+        float((slopes**2).sum()),
+    )
+
+
+def _terms(change: Map, chosen: NDArray[np.intp]) -> Map:
+    rows, columns = change.shape[:2]
+    x, y = place_axes(rows, columns)
+    row, column = np.divmod(chosen, columns)
+    return design_rows(change[row, column], x[column], y[row])
+
+
+def solve(sums: Iterable[PressSums], ridge: Ridge, *, towards: Array | None = None) -> Array:
+    """Return the coefficients (terms, 2).
+
+    Parameters
+    ----------
+    sums : iterable of PressSums
+        Of the presses to be fitted, at least one.
+    ridge : Ridge
+        How much they are held back.
+    towards : (terms, 2), optional
+        Coefficients that the ridge draws to, as those of another gel; by default 0.
+    """
+    chosen = list(sums)
+    squares = sum((press.squares for press in chosen), np.zeros_like(chosen[0].squares))
+    products = sum((press.products for press in chosen), np.zeros_like(chosen[0].products))
+    return _solved(squares, products, sum(press.nodes for press in chosen), ridge, towards)
+
+
+def _solved(
+    squares: Array, products: Array, nodes: int, ridge: Ridge, towards: Array | None = None
+) -> Array:
+    # Each term in units of its own size, so that the ridge means the same for all.
+    size = np.sqrt(np.diag(squares) / max(nodes, 1)) + 1e-9
+    scaled = squares / size[:, None] / size[None, :]
+    held = max(nodes, 1) * ridge.penalty
+    right = products / size[:, None]
+    if towards is not None:
+        right = right + held[:, None] * (towards * size[:, None])
+    scaled[np.diag_indices_from(scaled)] += held
+    found = scipy.linalg.solve(scaled, right, assume_a="pos", check_finite=False)
+    return np.asarray(found / size[:, None])
+
+
+def mean_squared_error(press: PressSums, coefficients: Array) -> float:
+    """Return the mean squared error of a press's slopes, both components together."""
+    fitted = (coefficients * (press.inside @ coefficients)).sum()
+    total = float(fitted) - 2.0 * float((coefficients * press.products).sum()) + press.energy
+    return max(total, 0.0) / max(press.nodes, 1)
+
+
+def folds(count: int, most: int = MOST_FOLDS) -> list[list[int]]:
+    """Return which presses are left out together, every one once."""
+    number = min(count, most)
+    return [list(range(first, count, number)) for first in range(number)]
+
+
+def left_out(
+    sums: Sequence[PressSums], ridge: Ridge, *, towards: Array | None = None
+) -> list[Array]:
+    """Return for each press the coefficients that were fitted without it."""
+    found: list[Array] = [np.empty(0)] * len(sums)
+    whole = _totals(sums)
+    for fold in folds(len(sums)):
+        out = _totals([sums[i] for i in fold])
+        coefficients = _solved(*_without(whole, out), ridge, towards)
+        for i in fold:
+            found[i] = coefficients
+    return found
+
+
+def _without(whole: _Totals, out: _Totals) -> _Totals:
+    return whole[0] - out[0], whole[1] - out[1], whole[2] - out[2]
+
+
+def _totals(sums: Sequence[PressSums]) -> _Totals:
+    squares = np.sum([press.squares for press in sums], axis=0)
+    products = np.sum([press.products for press in sums], axis=0)
+    return squares, products, sum(press.nodes for press in sums)
+
+
+def choose_ridge(sums: Sequence[PressSums], *, towards: Array | None = None) -> Ridge:
+    """Return the ridge with which presses that were left out are explained best."""
+    whole = _totals(sums)
+    parts = []
+    for fold in folds(len(sums)):
+        out = _totals([sums[i] for i in fold])
+        parts.append((fold, _without(whole, out)))
+    best, least = FIRST_RIDGE, np.inf
+    for growths in product(GROWTHS, GROWTHS):
+        for strength in RIDGES:
+            ridge = Ridge(strength, *growths)
+            loss = 0.0
+            for fold, (squares, products, nodes) in parts:
+                coefficients = _solved(squares, products, nodes, ridge, towards)
+                loss += sum(min(mean_squared_error(sums[i], coefficients), LOSS_CAP) for i in fold)
+                if loss > least:
+                    break
+            if loss < least:
+                best, least = ridge, loss
+    return best

@@ -1,0 +1,276 @@
+"""Calibration folders of the open libraries: which images, balls and circles they hold.
+
+Three forms are known: ``catalog.csv`` with a folder for each press (gs_sdk), ``annotations/`` with
+``probe_images/`` (py3DCal), and ``annotate.csv`` beside the images (digit-depth).
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+import numpy as np
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import brief, parse_json, read_file
+from gelpolight_core.session.decisions import PlacedCircle
+from gelpolight_core.translation import tr
+
+MOST_FRAMES = 80
+"""Of folders with thousands of images of a robot's raster, so many are used, evenly spread."""
+LABEL_LIMIT = 64_000
+TABLE_LIMIT = 20_000_000
+RADIUS_RANGE = (0.05, 500.0)
+FORMS = "catalog.csv, annotations/annotations.csv, annotate.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignPress:
+    """An image of a pressed ball.
+
+    Attributes
+    ----------
+    image : Path
+        Its file.
+    radius_mm : float or None
+        Of the ball; None where the folder does not state it.
+    circle : PlacedCircle or None
+        The contact as a person has labelled it.
+    """
+
+    image: Path
+    radius_mm: float | None
+    circle: PlacedCircle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignFolder:
+    """What a calibration folder of another library holds.
+
+    Attributes
+    ----------
+    form : str
+        The table by which it was recognised.
+    presses : tuple of ForeignPress
+        In the order of the table.
+    background : Path or None
+        The untouched membrane, where the folder has it.
+    mm_per_px : float or None
+        The scale, where the folder states it.
+    """
+
+    form: str
+    presses: tuple[ForeignPress, ...]
+    background: Path | None
+    mm_per_px: float | None = None
+
+
+def read_foreign(folder: Path) -> ForeignFolder:
+    """Read a calibration folder of another library.
+
+    Parameters
+    ----------
+    folder : Path
+        With ``catalog.csv``, ``annotations/annotations.csv`` or ``annotate.csv``.
+
+    Raises
+    ------
+    InputError
+        If it has none of these, or a line, an image or a label cannot be used.
+    """
+    for table, read in (
+        (folder / "catalog.csv", _catalog),
+        (folder / "annotations" / "annotations.csv", _annotations),
+        (folder / "annotate.csv", _annotate),
+    ):
+        if table.is_file():
+            found = read(folder, table)
+            break
+    else:
+        raise InputError(
+            tr("The folder has none of the known tables"),
+            where=str(folder),
+            advice=tr("Choose a calibration folder with one of: {forms}").format(forms=FORMS),
+        )
+    if not found.presses:
+        raise InputError(
+            tr("The table lists no image"), where=str(table), advice=tr("Choose another folder")
+        )
+    return found
+
+
+def _catalog(folder: Path, table: Path) -> ForeignFolder:
+    """Read gs_sdk's form: a folder of each press, with ``gelsight.png`` and ``label.npz``."""
+    presses = []
+    for number, row in _rows(table, ("experiment_reldir", "diameter(mm)")):
+        where = f"{table}, {tr('line {n}').format(n=number)}"
+        press = _inside(folder, row["experiment_reldir"], where)
+        radius = 0.5 * _number(row["diameter(mm)"], where, *(2.0 * r for r in RADIUS_RANGE))
+        label = press / "label.npz"
+        circle = _label(label) if label.is_file() else None
+        presses.append(ForeignPress(_image(press / "gelsight.png", where), radius, circle))
+    return ForeignFolder(table.name, tuple(presses), _if_there(folder / "background.png"))
+
+
+def _annotations(folder: Path, table: Path) -> ForeignFolder:
+    """Read py3DCal's form: a robot's raster of one ball, many frames at each place.
+
+    Its circles have the radius of the ball, not of the contact, and are not used.
+    """
+    about = folder / "annotations" / "metadata.json"
+    try:
+        stated = parse_json(read_file(about))
+        radius = _number(stated["probe_radius_mm"], str(about), *RADIUS_RANGE)
+        scale = 1.0 / _number(stated["px_per_mm"], str(about), 0.1, 1e4)
+    except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            tr("The file does not state px_per_mm and probe_radius_mm"),
+            where=str(about),
+            advice=tr("Annotate the folder with its own library first"),
+        ) from error
+    places: dict[tuple[str, str], Path] = {}
+    for number, row in _rows(table, ("img_name", "x_mm", "y_mm")):
+        where = f"{table}, {tr('line {n}').format(n=number)}"
+        image = _inside(folder / "probe_images", row["img_name"], where)
+        places.setdefault((row["x_mm"], row["y_mm"]), _image(image, where))
+    images = list(places.values())
+    chosen = np.linspace(0, len(images) - 1, min(MOST_FRAMES, len(images))).round().astype(int)
+    return ForeignFolder(
+        table.name,
+        tuple(ForeignPress(images[i], radius) for i in chosen),
+        _if_there(folder / "blank_images" / "blank.png"),
+        scale,
+    )
+
+
+def _annotate(folder: Path, table: Path) -> ForeignFolder:
+    """Read digit-depth's form: lines of image, x, y and radius of the contact in pixels."""
+    presses = []
+    for number, row in enumerate(csv.reader(io.StringIO(_text(table))), start=1):
+        where = f"{table}, {tr('line {n}').format(n=number)}"
+        if not row or (number == 1 and len(row) == 4 and not _is_number(row[1])):
+            continue
+        if len(row) != 4:
+            raise InputError(
+                tr("The line has {n} values").format(n=len(row)),
+                where=where,
+                advice=tr("Each line needs the image and x, y and radius of the circle in pixels"),
+            )
+        # The table holds the paths of the computer on which it was made.
+        name = PureWindowsPath(PurePosixPath(row[0]).name).name
+        places = (folder / name, folder / "images" / name)
+        image = next((path for path in places if path.is_file()), places[0])
+        circle = PlacedCircle(*(_number(value, where, 0.0, 1e5) for value in row[1:]))
+        presses.append(ForeignPress(_image(image, where), None, circle))
+    return ForeignFolder(table.name, tuple(presses), _if_there(folder / "background.png"))
+
+
+def _rows(table: Path, columns: tuple[str, ...]) -> list[tuple[int, Mapping[str, str]]]:
+    """Return the lines of a table with their numbers; `columns` must be there."""
+    reader = csv.DictReader(io.StringIO(_text(table)), skipinitialspace=True)
+    missing = [name for name in columns if name not in (reader.fieldnames or ())]
+    if missing:
+        raise InputError(
+            tr("The table has no column {name}").format(name=missing[0]),
+            where=str(table),
+            advice=tr("A calibration with balls needs the columns {names}").format(
+                names=", ".join(columns)
+            ),
+        )
+    rows: list[tuple[int, Mapping[str, str]]] = []
+    for row in reader:
+        if any(row[name] is None for name in columns):
+            raise InputError(
+                tr("The line has too few values"),
+                where=f"{table}, {tr('line {n}').format(n=reader.line_num)}",
+                advice=tr("Correct or remove this line"),
+            )
+        rows.append((reader.line_num, row))
+    return rows
+
+
+def _text(table: Path) -> str:
+    try:
+        return read_file(table, TABLE_LIMIT).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            tr("The file is not text in UTF-8"),
+            where=str(table),
+            advice=tr("Save the table as CSV in UTF-8"),
+        ) from error
+
+
+def _label(path: Path) -> PlacedCircle:
+    """Return the circle of a label file: arrays ``center`` and ``radius``, pixels."""
+    try:
+        with np.load(io.BytesIO(read_file(path, LABEL_LIMIT)), allow_pickle=False) as label:
+            x, y = np.asarray(label["center"], np.float64).ravel()
+            radius = float(np.asarray(label["radius"], np.float64).reshape(()))
+    except (ValueError, KeyError, TypeError, OSError, zipfile.BadZipFile) as error:
+        raise InputError(
+            tr("The label does not hold a circle (center, radius)"),
+            where=str(path),
+            advice=tr("Label the image again, or remove this file"),
+        ) from error
+    if not all(map(math.isfinite, (x, y, radius))) or radius <= 0.0:
+        raise InputError(
+            tr("The label's circle is not possible"),
+            where=str(path),
+            advice=tr("Label the image again, or remove this file"),
+        )
+    return PlacedCircle(float(x), float(y), radius)
+
+
+def _inside(folder: Path, name: str, where: str) -> Path:
+    """Return a file or folder that a table names, which must be inside its folder."""
+    path = folder / PureWindowsPath(name).as_posix()
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise InputError(
+            tr("The line names a place outside the folder: {name}").format(name=brief(name)),
+            where=where,
+            advice=tr("Put the images into the folder and correct the table"),
+        )
+    return path
+
+
+def _image(path: Path, where: str) -> Path:
+    if not path.is_file():
+        raise InputError(
+            tr("The image {path} does not exist").format(path=path),
+            where=where,
+            advice=tr("Copy the whole calibration folder, or remove this line"),
+        )
+    return path
+
+
+def _if_there(path: Path) -> Path | None:
+    return path if path.is_file() else None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(value: object, where: str, low: float, high: float) -> float:
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = math.nan
+    if not low <= number <= high:
+        raise InputError(
+            tr("{value} is not a number from {low:g} to {high:g}").format(
+                value=brief(value, 40), low=low, high=high
+            ),
+            where=where,
+            advice=tr("Correct this value"),
+        )
+    return number

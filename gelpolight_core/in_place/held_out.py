@@ -1,0 +1,179 @@
+"""What presses that were left out show of a calibration in place: errors of slope and height."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.in_place.ball import Ball, ball_slopes, distances
+from gelpolight_core.parallel import in_parallel
+from gelpolight_core.reconstruction.in_place.change import ColourChange
+from gelpolight_core.reconstruction.in_place.depth import depth_of, surface_slopes
+from gelpolight_core.reconstruction.in_place.model import ErrorCurve, evaluate
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+
+INSIDE = 0.9
+"""Share of the contact radius in which normals and shape are compared."""
+TOP, RING = 0.15, (0.82, 0.92)
+"""Shares of the contact radius between which the height of the cap is taken."""
+FAR = 2.2
+"""Contact radii from the centre from which the membrane is taken as untouched."""
+CURVE_NODES = 6
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutPress:
+    """A press beside what the calibration without it makes of it.
+
+    Attributes
+    ----------
+    normal_deg : float
+        Mean angle between the normals and the ball's.
+    cap_ratio : float
+        Height of the cap over the ball's.
+    diameter_ratio : float
+        Diameter of the sphere through the depth over the ball's.
+    slope : (N,)
+        Size of the ball's slope at nodes inside the contact.
+    error : (N,)
+        Root mean square error of the slope's components there.
+    floor : float
+        Root mean square of the depth far from the contact, nodes.
+    """
+
+    normal_deg: float
+    cap_ratio: float
+    diameter_ratio: float
+    slope: Array
+    error: Array
+    floor: float
+
+
+def held_out_press(seen: ColourChange, ball: Ball, coefficients: Array) -> HeldOutPress:
+    """Compare what coefficients give for a press with its ball.
+
+    Parameters
+    ----------
+    seen : ColourChange
+        The press.
+    ball : Ball
+        Where it is, nodes.
+    coefficients : (terms, 2)
+        Fitted without it.
+    """
+    slope_x, slope_y = evaluate(coefficients, seen.change)
+    from_x, from_y, rho = distances(slope_x.shape, ball)
+    inside = (rho < INSIDE * ball.contact) & seen.trusted
+    dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
+    wanted = ball_slopes(dx, dy, ball.radius)
+    weight = seen.trusted.astype(np.float32)
+    depth = depth_of(slope_x, slope_y, pitch_mm=1.0, weight=weight)[0]
+    found_x, found_y = surface_slopes(depth, 1.0)
+    found = np.stack([found_x[inside], found_y[inside]], axis=-1).astype(np.float64)
+    own = np.sqrt(ball.radius**2 - np.minimum(rho, 0.99 * ball.radius) ** 2)
+    top = (rho < TOP * ball.contact) & seen.trusted
+    ring = (rho > RING[0] * ball.contact) & (rho < RING[1] * ball.contact) & seen.trusted
+    far = depth[(rho > FAR * ball.contact) & seen.trusted]
+    cap = diameter = np.nan
+    if top.any() and ring.any():
+        height = float(own[top].mean() - own[ring].mean())
+        cap = float(np.mean(depth[top]) - np.mean(depth[ring])) / height
+        diameter = _sphere_radius(dx, dy, depth[inside].astype(np.float64)) / ball.radius
+    return HeldOutPress(
+        float(np.degrees(_angles(found, wanted)).mean()),
+        cap,
+        diameter,
+        np.hypot(wanted[:, 0], wanted[:, 1]),
+        np.sqrt(0.5 * ((found - wanted) ** 2).sum(axis=1)),
+        float(np.sqrt(np.mean(far**2))) if far.size else np.nan,
+    )
+
+
+def _angles(a: Array, b: Array) -> Array:
+    """Return the angles (N,) between the normals of slopes (N, 2), radians."""
+    first = np.column_stack([a, np.ones(len(a))])
+    second = np.column_stack([b, np.ones(len(b))])
+    across = np.linalg.norm(np.cross(first, second), axis=1)
+    return np.asarray(np.arctan2(across, (first * second).sum(axis=1)))
+
+
+def _sphere_radius(x: Array, y: Array, z: Array) -> float:
+    """Return the radius of the sphere through points, least squares of x^2 + y^2 + z^2."""
+    design = np.column_stack([2.0 * x, 2.0 * y, 2.0 * z, np.ones(len(x))])
+    found = np.linalg.lstsq(design, x**2 + y**2 + z**2, rcond=None)[0]
+    return float(np.sqrt(max(found[3] + (found[:3] ** 2).sum(), 0.0)))
+
+
+def held_out_presses(
+    seen: Sequence[ColourChange], balls: Sequence[Ball], coefficients: Sequence[Array]
+) -> tuple[HeldOutPress, ...]:
+    """Return :func:`held_out_press` of each press, in order."""
+    return tuple(
+        in_parallel(lambda item: held_out_press(*item), zip(seen, balls, coefficients, strict=True))
+    )
+
+
+def amplitude_of(
+    seen: Sequence[ColourChange], balls: Sequence[Ball], coefficients: Sequence[Array]
+) -> float:
+    """Return the share of the slopes that is found of presses that were left out, median.
+
+    Regression on noisy colours finds less than all.
+
+    Parameters
+    ----------
+    seen, balls
+        The presses.
+    coefficients : sequence of (terms, 2)
+        Fitted without each.
+    """
+
+    def share(item: tuple[ColourChange, Ball, Array]) -> float:
+        change, ball, fitted = item
+        found_x, found_y = evaluate(fitted, change.change)
+        from_x, from_y, rho = distances(found_x.shape, ball)
+        inside = (rho < INSIDE * ball.contact) & change.trusted
+        dx, dy = (np.asarray(a[inside], np.float64) for a in (from_x, from_y))
+        wanted = ball_slopes(dx, dy, ball.radius)
+        total = (found_x[inside] * wanted[:, 0] + found_y[inside] * wanted[:, 1]).sum()
+        return float(total / max((wanted**2).sum(), 1e-12))
+
+    return float(
+        np.median(list(in_parallel(share, list(zip(seen, balls, coefficients, strict=True)))))
+    )
+
+
+def error_curve(presses: Sequence[HeldOutPress], *, pitch_mm: float) -> ErrorCurve:
+    """Return how far slopes and depths of such presses are off.
+
+    Parameters
+    ----------
+    presses : sequence of HeldOutPress
+        Each left out in its turn.
+    pitch_mm : float
+        Length of a node.
+    """
+    slope = np.concatenate([press.slope for press in presses])
+    error = np.concatenate([press.error for press in presses])
+    edges = np.quantile(slope, np.linspace(0.0, 1.0, CURVE_NODES + 1))
+    middle, spread = [], []
+    for low, high in pairwise(edges):
+        part = (slope >= low) & (slope <= high)
+        middle.append(float(slope[part].mean()))
+        spread.append(float(np.sqrt(np.mean(error[part] ** 2))))
+    caps = np.array([press.cap_ratio for press in presses])
+    caps = caps[np.isfinite(caps)]
+    floors = np.array([press.floor for press in presses])
+    floors = floors[np.isfinite(floors)]
+    return ErrorCurve(
+        np.array(middle),
+        np.array(spread),
+        float(np.sqrt(np.mean((caps - 1.0) ** 2))) if caps.size else 1.0,
+        float(np.median(floors)) * pitch_mm if floors.size else 0.0,
+    )

@@ -1,0 +1,153 @@
+"""Turn a calibration folder of another library into the session of a closed sensor."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.image.file import FILE_LIMIT
+from gelpolight_core.in_place.foreign import ForeignFolder, ForeignPress
+from gelpolight_core.in_place.preset import Preset
+from gelpolight_core.io.atomic import make_folder, write_atomically
+from gelpolight_core.io.reading import read_file
+from gelpolight_core.session.closed import STAGES, ClosedSession
+from gelpolight_core.session.decisions import Decisions, write_decisions
+from gelpolight_core.session.description import create_session
+from gelpolight_core.session.images import SUFFIXES, read_raw_image
+from gelpolight_core.translation import tr
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """What a person states about a folder, each with precedence over the folder.
+
+    Attributes
+    ----------
+    serial : str
+        Of the sensor.
+    mm_per_px : float or None
+        The scale.
+    ball_radius_mm : float or None
+        Of all balls.
+    background : Path or None
+        Image of the untouched membrane.
+    preset : Preset or None
+        For the scale, where nobody states it.
+    """
+
+    serial: str
+    mm_per_px: float | None = None
+    ball_radius_mm: float | None = None
+    background: Path | None = None
+    preset: Preset | None = None
+
+
+def import_session(found: ForeignFolder, stated: Stated, out: Path) -> ClosedSession:
+    """Write the session folder of a closed sensor.
+
+    Labelled circles become circles drawn by hand (``decisions.toml``).
+
+    Parameters
+    ----------
+    found : ForeignFolder
+        Presses and what the folder states.
+    stated : Stated
+        What a person states.
+    out : Path
+        Folder to create; it must not exist, or be empty.
+
+    Raises
+    ------
+    InputError
+        If background, ball radius or scale is not known, or an image cannot be read or written.
+    """
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(
+            tr("The folder already contains files"),
+            where=str(out),
+            advice=tr("Choose a new folder"),
+        )
+    background = stated.background or found.background
+    if background is None:
+        raise InputError(
+            tr("The folder has no image of the untouched membrane"),
+            where=found.form,
+            advice=tr("Name it with --background"),
+        )
+    names = [f"ball_{index:03d}" for index in range(len(found.presses))]
+    pairs = list(zip(names, found.presses, strict=True))
+    files = {name: name + press.image.suffix.lower() for name, press in pairs}
+    scale, scale_sd = _scale(found, stated, background)
+    session = ClosedSession(
+        out,
+        stated.serial,
+        scale,
+        scale_sd,
+        ball_radii_mm={files[name]: _radius(press, stated) for name, press in pairs},
+        decisions=Decisions(
+            balls={files[name]: press.circle for name, press in pairs if press.circle is not None}
+        ),
+    )
+    made = not out.exists()
+    try:
+        create_session(session)
+        for stage in STAGES:
+            make_folder(out / stage)
+        _copy(background, out / "background" / f"background{background.suffix.lower()}")
+        for name, press in pairs:
+            _copy(press.image, out / "balls" / files[name])
+        write_decisions(session.decisions, out)
+    except BaseException:
+        # An incomplete session is useless, and would block the next attempt.
+        shutil.rmtree(out, ignore_errors=True)
+        if not made:
+            out.mkdir(exist_ok=True)
+        raise
+    return session
+
+
+def _radius(press: ForeignPress, stated: Stated) -> float:
+    radius = stated.ball_radius_mm or press.radius_mm
+    if radius is None:
+        raise InputError(
+            tr("The folder does not state the size of the ball"),
+            where=str(press.image.parent),
+            advice=tr("State it with --ball-diameter, in mm"),
+        )
+    return radius
+
+
+def _scale(found: ForeignFolder, stated: Stated, background: Path) -> tuple[float, float | None]:
+    """Return the scale and its standard deviation, where that is known."""
+    if stated.mm_per_px is not None:
+        return stated.mm_per_px, None
+    if found.mm_per_px is not None:
+        return found.mm_per_px, None
+    if stated.preset is not None:
+        rows, columns = _pixels(background)
+        return stated.preset.scale_for(columns, rows)
+    raise InputError(
+        tr("The folder does not state the scale"),
+        where=found.form,
+        advice=tr("Name a preset with --preset, or state --mm-per-px"),
+    )
+
+
+def _pixels(path: Path) -> tuple[int, int]:
+    image = read_raw_image(path)[0]
+    return int(image.shape[0]), int(image.shape[1])
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Copy an image that a session can hold."""
+    if source.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            tr("The image is neither PNG nor TIFF"),
+            where=str(source),
+            advice=tr("Capture PNG images: other formats change the colours"),
+        )
+    read_raw_image(source)
+    data = read_file(source, FILE_LIMIT)
+    write_atomically(target, lambda stream: stream.write(data))

@@ -1,0 +1,197 @@
+"""Presets of closed sensors: what their makers state, as a start for a calibration in place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.reading import brief, parse_toml, read_file
+from gelpolight_core.session.closed import SCALE_RANGE
+from gelpolight_core.session.table import Table
+from gelpolight_core.translation import tr
+
+FOLDER = Path(__file__).with_name("presets")
+FORMAT, VERSION = "gelpolight-preset", 1
+MOST_PX = 20_000
+SAME_SHAPE = 0.02
+"""Difference of the ratio of the sides up to which an image has a preset's shape."""
+COLOURED = 3
+"""Colours of light from which slopes can be read in all directions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A kind of closed sensor.
+
+    Attributes
+    ----------
+    key : str
+        Name of its file, such as ``gelsight-mini``.
+    name : str
+        As people call it.
+    light_colours : int
+        Colours of its lights; slopes need three.
+    camera_px : (int, int)
+        Width and height of the camera's own format.
+    cropped : (float, float, float, float)
+        Share of the camera's image that is cut off: left, top, right, bottom.
+    image_px : (int, int)
+        Usual width and height of the images after that.
+    mm_per_px, mm_per_px_sd : float
+        Nominal scale of such images, and how much sensors of this kind differ.
+    working_area_mm : (float, float)
+        Width and height of the membrane that is seen.
+    marker_pitches_mm : tuple of float
+        Distances of printed markers of its gels; 0 is a plain gel.
+    """
+
+    key: str
+    name: str
+    light_colours: int
+    camera_px: tuple[int, int]
+    cropped: tuple[float, float, float, float]
+    image_px: tuple[int, int]
+    mm_per_px: float
+    mm_per_px_sd: float
+    working_area_mm: tuple[float, float]
+    marker_pitches_mm: tuple[float, ...]
+
+    @property
+    def limits(self) -> str:
+        """What the program cannot do with this kind of sensor; empty where there is nothing."""
+        if self.light_colours >= COLOURED:
+            return ""
+        return tr(
+            "The lights of this sensor have one colour, which does not show the direction of a "
+            "slope: expect a calibration that fails"
+        )
+
+    def scale_for(self, width_px: int, height_px: int) -> tuple[float, float]:
+        """Return scale and its standard deviation (mm per pixel) for images of another size.
+
+        Parameters
+        ----------
+        width_px, height_px : int
+            Of the images as they are calibrated, cropped as stated.
+
+        Raises
+        ------
+        InputError
+            If they have another shape, so that they are cropped otherwise.
+        """
+        width, height = self.image_px
+        if abs(width_px * height / (height_px * width) - 1.0) > SAME_SHAPE:
+            raise InputError(
+                tr("The images have {a} pixels; the preset {name} is for the shape {b}").format(
+                    a=f"{width_px}x{height_px}", name=self.name, b=f"{width}x{height}"
+                ),
+                where="mm_per_px",
+                advice=tr("Crop and turn the images as the preset states, or state the scale"),
+            )
+        share = width / width_px
+        return self.mm_per_px * share, self.mm_per_px_sd * share
+
+
+def presets() -> tuple[Preset, ...]:
+    """Return the presets that come with the program, by name."""
+    found = (read_preset(path) for path in FOLDER.glob("*.toml"))
+    return tuple(sorted(found, key=lambda preset: preset.name))
+
+
+def preset_named(key: str) -> Preset:
+    """Return one of the presets that come with the program, or one of a file.
+
+    Parameters
+    ----------
+    key : str
+        Such as ``gelsight-mini``, or the path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    known = {preset.key: preset for preset in presets()}
+    if key.casefold() in known:
+        return known[key.casefold()]
+    if key.endswith(".toml"):
+        return read_preset(Path(key))
+    raise InputError(
+        tr('There is no preset "{key}"').format(key=brief(key)),
+        where="preset",
+        advice=tr("Choose one of {names}, or a TOML file").format(names=", ".join(sorted(known))),
+    )
+
+
+def read_preset(path: Path) -> Preset:
+    """Read a preset.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not TOML, or has a key that is unknown, missing, of the wrong
+        kind or out of range.
+    """
+    try:
+        content = parse_toml(read_file(path))
+    except FileNotFoundError as error:
+        raise InputError(
+            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
+        ) from error
+    except ValueError as error:
+        raise InputError(
+            tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
+            where=str(path),
+            advice=tr("Correct this line"),
+        ) from error
+    return _parse(content, path)
+
+
+def _parse(content: dict[str, Any], path: Path) -> Preset:
+    top = Table(content, "", path)
+    if top.text("format") != FORMAT:
+        raise top.wrong("format", tr('is not "{name}"').format(name=FORMAT))
+    if top.whole("version") != VERSION:
+        raise top.wrong("version", tr("is unknown"))
+    camera, image, area, markers = (
+        top.table(name) for name in ("camera", "image", "working_area", "markers")
+    )
+    top.no_more(
+        "format", "version", "name", "light_colours", "camera", "image", "working_area", "markers"
+    )
+    camera.no_more("width_px", "height_px", "cropped")
+    image.no_more("width_px", "height_px", "mm_per_px", "mm_per_px_sd")
+    area.no_more("width_mm", "height_mm")
+    markers.no_more("pitch_mm")
+    left, above, right, below = _numbers(camera, "cropped", 0.0, 0.45, count=4)
+    return Preset(
+        path.stem,
+        top.text("name"),
+        int(top.number("light_colours", 1, 100)),
+        _size(camera),
+        (left, above, right, below),
+        _size(image),
+        image.number("mm_per_px", *SCALE_RANGE),
+        image.number("mm_per_px_sd", 0.0, SCALE_RANGE[1]),
+        (area.number("width_mm", 0.1, 1000.0), area.number("height_mm", 0.1, 1000.0)),
+        _numbers(markers, "pitch_mm", 0.0, 100.0),
+    )
+
+
+def _size(table: Table) -> tuple[int, int]:
+    return int(table.number("width_px", 32, MOST_PX)), int(table.number("height_px", 32, MOST_PX))
+
+
+def _numbers(
+    table: Table, key: str, low: float, high: float, count: int | None = None
+) -> tuple[float, ...]:
+    """Return a list of numbers within a range."""
+    values = table.content.get(key)
+    if not isinstance(values, list) or not values or (count is not None and len(values) != count):
+        what = tr("is not a list of {n} numbers").format(n=count) if count else tr("is not a list")
+        raise table.wrong(key, what)
+    return tuple(
+        Table({key: value}, table.name, table.path).number(key, low, high) for value in values
+    )

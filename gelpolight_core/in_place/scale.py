@@ -1,0 +1,185 @@
+"""The scale of a closed sensor, measured on a pressed pin grid or flat punch of known size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.in_place.press import find_contact
+from gelpolight_core.reconstruction.in_place.change import reference
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+
+LEAST_PINS = 9
+BLURS_PX = (2.0, 3.0, 4.5, 7.0)
+"""Smoothing of the images before pins are looked for: about half a pin's radius."""
+LEAST_PEAK = 0.25
+"""Share of the strongest pin that a pin has at least."""
+OFF_LATTICE = 0.2
+"""Share of the spacing within which a pin belongs to the grid."""
+LEAST_ON_LATTICE = 0.7
+EDGE_SD_PX = 1.0
+"""How well a single punch's diameter is known."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredScale:
+    """Size of a camera pixel on the membrane.
+
+    Attributes
+    ----------
+    mm_per_px : float
+        Mean over the images.
+    sd_mm_per_px : float
+        Standard deviation of that mean.
+    pins : int
+        That were used; 0 for a punch.
+    """
+
+    mm_per_px: float
+    sd_mm_per_px: float
+    pins: int = 0
+
+
+def scale_from_pins(
+    images: Sequence[Map], background: Map, *, spacing_mm: float, where: str = "scale"
+) -> MeasuredScale:
+    """Return the scale from images of a pressed square grid of pins.
+
+    Parameters
+    ----------
+    images : sequence of (height, width, 3) float32
+        Linear light.
+    background : (height, width, 3) float32
+        The untouched membrane.
+    spacing_mm : float
+        Between neighbouring pins.
+    where : str, optional
+        What a message names.
+
+    Raises
+    ------
+    InputError
+        If an image shows no regular grid of at least 9 pins.
+    """
+    spacings, count, spreads = [], 0, []
+    for image in images:
+        fits = [_lattice(_pins(image, background, blur)) for blur in BLURS_PX]
+        found = max(fits, key=lambda fit: fit[2])
+        if found[2] < LEAST_PINS:
+            raise InputError(
+                tr("no regular grid of pins is seen ({n} pins of one)").format(n=found[2]),
+                where=where,
+                advice=tr("Press the pin grid evenly, 3 x 3 pins or more, or state mm_per_px"),
+            )
+        spacings.append(found[0])
+        spreads.append(found[1])
+        count += found[2]
+    spacing = float(np.mean(spacings))
+    between = float(np.std(spacings)) / np.sqrt(len(spacings))
+    sd = float(np.hypot(between, np.mean(spreads) / np.sqrt(len(spreads)))) / spacing
+    return MeasuredScale(spacing_mm / spacing, sd * spacing_mm / spacing, count)
+
+
+def scale_from_punch(
+    images: Sequence[Map], background: Map, *, diameter_mm: float, where: str = "scale"
+) -> MeasuredScale:
+    """Return the scale from images of a pressed flat round punch.
+
+    Parameters
+    ----------
+    images, background, where
+        As for :func:`scale_from_pins`.
+    diameter_mm : float
+        Of the punch.
+
+    Raises
+    ------
+    InputError
+        If an image shows no contact.
+    """
+    base = reference(background)
+    widths = np.array(
+        [
+            2.0 * find_contact(image, base, ball_radius=None, name=where)[0].radius
+            for image in images
+        ]
+    )
+    width = float(widths.mean())
+    sd_px = max(float(widths.std()), 2.0 * EDGE_SD_PX) / np.sqrt(len(widths))
+    return MeasuredScale(diameter_mm / width, diameter_mm / width * sd_px / width)
+
+
+def _pins(image: Map, background: Map, blur: float) -> Array:
+    """Return the centres (N, 2) of spots where the membrane has changed most, pixels."""
+    change = np.abs(image - background).sum(axis=2)
+    smooth = cv2.GaussianBlur(change, (0, 0), blur) - cv2.GaussianBlur(change, (0, 0), 3.0 * blur)
+    reach = 2 * round(2.0 * blur) + 1
+    peak = (smooth == cv2.dilate(smooth, np.ones((reach, reach), np.uint8))) & (smooth > 0.0)
+    rows, columns = np.nonzero(peak)
+    inner = (rows > 1) & (columns > 1) & (rows < len(smooth) - 2) & (columns < smooth.shape[1] - 2)
+    rows, columns = rows[inner], columns[inner]
+    if not rows.size:
+        return np.empty((0, 2))
+    height = smooth[rows, columns]
+    strong = height > LEAST_PEAK * float(np.quantile(height, 0.9))
+    rows, columns = rows[strong], columns[strong]
+    return np.stack(
+        [
+            columns + _offset(smooth[rows, columns - 1], smooth[rows, columns],
+                              smooth[rows, columns + 1]),
+            rows + _offset(smooth[rows - 1, columns], smooth[rows, columns],
+                           smooth[rows + 1, columns]),
+        ],
+        axis=1,
+    )  # fmt: skip
+
+
+def _offset(before: Map, at: Map, after: Map) -> Array:
+    bend = np.minimum(before - 2.0 * at + after, -1e-12)
+    return np.clip(0.5 * (before - after) / bend, -0.5, 0.5).astype(np.float64)
+
+
+def _lattice(pins: Array) -> tuple[float, float, int]:
+    """Return spacing, its standard deviation (pixels) and the pins of the best square grid."""
+    none = (1.0, 1.0, 0)
+    if len(pins) < LEAST_PINS:
+        return none
+    gaps = np.linalg.norm(pins[:, None] - pins[None], axis=2)
+    np.fill_diagonal(gaps, np.inf)
+    nearest = gaps.argmin(axis=1)
+    middle = pins[int(gaps.min(axis=1).argmin())]
+    start = int(np.linalg.norm(pins - np.median(pins, axis=0), axis=1).argmin())
+    middle, first = pins[start], pins[nearest[start]] - pins[start]
+    axes = np.stack([first, [-first[1], first[0]]])
+    on = np.zeros(len(pins), np.bool_)
+    for reach in (1.6, 3.2, 6.4, 100.0):
+        index = (pins - middle) @ np.linalg.inv(axes)
+        whole = np.rint(index)
+        near = np.abs(whole).max(axis=1) < reach
+        on = near & (np.abs(index - whole).max(axis=1) < OFF_LATTICE)
+        if np.count_nonzero(on) < 4 or np.linalg.matrix_rank(whole[on]) < 2:
+            return none
+        # One spacing and direction for both axes, and an origin: a similarity.
+        a, b = whole[on].T
+        one, zero = np.ones_like(a), np.zeros_like(a)
+        design = np.concatenate(
+            [np.stack([a, -b, one, zero], axis=1), np.stack([b, a, zero, one], axis=1)]
+        )
+        target = np.concatenate([pins[on, 0], pins[on, 1]])
+        (c, s, x, y), *_ = np.linalg.lstsq(design, target, rcond=None)
+        axes, middle = np.array([[c, s], [-s, c]]), np.array([x, y])
+    found = int(np.count_nonzero(on))
+    if found < LEAST_ON_LATTICE * len(pins):
+        return none
+    spacing = float(np.hypot(*axes[0]))
+    left = design @ np.array([c, s, x, y]) - target
+    covariance = np.linalg.inv(design.T @ design) * float(left @ left) / max(len(target) - 4, 1)
+    return spacing, float(np.sqrt(covariance[0, 0])), found

@@ -1,0 +1,1 @@
+"""Files of any content: atomic writes, locks, arrays, growing files, checked reading."""

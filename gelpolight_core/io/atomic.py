@@ -1,0 +1,208 @@
+"""Write files completely or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+
+class NameTakenError(InputError):
+    """A new file cannot be written because a file with its name exists."""
+
+
+def write_atomically(
+    path: Path,
+    writer: Callable[[BinaryIO], object],
+    *,
+    new: bool = False,
+    inside: Path | None = None,
+) -> None:
+    """Write a file so that other programs see either the complete old file or the complete new one.
+
+    The bytes are written to a temporary file in the same folder, flushed to disk, and then replace
+    the old file in one step. If anything fails, including Ctrl-C, the old file stays unchanged and
+    the temporary one is removed. A symbolic link is followed; the permissions of an existing file
+    are kept.
+
+    Parameters
+    ----------
+    path : Path
+        Destination; its folder must exist.
+    writer : callable
+        Receives the open binary file (which can seek) and writes into it.
+    new : bool, optional
+        Whether an existing file is never replaced, not even one written by another program at the
+        same moment.
+    inside : Path, optional
+        A folder that may come from elsewhere: links in it that point outside are not followed.
+
+    Raises
+    ------
+    NameTakenError
+        If `new` is set and the file exists.
+    InputError
+        If the file cannot be written: folder missing, no permission, disk full.
+    """
+    target = _ordinary_target(path)
+    if inside is not None and not target.is_relative_to(os.path.realpath(inside)):
+        raise InputError(
+            tr("The path is a link that points outside the folder"),
+            where=str(path),
+            advice=tr("Replace the link by the file or folder itself"),
+        )
+    try:
+        _write_and_place(target, _temporary_for(target), writer, _place_new if new else os.replace)
+    except FileExistsError as error:
+        if not new:
+            raise cannot_write(error, path) from error
+        raise NameTakenError(
+            tr("A file with this name already exists"),
+            where=str(path),
+            advice=tr("Choose another name"),
+        ) from error
+    except OSError as error:
+        raise cannot_write(error, path) from error
+
+
+def refuse_unwritable(path: Path) -> None:
+    """Refuse a file that cannot be written, before its content is computed.
+
+    Raises
+    ------
+    InputError
+        As for :func:`write_atomically`, except for a full disk.
+    """
+    target = _ordinary_target(path)
+    temporary = _temporary_for(target)
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        temporary.open("xb").close()
+        temporary.unlink()
+    except OSError as error:
+        raise cannot_write(error, path) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder and its parents, unless it exists.
+
+    Raises
+    ------
+    InputError
+        If it cannot be created, or a file has its name.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(error, folder) from error
+
+
+def _ordinary_target(path: Path) -> Path:
+    """Return the target of a path; refuse anything but an ordinary file."""
+    target = Path(os.path.realpath(path))
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        # Otherwise an ordinary file would replace, for example, /dev/full.
+        raise InputError(
+            tr("The path is a device, not a file"),
+            where=str(path),
+            advice=tr("Choose a file"),
+        )
+    return target
+
+
+def _temporary_for(target: Path) -> Path:
+    return target.with_name(f".{target.name[:200]}.{secrets.token_hex(4)}.part")
+
+
+def _place_new(temporary: Path, target: Path) -> None:
+    """Give a file its name, unless another file has it."""
+    try:
+        os.link(temporary, target)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links: the name is reserved first
+        target.open("xb").close()
+        try:
+            os.replace(temporary, target)
+        except OSError:
+            target.unlink(missing_ok=True)
+            raise
+    else:
+        temporary.unlink()
+
+
+def _write_and_place(
+    target: Path,
+    temporary: Path,
+    writer: Callable[[BinaryIO], object],
+    place: Callable[[Path, Path], None],
+) -> None:
+    # Not tempfile: its files are readable only by their owner, and would stay so.
+    file = temporary.open("x+b")
+    try:
+        with file:
+            writer(file)
+            file.flush()
+            os.fsync(file.fileno())
+        if target.is_file():
+            temporary.chmod(stat.S_IMODE(target.stat().st_mode))
+        place(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    sync_folder(target.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the names in a folder to disk: otherwise a power cut can remove a complete new file."""
+    if os.name != "posix":
+        return  # no other system opens folders
+    # Some network disks refuse this; the content of the files is safe anyway.
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def cannot_write(error: OSError, path: Path) -> InputError:
+    """Return the error for a file that the system does not allow to be written."""
+    found, advice = _plain_words(error)
+    return InputError(found, where=str(path), advice=advice)
+
+
+def _plain_words(error: OSError) -> tuple[str, str]:
+    """Return the problem and the advice."""
+    match error.errno:
+        case errno.ENOSPC | errno.EDQUOT:
+            return tr("The disk is full"), tr("Free some space or choose another disk")
+        case errno.EACCES | errno.EPERM:
+            return tr("You do not have permission to write here"), tr(
+                "Choose your own folder, or ask for permission"
+            )
+        case errno.EROFS:
+            return tr("This disk is read-only"), tr("Choose a folder on another disk")
+        case errno.ENOENT:
+            return tr("The folder does not exist"), tr("Create the folder first")
+        case errno.ENOTDIR | errno.EEXIST:
+            return tr("A file has the name of a required folder"), tr("Choose another folder")
+        case errno.EISDIR:
+            return tr("A folder has the name of the file"), tr("Choose another name")
+        case errno.ENAMETOOLONG:
+            return tr("The name is too long"), tr("Choose a shorter name")
+        case errno.EFBIG:
+            return tr("The file is too large for this disk"), tr("Choose another disk")
+    reason = error.strerror or str(error)
+    return tr("The file cannot be written ({reason})").format(reason=reason), tr(
+        "Check the disk or choose another folder"
+    )

@@ -1,0 +1,99 @@
+"""Only one program at a time writes to a run's folder; others get an error that names it."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import sys
+from pathlib import Path
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import cannot_write
+from gelpolight_core.io.user import user_name
+from gelpolight_core.translation import tr
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+FILE = ".writing"
+# Windows locks byte ranges and prevents others from reading them: lock one far behind the name.
+_LOCKED_BYTE = 4096
+
+
+class RunLock:
+    """The lock on a run's folder, until it is released or the program ends in any way.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the run.
+
+    Raises
+    ------
+    InputError
+        If another program has the lock, or the folder cannot be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        path = folder / FILE
+        try:
+            self._handle: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise cannot_write(error, path) from error
+        try:
+            # The system releases the lock with the process, even if it is killed.
+            _lock(self._handle)
+        except OSError as error:
+            who = _holder(self._handle)
+            self.release()
+            if error.errno not in (errno.EAGAIN, errno.EACCES):
+                raise cannot_write(error, path) from error
+            raise InputError(
+                tr("This run is being written by {who}").format(who=who),
+                where=str(folder),
+                advice=tr("Stop the other run first, or choose a new folder"),
+            ) from error
+        try:
+            os.ftruncate(self._handle, 0)
+            os.lseek(self._handle, 0, os.SEEK_SET)
+            os.write(self._handle, _name().encode())
+        except OSError as error:
+            self.release()
+            raise cannot_write(error, path) from error
+
+    def __enter__(self) -> RunLock:
+        """Hold the lock for a block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Release the lock at the end of the block."""
+        self.release()
+
+    def release(self) -> None:
+        """Release the lock; may be called repeatedly."""
+        handle, self._handle = self._handle, None
+        if handle is not None:
+            os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Lock a file for this process; raises OSError if another process has the lock."""
+    if sys.platform == "win32":
+        os.lseek(handle, _LOCKED_BYTE, os.SEEK_SET)
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+    else:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _name() -> str:
+    return f"{user_name() or tr('unknown user')} @ {socket.gethostname()}, process {os.getpid()}"
+
+
+def _holder(handle: int) -> str:
+    """Return the name written to the file by the holder of the lock."""
+    os.lseek(handle, 0, os.SEEK_SET)
+    return os.read(handle, 200).decode("utf-8", "replace") or tr("another program")

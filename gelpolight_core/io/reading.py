@@ -1,0 +1,190 @@
+"""Read files from unknown sources safely.
+
+Only ordinary files are opened (a pipe would block for ever), their content is read up to a fixed
+size, and every fault found while parsing raises ValueError, so that each reader can report it in
+one sentence. This module does not need the numerical libraries.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import stat
+import tomllib
+from io import BufferedReader
+from pathlib import Path
+from typing import Any
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+TEXT_LIMIT = 1_000_000
+# Parsing a key of n parts takes time proportional to n squared; real keys have at most three parts.
+MOST_PARTS = 20
+_LONG_TEXT = re.compile(r'"""|\'\'\'')
+_TEXT = re.compile(r""""(?:[^"\\\n]|\\.)*"?|'[^'\n]*'?""")
+_BETWEEN = re.compile(r"[\n,=\[\]{}]")
+NAME_LIMIT = 200
+# Highest plausible version number; anything above it means a damaged file.
+NEWEST = 1_000_000
+LINES = "\n\t"
+
+
+def open_file(path: Path) -> BufferedReader:
+    """Open an ordinary file for reading.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the file does not exist, or the path is a folder, a pipe or a device.
+    InputError
+        If the file cannot be read.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+    try:
+        # Non-blocking: opening a pipe without a writer would block for ever.
+        file = os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, ValueError) as error:
+        raise FileNotFoundError(str(path)) from error
+    except OSError as error:
+        raise unreadable(error, path) from error
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise FileNotFoundError(str(path))
+    return os.fdopen(file, "rb")
+
+
+def read_file(path: Path, limit: int = TEXT_LIMIT) -> bytes:
+    """Return the content of an ordinary file of at most `limit` bytes.
+
+    Raises
+    ------
+    FileNotFoundError
+        See :func:`open_file`.
+    InputError
+        If the file cannot be read or is larger.
+    """
+    with open_file(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        try:
+            data = stream.read(limit + 1) if size <= limit else b""
+        except OSError as error:
+            raise unreadable(error, path) from error
+    if size > limit or len(data) > limit:
+        raise InputError(
+            tr("The file is larger than {n} bytes, the limit for files of this kind").format(
+                n=limit
+            ),
+            where=str(path),
+            advice=tr("Choose another file"),
+        )
+    return data
+
+
+def parse_toml(data: bytes) -> dict[str, Any]:
+    """Return the content of a TOML text in UTF-8.
+
+    Raises
+    ------
+    ValueError
+        If it is not valid TOML, or its structure is implausible.
+    """
+    text = data.decode("utf-8-sig")
+    if _LONG_TEXT.search(text):
+        raise ValueError("it contains a multi-line string")
+    # Between these separators, dots occur only inside one number or one key.
+    for part in _BETWEEN.split(_TEXT.sub("", text)):
+        if part.partition("#")[0].count(".") > MOST_PARTS:
+            raise ValueError(f"a key has more than {MOST_PARTS} parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
+def parse_json(data: bytes | str) -> Any:
+    """Return the content of a JSON text; NaN and infinite values are refused.
+
+    Raises
+    ------
+    ValueError
+        If it is not valid JSON, or its structure is implausible.
+    """
+    try:
+        return json.loads(data, parse_constant=_refused, parse_float=_finite)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
+def plain_text(value: Any, most: int = 10_000) -> str:
+    """Return a value that must be a name: text that is safe to show, print and write to a file.
+
+    Raises
+    ------
+    ValueError
+        If it is not text, is longer than `most` characters, or contains control or invalid
+        characters.
+    """
+    text = written_text(value, most)
+    if any((c < " " and c not in LINES) or "\x7f" <= c <= "\x9f" for c in text):
+        raise ValueError(f"{brief(text)} contains control characters")
+    return text
+
+
+def written_text(value: Any, most: int = 1_000_000) -> str:
+    """Return a value that must be text; control characters from pasted text are allowed.
+
+    Raises
+    ------
+    ValueError
+        If it is not text, is longer than `most` characters, or cannot be written to a file.
+    """
+    if not isinstance(value, str):
+        raise ValueError(f"{brief(value)} is not text")
+    if len(value) > most:
+        raise ValueError(f"a text has {len(value)} characters")
+    value.encode()  # a lone surrogate cannot be encoded
+    return value
+
+
+def as_text(name: str) -> str:
+    """Return a name in writable form: bytes that are not valid text become escape codes."""
+    return name.encode("utf-8", "backslashreplace").decode()
+
+
+def is_file_name(name: str) -> bool:
+    """Return whether a text is a plain file name, without any folder part."""
+    forbidden = set(name) & {"/", "\\", "\0"}
+    return not forbidden and name not in ("", ".", "..") and len(name) <= NAME_LIMIT
+
+
+def brief(value: Any, most: int = 60) -> str:
+    """Return a value in a short printable form for a message."""
+    try:
+        text = value if isinstance(value, str) else repr(value)
+    except (ValueError, RecursionError):  # a number with thousands of digits, or endless nesting
+        return type(value).__name__
+    text = ascii(text)[1:-1] if not text.isprintable() else text
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def unreadable(error: OSError, path: Path) -> InputError:
+    """Return the error for a file that the system cannot read."""
+    return InputError(
+        tr("The file cannot be read ({reason})").format(reason=error.strerror or error),
+        where=str(path),
+        advice=tr("Check its permissions and the disk, or copy it to your own folder"),
+    )
+
+
+def _refused(constant: str) -> float:
+    raise ValueError(f"{constant} is not a valid number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{brief(text)} is too large")
+    return value

@@ -1,0 +1,16 @@
+"""Name of the current user."""
+
+from __future__ import annotations
+
+import getpass
+
+from gelpolight_core.io.reading import as_text
+
+
+def user_name() -> str:
+    """Return the login name of the user; empty if the system has none, as in a bare container."""
+    try:
+        return as_text(getpass.getuser())
+    # which one depends on the system and the Python version
+    except (KeyError, OSError, ImportError):
+        return ""

@@ -1,0 +1,166 @@
+"""Least squares within bounds, for many residuals and few parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Bounds = tuple[Array, Array]
+
+TOLERANCE = 1e-6
+MOST_STEPS = 60
+FIRST_DAMPING = 1e-3
+_LEAST_CURVATURE = np.finfo(np.float64).eps
+_STEP = float(np.sqrt(np.finfo(np.float64).eps))
+
+
+@dataclass(frozen=True, slots=True)
+class LeastSquares:
+    """Result of a fit.
+
+    Attributes
+    ----------
+    x : (n,)
+        The parameters.
+    slopes : (m, n) or None
+        Jacobian of the residuals before the last step; None for a robust fit, which weights it.
+    converged : bool
+        Whether the fit converged before the limit on the number of steps.
+    """
+
+    x: Array
+    slopes: Array | None
+    converged: bool
+
+
+def fit_least_squares(
+    residuals: Callable[[Array], Array],
+    jacobian: Callable[[Array], Array],
+    start: Array,
+    bounds: Bounds,
+    *,
+    scale: Array | None = None,
+    robust: bool = False,
+    tolerance: float = TOLERANCE,
+) -> LeastSquares:
+    r"""Minimise a sum of squares within bounds, by damped Gauss-Newton steps.
+
+    The normal equations have one row per parameter, so a step costs little compared with the
+    residuals; a decomposition of the whole Jacobian would take ten times as long.
+
+    Parameters
+    ----------
+    residuals : callable
+        Maps parameters (n,) to residuals (m,), divided by their standard deviations.
+    jacobian : callable
+        Maps parameters (n,) to the Jacobian of the residuals (m, n), a new array each time.
+    start : (n,)
+        First guess, within the bounds.
+    bounds : ((n,), (n,))
+        Lower and upper bounds; infinite where there is no bound.
+    scale : (n,), optional
+        Typical change of each parameter; by default chosen so that each parameter changes the
+        residuals at `start` equally.
+    robust : bool, optional
+        Minimise the sum of :math:`\sqrt{1 + r^2} - 1` instead of :math:`r^2 / 2`.
+    tolerance : float, optional
+        The fit ends when a step lowers the cost, or moves the parameters, by less than this
+        fraction.
+
+    References
+    ----------
+    K. Madsen, H. B. Nielsen, O. Tingleff, "Methods for non-linear least squares problems", 2004,
+    section 3.2; the robust loss and its curvature as in scipy.optimize.least_squares.
+    """
+    low, high = bounds
+    x = np.clip(start, low, high)
+    left = residuals(x)
+    cost = _cost(left, robust)
+    slopes = jacobian(x)
+    curvature, gradient = _normal_equations(slopes, left, robust)
+    if scale is None:
+        scale = 1.0 / np.sqrt(np.where(np.diag(curvature) > 0.0, np.diag(curvature), 1.0))
+    damping, growth = FIRST_DAMPING * float(np.max(np.diag(curvature) * scale**2)), 2.0
+    converged = False
+    for _ in range(MOST_STEPS):
+        damped = curvature + np.diag(damping / scale**2)
+        step = _step(damped, gradient, low - x, high - x)
+        there = np.clip(x + step, low, high)
+        step = there - x
+        expected = -float(gradient @ step + 0.5 * step @ curvature @ step)
+        left = residuals(there)
+        lower = cost - _cost(left, robust)
+        small = float(np.linalg.norm(step / scale)) <= tolerance * float(np.linalg.norm(x / scale))
+        if lower > 0.0:
+            x, cost = there, cost - lower
+            if small or lower < tolerance * cost:
+                converged = True
+                break
+            ratio = lower / expected if expected > 0.0 else 0.0
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
+            growth = 2.0
+            slopes = jacobian(x)
+            curvature, gradient = _normal_equations(slopes, left, robust)
+        elif small:
+            converged = True
+            break
+        else:
+            damping *= growth
+            growth *= 2.0
+    return LeastSquares(x, None if robust else slopes, converged)
+
+
+def forward_differences(
+    residuals: Callable[[Array], Array], x: Array, columns: Iterable[int] | None = None
+) -> Array:
+    """Return the Jacobian (m, n) of residuals (m,) by forward differences.
+
+    Parameters
+    ----------
+    residuals : callable
+        Maps parameters (n,) to residuals (m,).
+    x : (n,)
+        Point at which the Jacobian is evaluated.
+    columns : iterable of int, optional
+        Parameters whose derivatives are computed; the other columns are 0. All by default.
+    """
+    base = residuals(x)
+    slopes = np.zeros((base.size, x.size))
+    for k in range(x.size) if columns is None else columns:
+        moved = x.copy()
+        moved[k] += _STEP * max(1.0, abs(float(x[k])))
+        slopes[:, k] = (residuals(moved) - base) / (moved[k] - x[k])
+    return slopes
+
+
+def _cost(left: Array, robust: bool) -> float:
+    return float(np.sum(np.sqrt(1.0 + left**2) - 1.0)) if robust else 0.5 * float(left @ left)
+
+
+def _normal_equations(slopes: Array, left: Array, robust: bool) -> tuple[Array, Array]:
+    """Return curvature (n, n) and gradient (n,) of the cost; `slopes` may be overwritten."""
+    if not robust:
+        return slopes.T @ slopes, slopes.T @ left
+    z = 1.0 + left**2
+    gradient = slopes.T @ (left / np.sqrt(z))
+    slopes *= np.sqrt(np.maximum(z**-1.5, _LEAST_CURVATURE))[:, None]
+    return slopes.T @ slopes, gradient
+
+
+def _step(curvature: Array, gradient: Array, low: Array, high: Array) -> Array:
+    """Return the step (n,) to the minimum of a quadratic, stopped at the bounds."""
+    step = np.zeros(gradient.size)
+    free = ~((low >= 0.0) & (gradient > 0.0) | (high <= 0.0) & (gradient < 0.0))
+    while free.any():
+        pull = gradient[free] + curvature[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], -pull)
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step, low, high)[beyond]
+        free &= ~beyond
+    return step

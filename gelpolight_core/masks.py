@@ -1,0 +1,53 @@
+"""When a pixel is saturated or dark, and when a node is usable or in contact: defined once.
+
+Values are linear light, 0..1 of the camera's full scale.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Mask = NDArray[np.bool_]
+
+SATURATED = 0.995
+"""From here on a pixel is at its upper end: it only says that there is at least so much light."""
+LEAST_LIGHT = 0.01
+"""Below this light of the untouched membrane, the ratio of press to background is noise."""
+DARK_COSINE = 0.03
+"""A channel whose light falls on the surface at a smaller cosine is in shadow."""
+DARK_SIGMAS = 4.0
+"""A channel within so many standard deviations of no light is dark ..."""
+DARK_SHARE = 0.15
+"""... but not if it has this share of the flat membrane's light, however noisy it is."""
+CONTACT_CHANGE = 5e-3
+"""A contact changes the light by more than this share; less is below half a degree of slope."""
+CONTACT_SIGMAS = 5.0
+"""A contact changes the light by more than so many standard deviations of its noise."""
+
+
+def saturated(light: NDArray[np.floating[Any]]) -> Mask:
+    """Return which values are at the camera's upper end."""
+    return np.asarray(light >= SATURATED)
+
+
+def lit(light: NDArray[np.floating[Any]]) -> Mask:
+    """Return the nodes (...) whose untouched membrane has light in all channels (..., 3)."""
+    return np.asarray((light > LEAST_LIGHT).all(axis=-1))
+
+
+def usable(
+    valid: Mask, background: NDArray[np.floating[Any]], factors: NDArray[np.floating[Any]]
+) -> Mask:
+    """Return the nodes (rows, columns) that can be solved: in view, lit, with known reflectance.
+
+    Parameters
+    ----------
+    valid : (rows, columns) bool
+        In view and inside the working circle.
+    background, factors : (rows, columns, 3)
+        Light of the untouched membrane, and its reflectance factors (Eq. 9).
+    """
+    return np.asarray(valid & lit(background) & (factors > 0.0).all(axis=-1))

@@ -1,0 +1,241 @@
+"""Prepare a height map for evaluation: level, smooth, mask, compare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.measured import depth_at
+from gelpolight_core.measurement.roughness import fit_plane
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.translation import tr
+
+Mask = NDArray[np.bool_]
+Counts = NDArray[np.int64]
+Edges = NDArray[np.float64]
+Point = tuple[float, float]
+LEAST_NODES = 3
+MOST_NEAR_LINE = 1e-3
+"""Area of the triangle of three points as a share of its longest side squared: less is a line."""
+LARGEST_MEDIAN = 15
+ROUNDS = 3
+"""Of the levelling without the object: each leaves out what lies far from the plane before."""
+FAR = 3.0
+"""Standard deviations."""
+
+
+def usable(heightmap: HeightMap) -> Mask:
+    """Return where a height map has a depth: finite, and inside the working area."""
+    out = np.uint8(Flag.OUTSIDE | Flag.INVALID)
+    return np.asarray(np.isfinite(heightmap.depth_mm) & ((heightmap.flags & out) == 0))
+
+
+def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
+    """Take the least-squares plane of the untouched surface off a height map.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The surface.
+    mask : (rows, columns) bool, optional
+        Where the plane is fitted. Default: everywhere with a depth; what lies more than three
+        standard deviations from the plane, such as a pressed object, is left out in three rounds.
+
+    Raises
+    ------
+    InputError
+        If fewer than three points can be used.
+    """
+    there = usable(heightmap) if mask is None else usable(heightmap) & mask
+    x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
+    depth = heightmap.depth_mm.astype(np.float64)
+    plane = np.zeros(depth.shape)
+    for _ in range(ROUNDS if mask is None else 1):
+        if there.sum() < LEAST_NODES:
+            raise InputError(
+                tr("fewer than three points have a depth"),
+                where=tr("levelling"),
+                advice=tr("Choose a larger area inside the working area"),
+            )
+        level, slope_x, slope_y = fit_plane(x[there], y[there], depth[there])
+        plane = level + slope_x * (x - x[there].mean()) + slope_y * (y - y[there].mean())
+        left = depth - plane
+        middle = float(np.median(left[there]))
+        spread = 1.4826 * float(np.median(np.abs(left[there] - middle)))
+        there &= np.abs(left - middle) <= max(FAR * spread, 1e-9)
+    return _without(heightmap, plane, tr("Levelled by a least-squares plane."))
+
+
+def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightMap:
+    """Take the plane through three points of the surface off a height map.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The surface.
+    points_mm : three (x, y)
+        Places in the sensor frame. They read 0 afterwards.
+
+    Raises
+    ------
+    InputError
+        If there are not three points with a depth, or they lie on a line.
+    """
+    places = np.asarray(points_mm, np.float64)
+    if places.shape != (3, 2):
+        raise InputError(
+            tr("{n} points for a plane").format(n=len(places)),
+            where=tr("levelling"),
+            advice=tr("Choose three points"),
+        )
+    depth = depth_at(heightmap, places[:, 0], places[:, 1])
+    (ax, ay), (bx, by) = places[1] - places[0], places[2] - places[0]
+    longest = max(ax**2 + ay**2, bx**2 + by**2, 1e-12)
+    if not np.isfinite(depth).all() or abs(ax * by - ay * bx) < MOST_NEAR_LINE * longest:
+        raise InputError(
+            tr("the three points lie on a line, or one has no depth"),
+            where=tr("levelling"),
+            advice=tr("Choose three points inside the working area, far from each other"),
+        )
+    terms = np.column_stack([np.ones(3), places])
+    level, slope_x, slope_y = np.linalg.solve(terms, depth)
+    x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
+    plane = level + slope_x * x + slope_y * y
+    return _without(heightmap, plane, tr("Levelled by three points."))
+
+
+def smooth_gaussian(heightmap: HeightMap, *, sigma_mm: float) -> HeightMap:
+    """Smooth a height map with a Gaussian. Places without depth neither count nor change.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The surface.
+    sigma_mm : float
+        Standard deviation of the Gaussian.
+
+    Raises
+    ------
+    InputError
+        If it is not positive.
+    """
+    if not 0.0 < sigma_mm < np.inf:
+        raise _bad_size(sigma_mm)
+    there = usable(heightmap)
+    nodes = sigma_mm / heightmap.pitch_mm
+    depth = np.where(there, heightmap.depth_mm, 0.0).astype(np.float64)
+    total = gaussian_filter(depth, nodes, mode="constant")
+    weight = gaussian_filter(there.astype(np.float64), nodes, mode="constant")
+    smooth = np.where(there, total / np.maximum(weight, 1e-12), heightmap.depth_mm)
+    return _filtered(heightmap, smooth, tr("Smoothed, sigma {s:g} mm.").format(s=sigma_mm))
+
+
+def smooth_median(heightmap: HeightMap, *, nodes: int) -> HeightMap:
+    """Replace each depth by the median around it.
+
+    Places without depth count as their nearest neighbour with one, and do not change.
+
+    Parameters
+    ----------
+    heightmap : HeightMap
+        The surface.
+    nodes : int
+        Side of the square: odd, from 3 to 15.
+
+    Raises
+    ------
+    InputError
+        If it is another number.
+    """
+    if nodes % 2 == 0 or not 3 <= nodes <= LARGEST_MEDIAN:
+        raise _bad_size(nodes)
+    there = usable(heightmap)
+    if not there.any():
+        return heightmap
+    nearest = distance_transform_edt(~there, return_distances=False, return_indices=True)
+    smooth = median_filter(heightmap.depth_mm[tuple(nearest)], nodes, mode="nearest")
+    kept = np.where(there, smooth, heightmap.depth_mm)
+    return _filtered(heightmap, kept, tr("Median of {n} x {n} points.").format(n=nodes))
+
+
+def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
+    """Return how much deeper a height map is than an earlier one of the same sensor.
+
+    Parameters
+    ----------
+    heightmap, earlier : HeightMap
+        On the same grid.
+
+    Raises
+    ------
+    InputError
+        If the grids differ.
+    """
+    same = heightmap.depth_mm.shape == earlier.depth_mm.shape and all(
+        np.allclose(one, other, atol=1e-6)
+        for one, other in ((heightmap.x_mm, earlier.x_mm), (heightmap.y_mm, earlier.y_mm))
+    )
+    if not same:
+        raise InputError(
+            tr("the two height maps have different grids"),
+            where=f"{heightmap.source}, {earlier.source}",
+            advice=tr("Compare two frames of one sensor with one calibration"),
+        )
+    left = _without(
+        heightmap, earlier.depth_mm, tr("Difference to {name}.").format(name=earlier.source)
+    )
+    return replace(left, flags=heightmap.flags | earlier.flags)
+
+
+def histogram(
+    heightmap: HeightMap, *, bins: int = 100
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return how many points have which depth: counts (bins,) and edges (bins + 1,), mm.
+
+    Raises
+    ------
+    InputError
+        If no point has a depth.
+    """
+    there = usable(heightmap)
+    if not there.any():
+        raise InputError(
+            tr("no point has a depth"),
+            where=heightmap.source,
+            advice=tr("Use an image of the lit sensor"),
+        )
+    counts, edges = np.histogram(heightmap.depth_mm[there].astype(np.float64), bins=bins)
+    return counts, edges
+
+
+def _without(heightmap: HeightMap, plane: NDArray[np.floating], note: str) -> HeightMap:
+    depth = (heightmap.depth_mm - plane).astype(np.float32)
+    return replace(heightmap, depth_mm=depth, normals=None, notes=(*heightmap.notes, note))
+
+
+def _filtered(heightmap: HeightMap, depth_mm: NDArray[np.floating], note: str) -> HeightMap:
+    """Return a smoothed map. Its errors are no longer those of the map before."""
+    return replace(
+        heightmap,
+        depth_mm=depth_mm.astype(np.float32),
+        normals=None,
+        slope_sd=None,
+        depth_sd_mm=None,
+        slope_model_sd=None,
+        depth_model_sd_mm=None,
+        noise_mm=None,
+        notes=(*heightmap.notes, note),
+    )
+
+
+def _bad_size(size: float) -> InputError:
+    return InputError(
+        tr("a filter of size {size:g}").format(size=size),
+        where=tr("smoothing"),
+        advice=tr("Choose a sigma above 0 mm, or an odd number of points from 3 to 15"),
+    )

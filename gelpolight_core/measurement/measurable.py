@@ -1,0 +1,45 @@
+"""The height map that a measurement needs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numpy.typing import NDArray
+
+from gelpolight_core.health.finding import refuse_meaningless
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+
+def measurable_depth(
+    reconstructor: Reconstructor,
+    frame: NDArray[Any],
+    *,
+    name: str,
+    where: str = "",
+    despite_faults: bool = False,
+) -> HeightMap:
+    """Check an image, and reconstruct it with its standard deviations.
+
+    Parameters
+    ----------
+    reconstructor : Reconstructor
+        With the calibration.
+    frame : (height, width, 3)
+        As for :meth:`Reconstructor.depth`.
+    name : str
+        Of the image, kept in the result.
+    where : str, optional
+        What a message names; by default the image's name.
+    despite_faults : bool, optional
+        Whether an image whose depth means nothing is reconstructed all the same.
+
+    Raises
+    ------
+    InputError
+        If the depth would mean nothing, or as :meth:`Reconstructor.depth`.
+    """
+    health = reconstructor.health(frame, name=name)
+    if not despite_faults:
+        refuse_meaningless(health, where=where or name)
+    return reconstructor.depth(frame, name=name, normals=False, uncertainty=True, health=health)

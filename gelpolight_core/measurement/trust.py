@@ -1,0 +1,56 @@
+"""A measurement is never better than its calibration and its image."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeVar
+
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.tool import ToolResult
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLACE
+from gelpolight_core.translation import tr
+
+Result = TypeVar("Result", Measurement, ToolResult)
+
+WALLED = ("cylinder", "cuboid")
+"""Shapes whose walls are steeper than a ball and narrower than the smoothing of an image."""
+
+
+def judged(result: Result, height_map: HeightMap) -> Result:
+    """Return a measurement judged together with the calibration and the image behind it.
+
+    Every measurement goes through this function: in the public interface, on the command line, on
+    the Measure page, in an evaluation, in a protocol and in a batch.
+
+    Parameters
+    ----------
+    result : Measurement or ToolResult
+        Judged by its depths alone.
+    height_map : HeightMap
+        That was measured.
+
+    Returns
+    -------
+    Measurement or ToolResult
+        Doubtful, with the reason, where the calibration's verdict is "fail", the image has a fault,
+        or a calibration in place has seen no walls as the object's; unchanged otherwise.
+    """
+    faults = [height_map.calibration_fault]
+    if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
+        faults.append(
+            tr(
+                "the balls of this calibration in place have shown no walls: heights come out "
+                "about 10 % too small and sizes 2 to 10 % too large"
+            )
+        )
+    if height_map.health is not None:
+        faults += [finding.cause for finding in height_map.health.faults]
+    fault = "; ".join(text for text in faults if text)
+    if not fault:
+        return result
+    reason = f"{fault}; {result.reason}" if result.reason else fault
+    doubtful = replace(result, verdict="doubtful", reason=reason)
+    if isinstance(doubtful, ToolResult) and doubtful.measurement is not None:
+        doubtful = replace(doubtful, measurement=judged(doubtful.measurement, height_map))
+    return doubtful

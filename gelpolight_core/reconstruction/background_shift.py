@@ -1,0 +1,285 @@
+"""Has an untouched sensor moved away from its calibration, and setting it to zero again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from gelpolight_core.channels import CHANNEL_KEYS, channel_name
+from gelpolight_core.errors import InputError
+from gelpolight_core.factors.background import LEAST_FACTOR, flat_cosines
+from gelpolight_core.health.expected import even_membrane, raw_background
+from gelpolight_core.health.texture_shift import texture_shift_px
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.masks import LEAST_LIGHT, lit, saturated
+from gelpolight_core.quality import QualityTable, Verdict, judge
+from gelpolight_core.radiance import whiteboard
+from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
+from gelpolight_core.reconstruction.linear import as_linear
+from gelpolight_core.reconstruction.near_light.maps import COARSE
+from gelpolight_core.sensor_calibration import Calibration, HandEdit
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+TOUCHED_SHARE = 0.08
+"""A contact changes the light of its walls by tens of percent; what drifts is even over lengths
+like the field's."""
+TOUCHED_AREA_MM2 = 0.3
+"""Less area is a speck that came or went."""
+QUIET_MM = 0.25
+"""Over which the light is averaged before it is compared."""
+TOUCH_REACH_MM = 4.0
+"""Over which a change counts as even: wider than a contact, narrower than the field."""
+DIFFERS = 0.03
+"""A change of the light by this share counts as different; it tilts a normal by a degree or so."""
+
+
+@dataclass(frozen=True, slots=True)
+class BackgroundDrift:
+    """How far an untouched picture is from the calibration's background.
+
+    Attributes
+    ----------
+    shift_px : (float, float) or None
+        How far the membrane's texture has moved in the camera's picture, (u, v); None where the
+        membrane shows too little of it.
+    brightness_percent : (float, float, float)
+        Change of red, green and blue, median over the field.
+    differs_percent : float
+        Share of the field where a channel differs by more than 3 %.
+    touched : bool
+        Something is pressed, so that nothing can be said of drift.
+    quality : QualityTable
+        The same as judged figures with advice; fails when touched.
+    """
+
+    shift_px: tuple[float, float] | None
+    brightness_percent: tuple[float, float, float]
+    differs_percent: float
+    touched: bool
+    quality: QualityTable
+
+
+def background_drift(frame: NDArray[Any], calibration: AnyCalibration) -> BackgroundDrift:
+    """Compare a picture of the untouched sensor with the calibration's background.
+
+    Parameters
+    ----------
+    frame : (height, width, 3) uint8, uint16 or float32
+        RGB; whole numbers as the camera encodes them, floats linear light 0..1.
+    calibration : Calibration
+        The sensor's.
+
+    Raises
+    ------
+    InputError
+        If the frame is not of the calibration's size, or not lit.
+    """
+    seen = _on_grid([frame], calibration)
+    if isinstance(calibration, InPlaceCalibration):
+        base = calibration.in_place.background
+    else:
+        base = raw_background(calibration)
+    usable = np.asarray(lit(base) & np.isfinite(seen).all(axis=2))
+    ratio = np.where(usable[..., None], seen / np.maximum(base, LEAST_LIGHT), 1.0)
+    if not (usable.any() and float(np.median(ratio[usable])) > 0.05):
+        raise InputError(
+            tr("the picture is dark where the sensor's membrane is"),
+            where=tr("background"),
+            advice=tr("Switch all three LEDs on"),
+        )
+    coarse, there = _coarse(ratio, usable)
+    middle = np.median(coarse[there], axis=0)
+    pitch = COARSE * calibration.table.grid.pitch_mm
+    touched = _touched(coarse, there, pitch)
+    # Over a quarter of a millimetre the noise of one picture is below what counts.
+    quiet = cv2.GaussianBlur(np.where(there[..., None], coarse, 1.0), (0, 0), QUIET_MM / pitch)
+    differs = 100.0 * float((np.abs(quiet[there] - 1.0) > DIFFERS).any(axis=1).mean())
+    change = 100.0 * (middle - 1.0)
+    shift = None if touched else texture_shift_px(seen, base, usable, calibration.table)
+    brightness = (float(change[0]), float(change[1]), float(change[2]))
+    quality = _judge(shift, brightness, differs, touched)
+    return BackgroundDrift(shift, brightness, differs, touched, quality)
+
+
+def zeroed(
+    calibration: AnyCalibration, frames: Sequence[NDArray[Any]], *, operator: str, made: str
+) -> AnyCalibration:
+    """Return the calibration with the present background in the place of its own (tare).
+
+    The full model compares a press with its background, which is replaced. The paper's model has it
+    in its reflectance factors (Eq. 9), which are computed anew with the table and radiance as they
+    are. Lights, lens and membrane stay; where they have changed, zero hides it on the bare membrane
+    only.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        To be changed; the result is another.
+    frames : sequence of (height, width, 3)
+        Pictures of the untouched sensor, to be averaged; as for :func:`background_drift`.
+    operator : str
+        Who did it.
+    made : str
+        When: ISO 8601 time with zone.
+
+    Raises
+    ------
+    InputError
+        If there is no frame, one is not of the calibration's size, is not lit or saturated, the
+        sensor is touched, or camera and membrane have moved against each other.
+    """
+    if not frames:
+        raise InputError(
+            tr("there is no picture of the untouched sensor"),
+            where=tr("zero"),
+            advice=tr("Take one, with nothing on the sensor"),
+        )
+    for frame in frames:
+        _refuse_unfit(background_drift(frame, calibration))
+    present = _on_grid(frames, calibration)
+    edit = HandEdit("background", CHANNEL_KEYS, made, operator)
+    provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
+    if isinstance(calibration, InPlaceCalibration):
+        model = replace(calibration.in_place, background=present)
+        return replace(calibration, in_place=model, provenance=provenance)
+    factors = _factors(present, calibration)
+    full = calibration.full
+    if full is not None:
+        full = replace(full, background=unmix(present, calibration.crosstalk))
+    return replace(calibration, factors=factors, full=full, provenance=provenance)
+
+
+def _factors(present: Map, calibration: Calibration) -> Map:
+    """Return the reflectance factors (Eq. 9) of a background; 0 where they are unknown."""
+    theory = even_membrane(calibration)
+    factors = np.zeros(present.shape, np.float32)
+    np.divide(present, theory, out=factors, where=theory > 0.0, casting="same_kind")
+    known = (factors > LEAST_FACTOR).all(axis=2) & np.isfinite(factors).all(axis=2)
+    # As the calibration asks of the white board: what was dim there stays out.
+    light = calibration.radiance * flat_cosines(calibration.table, calibration.led_positions_mm)
+    known &= ~saturated(present).any(axis=2) & (light > whiteboard.LEAST_LIGHT).all(axis=2)
+    factors[~known] = 0.0
+    return factors
+
+
+def _on_grid(frames: Sequence[NDArray[Any]], calibration: AnyCalibration) -> Map:
+    """Return the average of frames in linear light on the membrane's grid."""
+    camera, response = calibration.camera, calibration.response
+    total = np.zeros((camera.height, camera.width, 3), np.float64)
+    for frame in frames:
+        if frame.shape != total.shape:
+            raise InputError(
+                tr("the picture is {shape}, the calibration is for {w}x{h}x3").format(
+                    shape="x".join(str(n) for n in frame.shape), w=camera.width, h=camera.height
+                ),
+                where=tr("background"),
+                advice=tr("Use the calibration of this sensor at this picture size"),
+            )
+        linear = response is None or frame.dtype.kind == "f"
+        total += as_linear(frame if linear or response is None else response.linearise(frame))
+    mean = (total / len(frames)).astype(np.float32)
+    if isinstance(calibration, InPlaceCalibration):
+        return calibration.in_place.grid.reduce(mean)
+    return calibration.table.apply(mean)
+
+
+def _coarse(ratio: Map, usable: Mask) -> tuple[Map, Mask]:
+    """Return averages over blocks of nodes, and which blocks are known whole."""
+    rows, columns = (n // COARSE for n in usable.shape)
+    cut = ratio[: rows * COARSE, : columns * COARSE]
+    mean = cut.reshape(rows, COARSE, columns, COARSE, 3).mean(axis=(1, 3))
+    whole = usable[: rows * COARSE, : columns * COARSE].reshape(rows, COARSE, columns, COARSE)
+    return mean, np.asarray(whole.all(axis=(1, 3)))
+
+
+def _touched(coarse: Map, there: Mask, pitch_mm: float) -> bool:
+    """Return whether the light has changed somewhere as only a contact changes it."""
+    sigma = TOUCH_REACH_MM / pitch_mm
+    share = cv2.GaussianBlur(there.astype(np.float32), (0, 0), sigma)
+    known = np.where(there[..., None], coarse, 0.0)
+    even = cv2.GaussianBlur(known, (0, 0), sigma) / np.maximum(share, 1e-6)[..., None]
+    quiet = cv2.GaussianBlur(np.where(there[..., None], coarse / even, 1.0), (0, 0), 1.0)
+    changed = (np.abs(quiet - 1.0) > TOUCHED_SHARE).any(axis=2) & there
+    # The field's edge moves against the lit rim when the camera does: no contact begins there.
+    changed &= ndimage.binary_erosion(there, iterations=2)
+    labels, count = ndimage.label(changed)
+    if count == 0:
+        return False
+    return bool(np.bincount(labels.ravel())[1:].max() * pitch_mm**2 > TOUCHED_AREA_MM2)
+
+
+def _judge(
+    shift_px: tuple[float, float] | None,
+    brightness: tuple[float, float, float],
+    differs_percent: float,
+    touched: bool,
+) -> QualityTable:
+    figures = [
+        judge(
+            "drift_touched",
+            tr("Contacts on the sensor (0: untouched)"),
+            float(touched),
+            fail=0.5,
+            advice=tr("Take everything off the sensor, and look again"),
+        )
+    ]
+    if shift_px is not None:
+        figures.append(
+            judge(
+                "drift_shift_px",
+                tr("Membrane moved in the picture"),
+                math.hypot(*shift_px),
+                "px",
+                warn=0.5,
+                fail=2.0,
+                advice=tr("Camera and elastomer have moved apart: seat them, or calibrate again"),
+            )
+        )
+    figures += [
+        judge(
+            f"drift_brightness_{CHANNEL_KEYS[k]}_percent",
+            tr("Change of brightness, {name}").format(name=channel_name(k)),
+            abs(change),
+            "%",
+            warn=2.0,
+            fail=15.0,
+            advice=tr("Let the LEDs warm up and check exposure and gain, then set to zero"),
+        )
+        for k, change in enumerate(brightness)
+    ]
+    figures.append(
+        judge(
+            "drift_differs_percent",
+            tr("Share of the field that differs by 3 %"),
+            differs_percent,
+            "%",
+            warn=5.0,
+            fail=80.0,
+            advice=tr("Set to zero; where it stays, clean the sensor or calibrate again"),
+        )
+    )
+    return QualityTable(tuple(figures))
+
+
+def _refuse_unfit(drift: BackgroundDrift) -> None:
+    """Refuse to take a picture for the background that is none, or that zero cannot mend."""
+    for key in ("drift_touched", "drift_shift_px"):
+        figures = [f for f in drift.quality.figures if f.key == key]
+        if figures and figures[0].verdict is Verdict.FAIL:
+            found = (
+                tr("something is pressed into the membrane")
+                if drift.touched
+                else tr("the membrane has moved by {px:.1f} px").format(px=figures[0].value)
+            )
+            raise InputError(found, where=tr("zero"), advice=figures[0].advice)

@@ -1,0 +1,269 @@
+"""What a reconstruction takes: pictures of the right kind, lights that can be solved."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.lights.positions import (
+    CONDITION_LIMIT,
+    direction_condition,
+)
+from gelpolight_core.masks import usable
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+BYTES_OF_KIND = {"u": (1, 2), "f": (2, 4, 8, 12, 16)}
+BOUNDARY_MM = 1.0
+"""Distance from the boundary of the field at which the paper's model is checked for contact."""
+BOUNDARY_NODES = 720
+CONDITION_POINTS = 2000
+HELD_DOWN_MM, HELD_DOWN_SHARE = 0.03, 0.2
+"""Depth there, and share of the deepest, that shows a contact across the boundary although depth 0
+is held: more than the drape of one that ends 2 mm before it, and than the paper's model errs by."""
+PRESSED_SHARE = 0.1
+"""Nodes deeper than this share of the deepest are pressed or draped."""
+ONE_DARK_SHARE = 0.25
+"""Share of the pressed nodes in the shadow of an LED. Faces of 1 mm with a drape of 0.7 mm have
+0.16; walls of 71 degrees 0.34 and 3 % of the height, of 84 degrees 0.31 and 7 %."""
+FROZEN_SHARE = 0.25
+"""Depth over the height of the lowest LED: at 0.3 frozen lights cost 5 % of the depth."""
+THIN = 4
+MOST_CONDITION = 39.0
+"""Condition number of the light directions: above it, depths scatter more than their standard
+deviations state."""
+UNSOLVED_SHARE = 1e-3
+"""Walls of 57 degrees leave 0.001 %, of 71 degrees 0.14 %, of 76 degrees 0.2 %: 2 % of height."""
+MOST_PITCH = 0.25
+"""Node distance over the drape's decay length: at 0.28 a cylinder of 1 mm loses 4 % of its height,
+at 0.7 8 %."""
+MOST_HIDDEN_MM = 0.1
+"""Sensors of 320 x 240 pixels and 50 dB show 25 um; a depth of 0 from a worse one needs a note."""
+LEAST_USABLE = 0.02
+USABLE_STEP = 8
+
+
+def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
+    """Return a frame as uint8, uint16 or float32 in this machine's byte order.
+
+    Floats are limited to 0..1, so that no wild value spreads to its neighbours: below there is no
+    light, above the pixel is saturated. What is not a number stays so and counts as missing.
+
+    Parameters
+    ----------
+    frame : array
+        Any numbers.
+    name : str
+        What a message calls it.
+
+    Raises
+    ------
+    InputError
+        If the frame holds other numbers.
+    """
+    kind, size = frame.dtype.kind, frame.dtype.itemsize
+    if size not in BYTES_OF_KIND.get(kind, ()):
+        raise InputError(
+            tr("the picture holds values of type {kind}").format(kind=frame.dtype),
+            where=name or tr("image"),
+            advice=tr("Give 8 or 16 bit numbers without sign, or floats of linear light 0..1"),
+        )
+    if kind == "u":
+        return frame.astype(frame.dtype.newbyteorder("="), copy=False)
+    if frame.dtype == np.float32 and frame.min() >= 0.0 and frame.max() <= 1.0:
+        return frame.astype(np.float32, copy=False)
+    limited: Map = np.clip(frame, 0.0, 1.0).astype(np.float32)
+    limited[~np.isfinite(frame)] = np.nan
+    return limited
+
+
+def free_boundary_note() -> str:
+    """Return the note on a map whose boundary a contact crosses; its depth is as good as any."""
+    return tr("a contact crosses the boundary of the field: the boundary is free there")
+
+
+def held_boundary_note() -> str:
+    """Return the note on a map of the paper's model whose boundary a contact crosses."""
+    return tr(
+        "a contact crosses the boundary of the field, where the paper's model holds depth 0: "
+        "depths are too small; use the full model, or press nearer to the middle"
+    )
+
+
+def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float) -> tuple[str, ...]:
+    """Return the notes on a map of the paper's model outside of what the model assumes.
+
+    It takes three lights for granted, frozen at the undeformed surface.
+
+    Parameters
+    ----------
+    depth_mm, flags : (rows, columns)
+        The map.
+    least_height_mm : float
+        From the lowest LED to the undeformed surface.
+    """
+    thin = np.s_[::THIN, ::THIN]
+    depth = depth_mm[thin]
+    deepest = float(depth.max(initial=0.0))
+    pressed = depth > max(PRESSED_SHARE * deepest, HELD_DOWN_MM)
+    dark = pressed & ((flags[thin] & np.uint8(Flag.DARK)) != 0)
+    share = int(np.count_nonzero(dark)) / max(int(np.count_nonzero(pressed)), 1)
+    notes = []
+    if share > ONE_DARK_SHARE:
+        notes.append(
+            tr(
+                "{percent:.0f} % of what is pressed lies in the shadow of an LED, which the "
+                "paper's model does not know: what stands on steep walls may come out too low; "
+                "use the full model"
+            ).format(percent=100.0 * share)
+        )
+    if deepest > FROZEN_SHARE * least_height_mm:
+        notes.append(
+            tr(
+                "the press is deep for its lights, which the paper's model freezes at the "
+                "undeformed surface: depths may be off by 5 % and more; use the full model"
+            )
+        )
+    return tuple(notes)
+
+
+def condition_note(calibration: Calibration, leds_mm: NDArray[np.float64]) -> str:
+    """Return the note on lights that lie nearly in one plane somewhere; empty where none do."""
+    table = calibration.table
+    points = table.grid.points_mm()[table.valid]
+    if not points.size:
+        return ""
+    condition = direction_condition(leds_mm, points[:: max(len(points) // CONDITION_POINTS, 1)])
+    if condition <= MOST_CONDITION:
+        return ""
+    return tr(
+        "the light directions lie nearly in one plane in part of the field (condition number "
+        "{c:.0f}): depths scatter more than stated; place the LEDs wider apart"
+    ).format(c=condition)
+
+
+def unanchored_note() -> str:
+    """Return the note on a map without an anchor, all of which may be off by a constant."""
+    return tr(
+        "nearly all of the boundary is pressed: depths hold between points of the map only, and "
+        "all may be off by one constant; press so that more of the boundary stays free"
+    )
+
+
+def unsolved_note(share: float) -> str:
+    """Return what is to be said of nodes that light alone does not decide; empty where few are."""
+    if share <= UNSOLVED_SHARE:
+        return ""
+    return tr(
+        "{percent:.1f} % of the membrane is lit by less than two LEDs or turned away from the "
+        "camera, as on steep walls: what stands on them may come out too low"
+    ).format(percent=100.0 * share)
+
+
+def small_image_note(pitch_mm: float, decay_mm: float) -> str:
+    """Return the note on a map whose nodes do not resolve the drape; empty where they do."""
+    if pitch_mm <= MOST_PITCH * decay_mm:
+        return ""
+    return tr(
+        "the image is too small for this membrane: one pixel sees {p:.2f} mm, and the drape falls "
+        "off within {d:.2f} mm; heights may be too low by several percent; use larger images"
+    ).format(p=pitch_mm, d=decay_mm)
+
+
+def visible_depth_note(visible_mm: float) -> str:
+    """Return the note on a map without a contact, of a sensor that hides deep ones; else empty."""
+    if visible_mm <= MOST_HIDDEN_MM:
+        return ""
+    return tr(
+        "no contact was found, but this calibration's noise hides faces of less than {um:.0f} um: "
+        "calibrate again with more light or less gain"
+    ).format(um=1e3 * visible_mm)
+
+
+def refuse_coplanar_lights(calibration: Calibration, leds_mm: NDArray[np.float64]) -> None:
+    """Refuse lights whose directions at the middle of the sensor lie nearly in one plane.
+
+    Raises
+    ------
+    InputError
+        If their condition number is above the limit of the LED stage, or none.
+    """
+    condition = np.inf
+    if np.isfinite(leds_mm).all() and (leds_mm[:, 2] < 0.0).all():
+        condition = direction_condition(leds_mm, np.zeros(2))
+    if not condition <= CONDITION_LIMIT:
+        raise InputError(
+            tr(
+                "The three light directions lie nearly in one plane (condition number {c:.0f})"
+            ).format(c=condition),
+            where=calibration.identity,
+            advice=tr("Place the LEDs wider apart around the sensor's axis, and calibrate again"),
+        )
+
+
+def refuse_dark_membrane(calibration: Calibration, *, model: str) -> None:
+    """Refuse a calibration that has light on next to nothing of the membrane.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The sensor's.
+    model : str
+        ``full``, which looks at the background, or ``paper``, which looks at the radiance.
+
+    Raises
+    ------
+    InputError
+        If fewer than `LEAST_USABLE` of the nodes in view are lit in all channels.
+    """
+    thin = np.s_[::USABLE_STEP, ::USABLE_STEP]
+    full, valid = calibration.full, calibration.table.valid[thin]
+    light = calibration.radiance if model != "full" or full is None else full.background
+    lit = usable(valid, light[thin], calibration.factors[thin])
+    share = float(np.count_nonzero(lit)) / max(int(valid.sum()), 1)
+    if not share > LEAST_USABLE:
+        raise InputError(
+            tr("all three LEDs light {share:.1f} % of the membrane").format(share=100.0 * share),
+            where=calibration.identity,
+            advice=tr("Place the LEDs lower, or calibrate again with more light"),
+        )
+
+
+class NearBoundary(NamedTuple):
+    """Nodes of the grid a millimetre inside the boundary of the field.
+
+    Attributes
+    ----------
+    row, column : (nodes,) int
+        Their indices.
+    """
+
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+
+    def pressed(self, depth_mm: Map) -> bool:
+        """Return whether a contact crosses the boundary in a depth map (rows, columns)."""
+        deepest = np.abs(depth_mm[self.row, self.column]).max(initial=0.0)
+        return bool(deepest > max(HELD_DOWN_MM, HELD_DOWN_SHARE * float(depth_mm.max())))
+
+
+def nodes_near_boundary(calibration: Calibration) -> NearBoundary:
+    """Return the nodes next to the boundary of a calibration's field."""
+    table = calibration.table
+    grid = table.grid
+    angle = np.linspace(0.0, 2.0 * np.pi, BOUNDARY_NODES, endpoint=False)
+    radius = 0.5 * calibration.sensor.working_diameter_mm - BOUNDARY_MM
+    x, y = (
+        np.clip(radius * side, axis[0] + BOUNDARY_MM, axis[-1] - BOUNDARY_MM)
+        for side, axis in ((np.cos(angle), grid.x_mm), (np.sin(angle), grid.y_mm))
+    )
+    nodes = np.rint(grid.to_index(np.stack([x, y], axis=-1))).astype(np.intp)
+    column = np.clip(nodes[:, 0], 0, grid.shape[1] - 1)
+    row = np.clip(nodes[:, 1], 0, grid.shape[0] - 1)
+    known = table.valid[row, column]
+    return NearBoundary(row[known], column[known])

@@ -1,0 +1,158 @@
+"""The depth map of one picture, with all that is needed to use it elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.health.finding import Health
+from gelpolight_core.reconstruction.trace import Trace
+
+
+class Flag(IntFlag):
+    """Why the depth of a pixel is to be trusted less; several may hold at once.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> gp.Flag.DARK in gp.Flag(6)
+    True
+    >>> gp.Flag(6)
+    <Flag.SATURATED|DARK: 6>
+    """
+
+    OUTSIDE = 1
+    """Outside the working area or the picture."""
+    SATURATED = 2
+    """A channel at its upper end: it says nothing."""
+    DARK = 4
+    """A channel without signal: in shadow."""
+    EXTRAPOLATED = 8
+    """Reflectance table used beyond its data."""
+    NOT_OBSERVABLE = 16
+    """Wall turned away from the camera."""
+    INVALID = 32
+    """Not finite, or no light or reflectance factor there."""
+    UNANCHORED = 64
+    """Nearly all of the boundary is pressed: the depth may be off by a constant."""
+
+
+FLAG_NAMES = MappingProxyType({str(flag.name).lower(): flag.value for flag in Flag})
+"""Name of each flag in files, and its value in `HeightMap.flags`."""
+
+SD_MAPS = ("slope_sd", "depth_sd_mm", "slope_model_sd", "depth_model_sd_mm")
+"""The maps of standard deviations that a height map may hold."""
+
+SENSOR_NUMBERS = ("depth_scale_sd", "lateral_scale_sd", "visible_depth_mm")
+"""The numbers of the sensor that a height map may hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeightMap:
+    """Depth of the membrane on a regular metric grid in the sensor frame.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float32
+        Indentation towards the camera; the surface is at z = -depth.
+    x_mm : (columns,)
+        Places of the columns, at `pitch_mm` from each other, rising.
+    y_mm : (rows,)
+        Places of the rows, at `pitch_mm` from each other, rising.
+    pitch_mm : float
+        Distance between neighbouring grid points.
+    normals : (rows, columns, 3) float32 or None
+        Unit normals of the membrane in the sensor frame, towards the camera (z < 0).
+    flags : (rows, columns) uint8
+        Sums of :class:`Flag`.
+    calibration_id : str
+        Of the calibration that the depth was made with.
+    model : str
+        ``paper`` or ``full``.
+    source : str
+        Name of the picture, such as ``press_03.png``.
+    notes : tuple of str
+        What is to be said of this map, in sentences for a person.
+    slope_sd, depth_sd_mm : (rows, columns) float32 or None
+        What repeats of the picture scatter by: standard deviations of the surface's slopes (root
+        mean square of x and y) and of the depth, from the picture's noise. None where they were
+        not asked for, or by the paper's model.
+    slope_model_sd, depth_model_sd_mm : (rows, columns) float32 or None
+        The same from what the model does not explain of a press: alike in every repeat, another
+        in every press.
+    noise_mm : (examples, rows / 4, columns / 4) float32 or None
+        Errors of the depth that this noise could as well have made, on every fourth of the nodes
+        (averages over blocks of 4 x 4).
+    depth_scale_sd, lateral_scale_sd : float or None
+        Relative standard deviations, from the calibration and the lengths stated for it, of
+        depths and slopes, and of lengths across. They are common to all pixels and all pictures of
+        a calibration: the standard deviation of a depth is the root of the sum of squares of
+        `depth_sd_mm`, `depth_model_sd_mm`, and `depth_scale_sd` times the depth. None where the
+        calibration does not say.
+    visible_depth_mm : float or None
+        Smallest depth of a pressed flat face that the sensor shows above its noise; shallower
+        relief reads 0. None by the paper's model, which does not look for contacts.
+    trace : Trace or None
+        Which steps were done, and why the others were left out.
+    calibration_fault : str
+        Why no measurement with the calibration can be trusted; empty where it did not fail.
+    health : Health or None
+        The faults of the frame that it was made of.
+    lateral_per_mm : float
+        How much too wide an object comes out per mm of its depth, as a share: the paper's model
+        leaves each point where its ray meets the undeformed surface. 0 for the full model.
+
+    Raises
+    ------
+    ValueError
+        Where the shapes do not fit each other.
+
+    Examples
+    --------
+    >>> import gelpolight_core as gp
+    >>> sensor = gp.Reconstructor(gp.read_calibration("sensor.gplcal"))
+    >>> height_map = sensor.depth(gp.read_image("session/presses/cylinder_s5_d100.png"))
+    >>> height_map.depth_mm.shape == (len(height_map.y_mm), len(height_map.x_mm))
+    True
+    """
+
+    depth_mm: NDArray[np.float32]
+    x_mm: NDArray[np.floating]
+    y_mm: NDArray[np.floating]
+    pitch_mm: float
+    normals: NDArray[np.float32] | None
+    flags: NDArray[np.uint8]
+    calibration_id: str
+    model: str
+    source: str
+    notes: tuple[str, ...] = ()
+    slope_sd: NDArray[np.float32] | None = None
+    depth_sd_mm: NDArray[np.float32] | None = None
+    slope_model_sd: NDArray[np.float32] | None = None
+    depth_model_sd_mm: NDArray[np.float32] | None = None
+    noise_mm: NDArray[np.float32] | None = None
+    depth_scale_sd: float | None = None
+    lateral_scale_sd: float | None = None
+    visible_depth_mm: float | None = None
+    trace: Trace | None = None
+    calibration_fault: str = ""
+    health: Health | None = None
+    lateral_per_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check that the shapes fit each other."""
+        rows, columns = self.depth_mm.shape
+        expected = {"x_mm": (columns,), "y_mm": (rows,), "flags": (rows, columns)}
+        if self.normals is not None:
+            expected["normals"] = (rows, columns, 3)
+        for name in SD_MAPS:
+            if getattr(self, name) is not None:
+                expected[name] = (rows, columns)
+        for name, shape in expected.items():
+            found = np.shape(getattr(self, name))
+            if found != shape:
+                raise ValueError(f"{name} of shape {found} beside a depth map of {rows, columns}")

@@ -1,0 +1,143 @@
+"""From the slopes of a closed sensor to its depth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+Map = NDArray[np.float32]
+
+FREE = 1e-4
+"""How firmly depth 0 is held where a contact crosses the border."""
+ROUGHLY_FREE = 1e-3
+"""How firmly it is held all around in a first, coarse solution."""
+COARSE = 4
+CROSSES = 0.08
+"""Share of the greatest depth at the border from which it is not held all around ..."""
+HELD = 0.02
+"""... and up to which it still is held, node by node."""
+STEEP_SHARE, REACH_MM = 0.25, 2.0
+"""A contact crosses the border within this reach of walls, which have this share of the steepest
+slope. Small errors of the slopes over all of the field leave depth at the border, too."""
+LEAST_DEPTH_NODES = 0.5
+"""A map that is nowhere deeper is left alone."""
+TOLERANCE, ROUGH_TOLERANCE = 1e-3, 1e-2
+
+
+def depth_of(
+    slope_x: Map,
+    slope_y: Map,
+    *,
+    pitch_mm: float,
+    weight: Map,
+    workers: RowWorkers | None = None,
+) -> tuple[Map, bool]:
+    """Integrate slopes, the border free where a contact crosses it.
+
+    A coarse solution that is hardly held anywhere shows where the border is pressed. A second one
+    that is free there is the start of the fine solution, which has the details left to find.
+
+    Parameters
+    ----------
+    slope_x, slope_y : (rows, columns) float32
+        d(depth)/dx and d(depth)/dy.
+    pitch_mm : float
+        Distance between nodes.
+    weight : (rows, columns) float32
+        How far each slope is trusted, 0..1.
+    workers : RowWorkers, optional
+        Threads; by default one.
+
+    Returns
+    -------
+    depth_mm : (rows, columns) float32
+        At the nodes.
+    crossed : bool
+        Whether the border is free somewhere.
+    """
+    rows, columns = slope_x.shape
+    size = max(columns // COARSE, 2), max(rows // COARSE, 2)
+    small_weight, small_x, small_y = (
+        np.asarray(cv2.resize(a, size, interpolation=cv2.INTER_AREA), np.float32)
+        for a in (weight, slope_x, slope_y)
+    )
+    pitch = pitch_mm * columns / size[0]
+    loose = np.full(small_x.shape, ROUGHLY_FREE, np.float32)
+    rough = integrate_weighted(
+        small_x, small_y, small_weight, pitch_mm=pitch, hold=loose, tolerance=ROUGH_TOLERANCE
+    ).depth_mm
+    firm = _firm(rough, _near_walls(small_x, small_y, pitch), LEAST_DEPTH_NODES * pitch_mm)
+    if firm is None:
+        whole = integrate_weighted(
+            slope_x, slope_y, weight, pitch_mm=pitch_mm, tolerance=TOLERANCE, workers=workers
+        )
+        return whole.depth_mm, False
+    # A coarse node's spring stands for those of its share of the fine border.
+    coarse = integrate_weighted(
+        small_x, small_y, small_weight, pitch_mm=pitch, hold=firm, tolerance=TOLERANCE
+    ).depth_mm
+    start = cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_CUBIC)
+    hold = cv2.resize(
+        cv2.erode(firm, np.ones((3, 3), np.uint8)),
+        (columns, rows),
+        interpolation=cv2.INTER_LINEAR,
+    )
+    found = integrate_weighted(
+        slope_x,
+        slope_y,
+        weight,
+        pitch_mm=pitch_mm,
+        start_mm=np.asarray(start, np.float32),
+        hold=np.asarray(hold, np.float32),
+        tolerance=TOLERANCE,
+        workers=workers,
+    )
+    return found.depth_mm, True
+
+
+def _near_walls(slope_x: Map, slope_y: Map, pitch_mm: float) -> NDArray[np.bool_]:
+    """Return the nodes (rows, columns) within reach of a contact's walls."""
+    slope = np.hypot(slope_x, slope_y)
+    steep = slope > STEEP_SHARE * float(np.quantile(slope, 0.995))
+    side = 2 * max(round(REACH_MM / pitch_mm), 1) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    return np.asarray(cv2.dilate(steep.astype(np.uint8), disc) > 0)
+
+
+def _firm(rough_mm: Map, near: NDArray[np.bool_], least_mm: float) -> Map | None:
+    """Return how firmly the border is held by a solution that hardly is; None: everywhere."""
+
+    def border(values: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])
+
+    around = border(rough_mm)
+    ground = float(np.quantile(around, 0.25))
+    deepest = float(rough_mm.max()) - ground
+    highest = float(around[border(near)].max(initial=ground))
+    if deepest < least_mm or highest - ground < CROSSES * deepest:
+        return None
+    pressed = np.where(near, (rough_mm - ground) / (HELD * deepest), 0.0)
+    return np.asarray(np.clip(2.0 - pressed, FREE, 1.0), np.float32)
+
+
+def surface_slopes(depth_mm: Map, pitch_mm: float) -> tuple[Map, Map]:
+    """Return the slopes (rows, columns) of a depth map along x and y.
+
+    They are those of a surface, unlike the slopes that each node's colour gives: what is
+    contradictory in these, 0.4 to 1.5 degrees on real sensors, the integration has removed.
+    """
+    slope_y, slope_x = np.gradient(depth_mm, np.float32(pitch_mm))
+    return np.asarray(slope_x, np.float32), np.asarray(slope_y, np.float32)
+
+
+def normals(depth_mm: Map, pitch_mm: float) -> Map:
+    """Return the unit normals (-dd/dx, -dd/dy, -1) / |.| (rows, columns, 3) of a depth map."""
+    slope_x, slope_y = surface_slopes(depth_mm, pitch_mm)
+    down = np.float32(-1.0) / np.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+    return np.asarray(np.stack([slope_x * down, slope_y * down, down], axis=-1), np.float32)

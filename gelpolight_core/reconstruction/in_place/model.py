@@ -1,0 +1,181 @@
+"""What calibration in place knows of a closed sensor, and the slopes that it gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reconstruction.in_place.change import (
+    ColourChange,
+    Reference,
+    colour_change,
+    reference,
+)
+from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
+from gelpolight_core.reconstruction.in_place.terms import (
+    POWERS,
+    evaluate_rows,
+    place_axes,
+    row_coefficients,
+)
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+COLOUR_CELLS = 32
+"""Cells along each channel of the record of colours that the balls have shown."""
+COLOUR_RANGE = (-1.0, 3.0)
+BEYOND_SLOPE = 1.1
+"""Slopes beyond the steepest that the balls have shown, times this, are extrapolated."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorCurve:
+    """How far slopes and depths of presses that were left out are off.
+
+    Attributes
+    ----------
+    slopes : (nodes,)
+        Size of the slope, rising from 0.
+    slope_sd : (nodes,)
+        Root mean square error of a slope's component there.
+    depth_share : float
+        Relative error of a press's height, root mean square.
+    depth_floor_mm : float
+        Root mean square of the depth where nothing touches.
+    """
+
+    slopes: Array
+    slope_sd: Array
+    depth_share: float
+    depth_floor_mm: float
+
+
+@dataclass(frozen=True)
+class InPlaceModel:
+    """A closed sensor's membrane: its background, and slope by change of colour and place.
+
+    Attributes
+    ----------
+    grid : WorkingGrid
+        Nodes and scale.
+    background : (rows, columns, 3) float32
+        Linear light of the untouched membrane on the grid.
+    coefficients : (terms, 2)
+        Of the polynomial to d(depth)/dx and d(depth)/dy.
+    seen_colours : (cells, cells, cells) float32
+        1 where the balls have shown such a change of colour, else 0.
+    steepest : float
+        Largest slope that the balls have shown.
+    errors : ErrorCurve
+        Of presses that were left out.
+    follow_gain : bool
+        Whether each frame's common brightness is divided out.
+    scale_sd : float
+        Relative standard deviation of `grid.mm_per_px`.
+    """
+
+    grid: WorkingGrid
+    background: Map
+    coefficients: Array
+    seen_colours: Map
+    steepest: float
+    errors: ErrorCurve
+    follow_gain: bool = False
+    scale_sd: float = 0.0
+
+    @cached_property
+    def reference(self) -> Reference:
+        """The background, smoothed."""
+        return reference(self.background)
+
+    def change(self, rgb: Map) -> ColourChange:
+        """Return the change of colour that a camera image (height, width, 3) shows."""
+        return colour_change(self.grid.reduce(rgb), self.reference, follow_gain=self.follow_gain)
+
+    def slopes(self, change: Map, workers: RowWorkers | None = None) -> tuple[Map, Map]:
+        """Return d(depth)/dx and d(depth)/dy (rows, columns) of a change of colour."""
+        return evaluate(self.coefficients, change, workers, rows=self._rows)
+
+    @cached_property
+    def _rows(self) -> Map:
+        return row_coefficients(self.coefficients, place_axes(*self.grid.shape)[1])
+
+    def extrapolated(self, change: Map, slope_x: Map, slope_y: Map) -> Mask:
+        """Return where slope or colour is beyond what the balls have shown."""
+        found = np.empty(slope_x.shape, np.bool_)
+        steepest = np.float32((BEYOND_SLOPE * self.steepest) ** 2)
+        scale = np.float32(COLOUR_CELLS / (COLOUR_RANGE[1] - COLOUR_RANGE[0]))
+        low = np.float32(COLOUR_RANGE[0])
+        _beyond(change, slope_x, slope_y, self.seen_colours, low, scale, steepest, found)
+        return found
+
+
+def evaluate(
+    coefficients: Array,
+    change: Map,
+    workers: RowWorkers | None = None,
+    *,
+    rows: Map | None = None,
+) -> tuple[Map, Map]:
+    """Return the slopes (rows, columns) that a polynomial gives.
+
+    Parameters
+    ----------
+    coefficients : (terms, 2)
+        Of the polynomial.
+    change : (rows, columns, 3) float32
+        Change of colour.
+    workers : RowWorkers, optional
+        Threads; by default one.
+    rows : array, optional
+        The polynomial of each row, where it is known already.
+    """
+    x, y = place_axes(*change.shape[:2])
+    rows = row_coefficients(coefficients, y) if rows is None else rows
+    slope_x = np.empty(change.shape[:2], np.float32)
+    slope_y = np.empty_like(slope_x)
+    whole = np.ascontiguousarray(change, np.float32)
+    arguments = (whole, x, rows, POWERS, slope_x, slope_y)
+    if workers is None:
+        evaluate_rows(0, len(whole), *arguments)
+    else:
+        workers.run(len(whole), evaluate_rows, *arguments)
+    return slope_x, slope_y
+
+
+def colour_cells(change: Map) -> NDArray[np.int32]:
+    """Return the cell (..., 3) of a change of colour."""
+    low, high = COLOUR_RANGE
+    cell = (change - np.float32(low)) * np.float32(COLOUR_CELLS / (high - low))
+    np.clip(cell, 0, COLOUR_CELLS - 1, out=cell)
+    return np.asarray(cell, np.int32)
+
+
+@numba.njit(nogil=True, cache=True)
+def _cell(value, low, scale, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    place = (value - low) * scale
+    if not place > np.float32(0.0):  # also what is no number
+        return 0
+    return min(int(min(place, np.float32(last))), last)
+
+
+@numba.njit(nogil=True, cache=True)
+def _beyond(change, slope_x, slope_y, seen, low, scale, steepest, found):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Write where a slope's square is above `steepest`, or the cell of the colour is not `seen`."""
+    rows, columns = slope_x.shape
+    last = seen.shape[0] - 1
+    for i in range(rows):
+        for j in range(columns):
+            r = _cell(change[i, j, 0], low, scale, last)
+            g = _cell(change[i, j, 1], low, scale, last)
+            b = _cell(change[i, j, 2], low, scale, last)
+            x, y = slope_x[i, j], slope_y[i, j]
+            shown = seen[r, g, b] > 0.0
+            found[i, j] = x * x + y * y > steepest or not shown

@@ -1,0 +1,1 @@
+"""From slopes to depth: the Poisson equation, plain and weighted."""

@@ -1,0 +1,1 @@
+"""The near-light model: one solver for every scale and region."""

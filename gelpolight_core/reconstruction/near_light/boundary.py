@@ -1,0 +1,191 @@
+"""Where depth 0 is held at the boundary of a solved region, decided by the solved depth.
+
+Depth 0 just outside is right where the membrane is at rest. Where a contact crosses the boundary it
+is wrong (PHYSICS, integration), and the brightness does not show it: a flat face looks almost like
+the bare membrane. So the first round is integrated with depth 0 all around. If depth is left next
+to the boundary, it is integrated once more with all of the field's boundary free: what then lies
+above the lowest level is pressed and stays free, and the rest is held again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reconstruction.near_light.region import Region
+
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+STRIP_MM = 0.5
+"""Width of the strip next to the boundary whose depth is judged."""
+LEFT_MM, LEFT_SHARE = 0.005, 0.01
+"""Depth left in the strip, and share of the deepest, from which on a contact reaches it. Ordinary
+drape is cut off at less; a contact that crosses leaves half its depth."""
+PRESSED_SHARE = 0.1
+"""Share of the deepest boundary depth from which on a node of the free boundary is pressed: more
+than the lights of the first round err by. Drape that is less falls to 3 um over `REACH_MM`."""
+REACH_MM = 2.5
+"""The boundary is free as far around pressed nodes: 3.5 decay lengths of 0.7 mm of drape."""
+LOWEST_PERCENT = 5.0
+"""Percentile of the depth that is taken for membrane at rest, where the boundary is free."""
+ONE_SIDED_SD = 0.03
+"""Relative error of depths behind a straight wall, by the share of the boundary that is free: at
+a half 1.3 % at full scale was seen where the noise states 0.1 %. Around a closed outline the errors
+of walls that face different lights cancel; behind one wall they do not."""
+HOLLOW_SHARE = 0.25
+"""Membrane at rest is never this share of the deepest above the boundary; its bulge around a
+contact is far less."""
+LEAST_HELD = 0.1
+"""A boundary held over a smaller share is no anchor that can be relied on."""
+
+
+class Boundary(NamedTuple):
+    """How the boundary of a region is treated, at the coarsest scale.
+
+    Attributes
+    ----------
+    free : (rows, columns) bool or None
+        Where a contact crosses the boundary of the field; None where none does.
+    cut : bool
+        Whether depth is left where the region ends inside the field: the region is too small.
+    rest : (rows, columns) bool or None
+        Where the lowest depth is taken for membrane at rest, because too little of the boundary
+        is; None where depth 0 at the boundary is the anchor.
+    level_sd_mm : float
+        How far all depths may be off together; 0 where the boundary is the anchor.
+    depth_sd : float
+        Relative standard deviation of depths that are integrated across the walls of one side
+        only; it grows with the share of the field's boundary that is free.
+    """
+
+    free: Mask | None = None
+    cut: bool = False
+    rest: Mask | None = None
+    level_sd_mm: float = 0.0
+    depth_sd: float = 0.0
+
+    def levelled(self, depth_mm: Map) -> Map:
+        """Return a depth (rows, columns) of any scale with its membrane at rest at 0."""
+        if self.rest is None:
+            return depth_mm
+        step = depth_mm.shape[0] // self.rest.shape[0]
+        level = np.percentile(depth_mm[::step, ::step][self.rest], LOWEST_PERCENT)
+        return np.asarray(depth_mm - np.float32(level))
+
+
+class Strips(NamedTuple):
+    """Strips (rows, columns) next to the boundary of a region.
+
+    Attributes
+    ----------
+    inside : bool
+        All of the field.
+    rim : bool
+        Inside the field, next to its boundary.
+    beyond : bool
+        `rim`, and all that lies outside the field.
+    inner : bool
+        Next to where the region ends inside the field.
+    rim_nodes : int
+        Nodes of such a strip around the whole field.
+    """
+
+    inside: Mask
+    rim: Mask
+    beyond: Mask
+    inner: Mask
+    rim_nodes: int
+
+
+def rim_distance_mm(inside: Mask, pitch_mm: float) -> Map:
+    """Return how far nodes (rows, columns) are from the nearest one outside the field or grid."""
+    padded = np.pad(inside.astype(np.uint8), 1)
+    return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, 5)[1:-1, 1:-1] * pitch_mm)
+
+
+def region_strips(distance_mm: Map, region: Region, pitch_mm: float) -> Strips:
+    """Return the strips of a region.
+
+    Parameters
+    ----------
+    distance_mm : (grid rows, grid columns)
+        As :func:`rim_distance_mm` returns it.
+    region : Region
+        Of the grid.
+    pitch_mm : float
+        Distance between nodes.
+    """
+    (top, left), (rows, columns) = region.corner, region.shape
+    here = distance_mm[top : top + rows, left : left + columns]
+    # The nodes next to the boundary are one pitch from those outside.
+    reach_mm = max(STRIP_MM, pitch_mm)
+    beyond = here <= reach_mm
+    around = int(np.count_nonzero((distance_mm > 0.0) & (distance_mm <= reach_mm)))
+    width = max(round(STRIP_MM / pitch_mm), 1)
+    inner = np.zeros(region.shape, bool)
+    if top > 0:
+        inner[:width] = True
+    if left > 0:
+        inner[:, :width] = True
+    if top + rows < distance_mm.shape[0]:
+        inner[-width:] = True
+    if left + columns < distance_mm.shape[1]:
+        inner[:, -width:] = True
+    inside = here > 0.0
+    return Strips(inside, beyond & inside, beyond, inner & ~beyond, around)
+
+
+def find_boundary(
+    held_mm: Map, strips: Strips, integrate: Callable[[Mask | None], Map], pitch_mm: float
+) -> Boundary:
+    """Return where the boundary is free.
+
+    Parameters
+    ----------
+    held_mm : (rows, columns)
+        Depth of the first round, with depth 0 held all around.
+    strips : Strips
+        Of the region.
+    integrate : callable (free) -> depth
+        Integrates the same slopes with the boundary free where a mask (rows, columns) says so.
+    pitch_mm : float
+        Distance between nodes.
+    """
+    if not (_left(held_mm, strips.rim) or _hollow(held_mm)):
+        return Boundary(cut=_left(held_mm, strips.inner))
+    ends_inside = bool(strips.inner.any())
+    open_mm = integrate(strips.beyond)
+    # Where the region ends inside the field, the membrane there is at rest.
+    lowest = 0.0 if ends_inside else np.percentile(open_mm[strips.inside], LOWEST_PERCENT)
+    above_mm = open_mm - np.float32(lowest)
+    highest_mm = float(above_mm[strips.rim].max(initial=0.0))
+    pressed = strips.rim & (above_mm > max(LEFT_MM, PRESSED_SHARE * highest_mm))
+    if not pressed.any():
+        return Boundary(cut=_left(held_mm, strips.inner))
+    size = 2 * max(round(REACH_MM / pitch_mm), 1) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    free = (cv2.dilate(pressed.astype(np.uint8), disc) > 0) & strips.beyond
+    share = np.count_nonzero(strips.rim & free) / strips.rim_nodes
+    if ends_inside:
+        cut = _left(integrate(free), strips.inner)
+        return Boundary(free, cut, depth_sd=ONE_SIDED_SD * share)
+    if share > 1.0 - LEAST_HELD:
+        return Boundary(strips.beyond, rest=strips.inside, level_sd_mm=highest_mm)
+    return Boundary(free, depth_sd=ONE_SIDED_SD * share)
+
+
+def _hollow(depth_mm: Map) -> bool:
+    """Return whether a part lies above the boundary, which shows that the boundary is pressed."""
+    return float(depth_mm.min()) < -max(LEFT_MM, HOLLOW_SHARE * float(depth_mm.max()))
+
+
+def _left(depth_mm: Map, strip: Mask) -> bool:
+    """Return whether depth is left in a strip."""
+    if not strip.any():
+        return False
+    deepest = float(np.abs(depth_mm).max())
+    return float(np.abs(depth_mm[strip]).max()) > LEFT_MM + LEFT_SHARE * deepest

@@ -1,0 +1,334 @@
+"""Where an image differs from the background: found on blocks of raw pixels, before any solve.
+
+A deep contact changes the light of single blocks. A shallow one changes it by less than a block's
+noise, but over the whole width of its drape: averages over wider areas show it. The smallest depth
+that is found this way is stated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.masks import CONTACT_CHANGE, CONTACT_SIGMAS, LEAST_LIGHT, lit
+from gelpolight_core.optics.refraction import camera_to_membrane
+from gelpolight_core.reconstruction.near_light.sampling import block_means
+from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.sensor_calibration import Calibration, FullModel
+
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+BLOCK_MM = 0.2
+# A press changes the light from the surroundings too, far from itself and without any slope.
+CHANGE_BY_BOUNCE = 6e-3
+# Of the nine blocks about one, so that a hot pixel is no contact.
+NEIGHBOURS = 3
+AREAS_MM = (0.6, 1.4)
+"""Widths of the areas over which a shallow contact is looked for: the drape's, and twice that."""
+AREA_CHANGE = 2.5e-3
+"""Change of an area's light, less the change of all the field, that is below any contact's: LEDs
+that warm up unevenly make as much."""
+AREA_SIGMAS = 6.0
+"""Half a million areas of noise give less than one in a thousand images by chance."""
+MEDIAN_OF_NOISE = 0.6745
+"""Median size of normal noise, in standard deviations."""
+STATED_NOISE = 1.4
+"""A calibration states the noise of resampled images; raw pixels have as many times more."""
+VISIBLE_PERCENT = 90.0
+"""The smallest visible depth holds for this share of the field."""
+# Raw pixels between the places at which the optics is followed.
+STRIDE = 8
+# Blocks between those from which the field's median is taken.
+THIN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """The part of the membrane that differs from the background.
+
+    Attributes
+    ----------
+    low, high : tuple of 2 floats
+        Its corners (x, y) in the sensor frame, mm, without a margin.
+    share : float
+        Of the blocks that differ.
+    """
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """Averages over squares of blocks, in which shallow contacts are looked for.
+
+    Attributes
+    ----------
+    blocks : int
+        Along a side; odd.
+    limit : (rows, columns, 3) float32
+        Share of the light that counts; infinite where the background is not known.
+    """
+
+    blocks: int
+    limit: Map
+
+
+@dataclass(frozen=True, slots=True)
+class ContactFinder:
+    """The background in blocks of raw pixels.
+
+    Attributes
+    ----------
+    block : int
+        Raw pixels along a side.
+    expected : (rows, columns, 3) float32
+        Mean of the block without contact, as the camera gives it, 0..1.
+    limit : (rows, columns, 3) float32
+        Change that counts; infinite where the background is not known.
+    per_light, most : (rows, columns, 3) float32
+        One over `expected`, and the largest share that a block adds to an area; 0 where the
+        background is not known.
+    points_mm : (rows, columns, 2) float64
+        Place on the membrane.
+    areas : tuple of Area
+        For shallow contacts.
+    beside_mm : float
+        How far from a deep contact a shallow one is another; nearer it is the deep one's drape.
+    visible_mm : float
+        Smallest depth of a flat face that is found over most of the field; smaller relief is taken
+        for noise.
+    response : CameraResponse or None
+        How the camera encodes light; None: linearly.
+    """
+
+    block: int
+    expected: Map
+    limit: Map
+    per_light: Map
+    most: Map
+    points_mm: NDArray[np.float64]
+    areas: tuple[Area, ...]
+    beside_mm: float
+    visible_mm: float
+    response: CameraResponse | None
+
+    def find(
+        self, frame: NDArray[Any], workers: RowWorkers, gain: NDArray[np.float64] | None = None
+    ) -> Contact | None:
+        """Return where a raw frame differs, or None where it does nowhere.
+
+        Parameters
+        ----------
+        frame : (height, width, 3)
+            Raw image.
+        workers : RowWorkers
+            Threads.
+        gain : (3,), optional
+            Light of each channel over that at calibration.
+        """
+        change = means(frame, self.block, workers) - self._expected(gain)
+        found = _among_others(_in_any(np.abs(change) > self.limit))
+        shallow = self._shallow(change)
+        if shallow is not None and found.any():
+            low, high = _corners(self.points_mm[found])
+            points = self.points_mm[shallow]
+            away = np.maximum(low - points, points - high).max(axis=1)
+            shallow[shallow] = away > self.beside_mm
+        found = found if shallow is None else found | shallow
+        if not found.any():
+            return None
+        low, high = _corners(self.points_mm[found])
+        known = np.isfinite(self.limit[..., 0]).sum()
+        return Contact(
+            (float(low[0]), float(low[1])),
+            (float(high[0]), float(high[1])),
+            float(np.count_nonzero(found) / max(known, 1)),
+        )
+
+    def _expected(self, gain: NDArray[np.float64] | None) -> Map:
+        if gain is None:
+            return self.expected
+        if self.response is None:
+            return np.asarray(self.expected * gain, np.float32)
+        light = np.empty_like(self.expected)
+        for k, curve in enumerate(self.response.curves):
+            levels = np.linspace(0.0, 1.0, curve.size)
+            light[..., k] = gain[k] * np.interp(self.expected[..., k], levels, curve)
+        return _encoded(light, self.response)
+
+    def _shallow(self, change: Map) -> Mask | None:
+        """Return where the average over an area (rows, columns) differs; None where none does."""
+        share = change * self.per_light
+        # No single block decides: a hot pixel or a speck counts as much as the noise may.
+        np.minimum(share, self.most, out=share)
+        np.maximum(share, -self.most, out=share)
+        thin = np.s_[::THIN, ::THIN]
+        known = self.most[thin][..., 0] > 0.0
+        if known.any():
+            # The LEDs' common change is no contact.
+            share -= np.median(share[thin][known], axis=0) * (self.per_light > 0.0)
+        found = None
+        for area in self.areas:
+            side = (area.blocks, area.blocks)
+            z = np.abs(cv2.blur(share, side, borderType=cv2.BORDER_CONSTANT)) / area.limit
+            # An image that is noisier than the calibration says has its own limit.
+            usual = float(np.median(z[thin][known])) if known.any() else 0.0
+            differs = z > max(usual * AREA_SIGMAS / MEDIAN_OF_NOISE, 1.0)
+            if differs.any():
+                found = _in_any(differs) if found is None else found | _in_any(differs)
+        return None if found is None else _among_others(found)
+
+
+def _among_others(blocks: Mask) -> Mask:
+    """Return where enough of the nine blocks about one are true."""
+    count = blocks.astype(np.uint8)
+    cv2.boxFilter(count, -1, (3, 3), count, normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return np.asarray(count >= NEIGHBOURS)
+
+
+def _in_any(channels: Mask) -> Mask:
+    """Return where one of three channels (rows, columns, 3) is true."""
+    return np.asarray(channels[..., 0] | channels[..., 1] | channels[..., 2])
+
+
+def _corners(points_mm: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the corners of the rectangle around points (N, 2)."""
+    return points_mm.min(axis=0), points_mm.max(axis=0)
+
+
+def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: float) -> ContactFinder:
+    """Bring a calibration's background into the camera's image, in blocks."""
+    camera, table = calibration.camera, calibration.table
+    grid = table.grid
+    block = max(round(BLOCK_MM / grid.pitch_mm), 1)
+    places = _points(calibration)
+    u, v = (
+        np.arange(n, dtype=np.float32) / np.float32(STRIDE) for n in (camera.width, camera.height)
+    )
+    map_u, map_v = np.meshgrid(u, v)
+    points: Map = np.asarray(
+        cv2.remap(places.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR), np.float32
+    )
+    origin = np.array([grid.x_mm[0], grid.y_mm[0]])
+    index = ((points - origin) / grid.pitch_mm).astype(np.float32)
+    known = table.valid & lit(full.background)
+
+    def seen(values: NDArray[Any]) -> Map:
+        return np.asarray(
+            cv2.remap(
+                np.asarray(values, np.float32),
+                np.ascontiguousarray(index[..., 0]),
+                np.ascontiguousarray(index[..., 1]),
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_CONSTANT,
+            )
+        )
+
+    light = seen(full.background) @ calibration.crosstalk.T.astype(np.float32)
+    picture = _encoded(light, calibration.response)
+    rows, columns = camera.height // block, camera.width // block
+
+    def blocks(values: Map) -> Map:
+        cut = np.ascontiguousarray(values[: rows * block, : columns * block])
+        return np.asarray(cv2.resize(cut, (columns, rows), interpolation=cv2.INTER_AREA))
+
+    expected = blocks(picture)
+    # The background was resampled on its way here: what another blur changes is not to be trusted.
+    blurred = cv2.GaussianBlur(picture, (0, 0), 1.0)
+    unsure = np.abs(blocks(np.asarray(blurred, np.float32)) - expected)
+    least = CONTACT_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
+    core = cv2.erode(known.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0)
+    inside = blocks(seen(core)) > 0.999
+    # Stated at the median brightness; it grows with the light, and the background has its own.
+    median = np.median(expected[inside], axis=0) if inside.any() else np.ones(3)
+    noise = calibration.noise * np.sqrt(2.0 * np.maximum(expected / median, 1.0))
+    limit = np.maximum(least * expected, CONTACT_SIGMAS / block * noise) + 2.0 * unsure
+    per_light = np.where(inside[..., None], 1.0 / np.maximum(expected, LEAST_LIGHT), 0.0)
+    most = (limit * per_light).astype(np.float32)
+    limit[~inside] = np.inf
+    middle = blocks(points).astype(np.float64)
+    side_mm = block * grid.pitch_mm
+    areas = []
+    for width_mm in AREAS_MM:
+        side = 2 * round(0.5 * (width_mm / side_mm - 1.0)) + 1
+        # The darkest part of an area is its noisiest.
+        variance = np.maximum(cv2.blur((noise * per_light) ** 2, (side, side)), 0.0)
+        change = AREA_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
+        share = np.maximum(change, AREA_SIGMAS / (block * side) * np.sqrt(variance))
+        share += 2.0 / side * unsure * per_light
+        share[~inside] = np.inf
+        areas.append(Area(side, share.astype(np.float32)))
+    return ContactFinder(
+        block,
+        expected,
+        limit.astype(np.float32),
+        per_light.astype(np.float32),
+        most,
+        middle,
+        tuple(areas),
+        beside_mm,
+        _visible_mm(full, middle, areas, side_mm),
+        calibration.response,
+    )
+
+
+def _visible_mm(
+    full: FullModel, points_mm: NDArray[np.float64], areas: list[Area], side_mm: float
+) -> float:
+    """Return the depth of a flat face whose drape changes an area's light by the limit.
+
+    The drape around a face d deep has the slope d / decay at the edge and falls by e over the
+    decay length. A slope changes the light of a matt membrane by its product with the tangent of
+    the light's angle from the vertical, where the membrane falls towards the light or away.
+    """
+    known = np.isfinite(areas[0].limit).all(axis=2)
+    if not known.any():
+        return np.inf
+    points = points_mm[known][::THIN]
+    led = full.led_positions_mm
+    across = np.linalg.norm(led[:, :2] - points[:, None, :], axis=2)
+    tangent = across / np.abs(led[:, 2])
+    decay, found = full.decay_mm, []
+    for area in areas:
+        width = area.blocks * side_mm
+        mean = decay / width * (1.0 - np.exp(-width / decay))
+        slope = area.limit[known][::THIN] / np.maximum(tangent * mean, 1e-6)
+        found.append(decay * slope.min(axis=1))
+    return STATED_NOISE * float(np.percentile(np.min(found, axis=0), VISIBLE_PERCENT))
+
+
+def means(frame: NDArray[Any], block: int, workers: RowWorkers) -> Map:
+    """Return the means (rows, columns, 3) of blocks of a raw frame, 0..1 of its scale."""
+    rows, columns = frame.shape[0] // block, frame.shape[1] // block
+    result = np.empty((rows, columns, 3), np.float32)
+    scale = np.float32(1.0 if frame.dtype.kind == "f" else 1.0 / np.iinfo(frame.dtype).max)
+    flat = frame.reshape(frame.shape[0], -1)
+    workers.run(rows, block_means, flat, scale, block, result)
+    return result
+
+
+def _points(calibration: Calibration) -> NDArray[np.float64]:
+    """Return places on the membrane (rows, columns, 2) of every `STRIDE`-th raw pixel."""
+    camera = calibration.camera
+    u = np.arange(0, camera.width + STRIDE, STRIDE, dtype=np.float64)
+    v = np.arange(0, camera.height + STRIDE, STRIDE, dtype=np.float64)
+    pixels = np.stack(np.meshgrid(u, v), axis=-1)
+    points, _ = camera_to_membrane(camera.directions(pixels), calibration.plane, calibration.stack)
+    return np.where(np.isfinite(points), points, 1e6)
+
+
+def _encoded(light: Map, response: CameraResponse | None) -> Map:
+    """Return linear light as the camera encodes it."""
+    if response is None:
+        return np.asarray(light, np.float32)
+    encoded = np.empty_like(light)
+    for k, curve in enumerate(response.curves):
+        encoded[..., k] = np.interp(light[..., k], curve, np.linspace(0.0, 1.0, curve.size))
+    return encoded

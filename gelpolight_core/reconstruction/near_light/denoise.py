@@ -1,0 +1,223 @@
+"""Quiet the even parts of an image and leave its edges alone.
+
+A normal is not a linear function of the image: near an LED's mirror image a channel hardly
+changes with the slope, and noise there tilts the surface to one side instead of both. Averaging a
+few pixels before the solve removes that. On walls and edges, where averaging would cost
+sharpness and the signal is strong, the image is used as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reconstruction.near_light.structures import Picture
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+Map = NDArray[np.float32]
+QUIET_PX = 1.2
+WIDER_PX = (2.4, 4.8, 9.6)
+SAMPLES = 8000
+"""Nodes from which the image's noise is estimated."""
+LEAST = np.float32(1e-9)
+USABLE = np.float32(1e-6)
+"""Background of a node that is usable; of others the noise is unknown."""
+CALM = 0.01
+"""Relative noise below which the curvature of normals over brightness tilts nothing that shows."""
+SILENT = 1e-3
+"""Relative noise below which denoising changes nothing that shows, and is left out."""
+SIGNIFICANT = 4.0
+LOUD, FEW = 1.25, 1e-3
+"""Wider averages are left out where so few even nodes have so many times `CALM`, or fewer."""
+EVEN = 0.5
+"""Share that an even part may at most keep of itself."""
+
+_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+_single = np.float32
+
+
+def quieted(
+    picture: Picture,
+    sd: tuple[np.float32, ...],
+    workers: RowWorkers,
+    take: Callable[..., NDArray[Any]],
+) -> Map | None:
+    """Average the even parts of press over background, and note the noise that is left.
+
+    Press and background are averaged alike, so that neither the fall of the light nor a speck of
+    the membrane shows in their ratio. Where little light leaves more noise than `CALM`, wider
+    averages are used, as far as the image is even over them.
+
+    Parameters
+    ----------
+    picture : Picture
+        At full scale; its noise is `sd` over the background. Ratio and noise are overwritten.
+    sd : 3 floats
+        Noise of press minus background.
+    workers : RowWorkers
+        Threads.
+    take : callable
+        Lends work arrays.
+
+    Returns
+    -------
+    (rows, columns) float32 or None
+        How far each node was left as it is by the narrowest average, 0..1; None where the image
+        is so quiet that nothing was averaged.
+    """
+    ratio, noise = picture.ratio, picture.noise
+    rows, columns = picture.marks.shape
+    light, base = take("light", ratio.shape), take("base", ratio.shape)
+    workers.run(rows, _parted, ratio, noise, sd, light, base)
+    room = [take(name, light.shape) for name in ("quiet light", "quiet base")]
+    narrow = tuple(_average(m, QUIET_PX, r) for m, r in zip((light, base), room, strict=True))
+    own = _own_noise(light, base, narrow[0])
+    if own is None or _relative(own, base) < SILENT:
+        return None
+    kept: Map | None = None
+    edge = take("edge", (rows, columns))
+    for width in (QUIET_PX, *WIDER_PX):
+        if kept is not None and not _noisy(noise, base, kept):
+            break
+        wide = tuple(_average(m, 2.0 * width, np.empty_like(m)) for m in (light, base))
+        workers.run(rows, _excess, narrow, wide, base, own, _left(width), edge)
+        reach = 2 * round(2.0 * width / QUIET_PX) + 1
+        grown = np.asarray(cv2.dilate(edge, np.ones((reach, reach), np.uint8)), np.float32)
+        spread = np.empty_like(edge)
+        _blurred(grown, 1.5 * width / QUIET_PX, spread)
+        share = _single(1.0 / (2.0 * np.sqrt(np.pi) * width))
+        everywhere = width == QUIET_PX
+        workers.run(rows, _mixed, narrow, spread, base, sd, share, everywhere, ratio, noise)
+        narrow = wide
+        kept = spread if kept is None else kept
+    return kept
+
+
+def _own_noise(light: Map, base: Map, average: Map) -> tuple[Map, Map] | None:
+    """Return a pixel's noise as variance without light, and per unit of light, (3,) each.
+
+    Robust, from the darker and the brighter third of what is usable; None where nothing is.
+    """
+    step = max(int(np.sqrt(light[0].size / SAMPLES)), 1)
+    thin = np.s_[step // 2 :: step, step // 2 :: step]
+    read, shot = np.zeros(3, np.float32), np.zeros(3, np.float32)
+    for k in range(3):
+        usable = base[k][thin] > USABLE
+        if not usable.any():
+            return None
+        seen = light[k][thin][usable]
+        off = np.abs(seen - average[k][thin][usable])
+        dark, bright = np.percentile(seen, [33.0, 67.0])
+        low, high = seen <= dark, seen >= bright
+        variance = [(1.4826 * np.median(off[part])) ** 2 for part in (low, high)]
+        level = [np.median(seen[part]) for part in (low, high)]
+        shot[k] = max((variance[1] - variance[0]) / max(level[1] - level[0], LEAST), 0.0)
+        read[k] = max(variance[0] - shot[k] * level[0], LEAST)
+    return read, shot
+
+
+def _relative(own: tuple[Map, Map], base: Map) -> float:
+    """Return the noise of press over background at the darker end of the light."""
+    worst = 0.0
+    for k, (read, shot) in enumerate(zip(*own, strict=True)):
+        thin = base[k][::8, ::8]
+        level = float(np.percentile(thin[thin > USABLE], 10.0))
+        worst = max(worst, float(np.sqrt(read + shot * level)) / level)
+    return worst
+
+
+def _left(width_px: float) -> np.float32:
+    """Return what differs significantly: white noise of sd 1 leaves this between two averages."""
+    wide = 2.0 * width_px
+    left = np.sqrt(1.0 / width_px**2 + 1.0 / wide**2 - 4.0 / (width_px**2 + wide**2))
+    return _single(SIGNIFICANT * left / np.sqrt(4.0 * np.pi))
+
+
+def _average(planes: Map, width_px: float, result: Map) -> Map:
+    for plane, target in zip(planes, result, strict=True):
+        _blurred(plane, width_px, target)
+    return result
+
+
+def _blurred(plane: Map, width_px: float, result: Map) -> None:
+    """Write the average over a Gaussian; wide ones are computed on blocks of pixels."""
+    block = int(width_px / QUIET_PX / 2.0)
+    if block < 2:
+        cv2.GaussianBlur(plane, (0, 0), width_px, result)
+        return
+    rows, columns = plane.shape
+    size = (-(-columns // block), -(-rows // block))
+    small = cv2.resize(plane, size, interpolation=cv2.INTER_AREA)
+    # The blocks themselves average already.
+    spread_px = np.sqrt(width_px**2 - (block**2 - 1.0) / 12.0) / block
+    small = cv2.GaussianBlur(small, (0, 0), float(spread_px))
+    cv2.resize(small, (columns, rows), result, interpolation=cv2.INTER_LINEAR)
+
+
+def _noisy(noise: Map, base: Map, edge: Map) -> bool:
+    """Return whether even parts have more noise than `CALM`; edges are left as they are."""
+    thin = np.s_[..., ::2, ::2]
+    loud = (noise[thin] > LOUD * CALM) & (base[thin] > USABLE) & (edge[thin] < EVEN)
+    return bool(np.count_nonzero(loud) > FEW * loud[0].size)
+
+
+@_whole
+def _parted(first, last, ratio, noise, sd, light, base):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Write light and background of each node; next to 0 where it is not usable."""
+    for i in range(first, last):
+        for k in range(3):
+            r, n, l, b = ratio[k, i], noise[k, i], light[k, i], base[k, i]  # noqa: E741
+            own = sd[k]
+            for j in range(r.shape[0]):
+                below = own / n[j]
+                b[j] = below
+                l[j] = r[j] * below
+
+
+@_whole
+def _excess(first, last, narrow, wide, base, own, limit, edge):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Write how far two averages differ beyond what noise makes of them, 0..1."""
+    (light, below), (wide_light, wide_below) = narrow, wide
+    least, none, one = _single(LEAST), _single(0.0), _single(1.0)
+    line = np.empty(edge.shape[1], np.float32)
+    for i in range(first, last):
+        line[:] = none
+        for k in range(3):
+            read, shot = own[0][k], own[1][k]
+            a, b, c, d = light[k, i], below[k, i], wide_light[k, i], wide_below[k, i]
+            known = base[k, i]
+            for j in range(line.shape[0]):
+                # |a / b - c / d| over limit * sqrt(variance) / b
+                variance = read + shot * (a[j] if a[j] > none else none)
+                off = abs(a[j] * d[j] - c[j] * b[j])
+                excess = off / (limit * np.sqrt(variance) * d[j] + least) - one
+                excess = excess if known[j] > USABLE else none
+                line[j] = excess if excess > line[j] else line[j]
+        for j in range(line.shape[0]):
+            edge[i, j] = line[j] if line[j] < one else one
+
+
+@_whole
+def _mixed(first, last, narrow, edge, base, sd, left, everywhere, ratio, noise):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Move ratio and noise towards the average's, where there is no edge and need of it."""
+    light, below = narrow
+    least, none, one = _single(LEAST), _single(0.0), _single(1.0)
+    per_calm = _single(1.0 / CALM)
+    always = one if everywhere else none
+    for i in range(first, last):
+        kept = edge[i]
+        for k in range(3):
+            r, n, a, b, c = ratio[k, i], noise[k, i], light[k, i], below[k, i], base[k, i]
+            own = sd[k] * left
+            for j in range(kept.shape[0]):
+                need = n[j] * per_calm - one
+                need = need if need < one else one
+                need = need if need > always else always
+                share = (one - kept[j]) * need if c[j] > USABLE else none
+                r[j] += share * (a[j] / (b[j] + least) - r[j])
+                n[j] += share * (own / (c[j] + least) - n[j])

@@ -1,0 +1,523 @@
+"""The compiled near-light solve: one normal for each node, blocks of 64 nodes at a time.
+
+For every node the surface point is placed along its refracted ray at the present depth; light
+directions, inverse square and lobe are those at that place. Press over background is compared with
+the membrane's response, and the normal is found by Gauss-Newton steps on the unit sphere. A dark or
+saturated channel is missing information: it is left out, and the two that remain decide together
+with |n| = 1. Of their two solutions the one that keeps the dark light dark is started from.
+
+The loops have no branches and run in single precision, so that the processor solves eight or
+sixteen nodes at once. Each block is copied into one small array: given many arrays, the compiler
+cannot know that they do not overlap.
+"""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+
+import numba
+import numpy as np
+
+from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
+from gelpolight_core.reconstruction.height_map import Flag
+
+STEEPEST_NZ = 0.15
+"""Normals are held to this z: steeper walls cannot be seen from above."""
+LEAST_ALONG_RAY = 0.1
+"""Below this cosine between normal and ray, scaled by the ray's length, a wall is hidden."""
+ONE_DARK_WEIGHT = 0.5
+UNSOLVED_WEIGHT = 0.01
+MODEL_ERROR = 0.03
+"""What the model does not explain of press over background; it limits a good image, not noise."""
+
+
+_B = 64
+# Planes of a block's array: what is read, what is worked with, and what is written.
+_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _KIND = 0, 3, 6, 9, 12, 13, 17
+_SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE = 18, 21, 24, 33, 36
+_TRUST, _FLAG, _MOVED, _PLANES = 38, 39, 40, 41
+_single = np.float32
+_0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
+_PI = _single(pi)
+_LEAST_COSINE, _LEAST_VIEW = _single(1e-3), _single(1e-2)
+_STEEPEST = _single(STEEPEST_NZ)
+_LEVEL = _single(sqrt(1.0 - STEEPEST_NZ**2))
+_LEAST_ALONG = _single(LEAST_ALONG_RAY)
+_LEAST_DISTANCE = _single(0.1)
+_ONE_DARK, _UNSOLVED = _single(ONE_DARK_WEIGHT), _single(UNSOLVED_WEIGHT)
+_MODEL2 = _single(MODEL_ERROR**2)
+_SIGMAS, _SHARE = _single(DARK_SIGMAS), _single(DARK_SHARE)
+_LONGEST = _single(0.3)
+_DAMP, _TINY = _single(1e-6), _single(1e-12)
+_F_OUTSIDE, _F_SATURATED = _single(Flag.OUTSIDE), _single(Flag.SATURATED)
+_F_DARK, _F_HIDDEN = _single(Flag.DARK), _single(Flag.NOT_OBSERVABLE)
+_F_FAR, _F_INVALID = _single(Flag.EXTRAPOLATED), _single(Flag.INVALID)
+
+_part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
+_whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+
+
+@_part
+def _most(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a if a > b else b
+
+
+@_part
+def _least(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a if a < b else b
+
+
+@_part
+def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the diffuse share at a cosine, and its derivative."""
+    if table is not None:
+        place = c * _single(table.shape[1] - 1)
+        below = min(int(place), table.shape[1] - 2)
+        rise = table[k, below + 1] - table[k, below]
+        return table[k, below] + (place - _single(below)) * rise, rise * _single(table.shape[1] - 1)
+    v = p[7]
+    s = v
+    v = v * c + p[6]
+    s = s * c + v
+    v = v * c + p[5]
+    s = s * c + v
+    v = v * c + p[4]
+    s = s * c + v
+    v = v * c + p[3]
+    s = s * c + v
+    v = v * c + p[2]
+    s = s * c + v
+    v = v * c + p[1]
+    s = s * c + v
+    return v * c + p[0], s
+
+
+@_part
+def _response(l, n, v, p, table, gloss, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled # noqa: E741
+    """Return the brightness under one light, and its gradient by the (free) normal.
+
+    As :meth:`Membrane.response`.
+    """
+    facing = l[0] * n[0] + l[1] * n[1] + l[2] * n[2]
+    c = _most(facing, _LEAST_COSINE)
+    f, by_c = _curve(_least(c, _1), p, table, k)
+    if gloss is None:
+        on = _1 if facing > _0 else _0
+        return f * on, by_c * l[0] * on, by_c * l[1] * on, by_c * l[2] * on
+    share, a2 = gloss
+    hx, hy, hz = l[0] + v[0], l[1] + v[1], l[2] + v[2]
+    short = _1 / sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx * short, hy * short, hz * short
+    t = _most(hx * n[0] + hy * n[1] + hz * n[2], _0)
+    s = _most(v[0] * n[0] + v[1] * n[1] + v[2] * n[2], _LEAST_VIEW)
+    b2 = _1 - a2
+    width = _1 / (_1 - t * t * b2)
+    rc = sqrt(a2 + b2 * c * c)
+    rs = sqrt(a2 + b2 * s * s)
+    lit = _1 / (c + rc)
+    shown = _1 / (s + rs)
+    # D(t) * 2c / (c + rc) * 2s / (s + rs) / (4 s)
+    lobe = share * a2 / _PI * width * width * lit * shown
+    g = lobe * c
+    on = _1 if facing > _0 else _0
+    by_c = (by_c + lobe * (_1 - c * lit * (_1 + b2 * c / rc))) * on
+    by_t = g * _single(4.0) * b2 * t * width * on
+    by_s = -g * shown * (_1 + b2 * s / rs) * on
+    return (
+        (f + g) * on,
+        by_c * l[0] + by_t * hx + by_s * v[0],
+        by_c * l[1] + by_t * hy + by_s * v[1],
+        by_c * l[2] + by_t * hz + by_s * v[2],
+    )
+
+
+@_part
+def _limited(nx, ny, nz):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the normal at unit length and not steeper than can be seen."""
+    size = _1 / sqrt(nx * nx + ny * ny + nz * nz + _TINY)
+    nx, ny, nz = nx * size, ny * size, nz * size
+    stretch = _LEVEL / sqrt(nx * nx + ny * ny + _TINY)
+    steep = nz > -_STEEPEST
+    return (
+        nx * stretch if steep else nx,
+        ny * stretch if steep else ny,
+        -_STEEPEST if steep else nz,
+    )
+
+
+@_part
+def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a light's direction at the present depth, and r^3 / z of its near-light gain.
+
+    A surface at the height of the light or beyond is treated as lit from just below it.
+    """
+    ax, ay = led[0] - x, led[1] - y
+    az = _least(led[2] + d, -_LEAST_DISTANCE)
+    r2 = ax * ax + ay * ay + az * az
+    short = _1 / sqrt(r2)
+    return (ax * short, ay * short, az * short), r2 * r2 * short / az
+
+
+@_part
+def _told(ratio, around, sigma, sat, scale, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0)."""
+    direct = ratio if bounce is None else ratio - bounce * around * _HALF * (_1 + nz)
+    direct = direct * scale
+    low = _most(dark, _least(_SIGMAS * sigma, _SHARE) * scale)
+    lit = _1 if direct >= low else _0
+    if not shadows:
+        lit = _1
+    return direct, lit, _0 if sat > _0 else lit
+
+
+@_part
+def _cross(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@_part
+def _inner(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@_part
+def _chosen(first, second, a, b, c):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a where `first`, else b where `second`, else c."""
+    x = a[0] if first else (b[0] if second else c[0])
+    y = a[1] if first else (b[1] if second else c[1])
+    z = a[2] if first else (b[2] if second else c[2])
+    return x, y, z
+
+
+@_part
+def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a first normal from equivalent cosines: three lights, or two and |n| = 1."""
+    p, q, r = _cross(l1, l2), _cross(l2, l0), _cross(l0, l1)
+    short = _1 / _inner(l0, p)
+    ax = (e0 * p[0] + e1 * q[0] + e2 * r[0]) * short
+    ay = (e0 * p[1] + e1 * q[1] + e2 * r[1]) * short
+    az = (e0 * p[2] + e1 * q[2] + e2 * r[2]) * short
+    is0, is1 = w0 == _0, w1 == _0
+    a, b, c = (
+        _chosen(is0, is1, l1, l2, l0),
+        _chosen(is0, is1, l2, l0, l1),
+        _chosen(is0, is1, l0, l1, l2),
+    )
+    ea = e1 if is0 else (e2 if is1 else e0)
+    eb = e2 if is0 else (e0 if is1 else e1)
+    bright = lit0 if is0 else (lit1 if is1 else lit2)
+    ex, ey, ez = _chosen(is0, is1, p, q, r)
+    between = _inner(a, b)
+    det = _1 / (_1 - between * between)
+    ka, kb = (ea - between * eb) * det, (eb - between * ea) * det
+    bx, by, bz = ka * a[0] + kb * b[0], ka * a[1] + kb * b[1], ka * a[2] + kb * b[2]
+    left = (_1 - bx * bx - by * by - bz * bz) / (ex * ex + ey * ey + ez * ez)
+    step = sqrt(_most(left, _single(1e-4)))
+    # Away from a dark light, towards a saturated one.
+    side = ex * c[0] + ey * c[1] + ez * c[2]
+    towards = side if bright > _0 else -side
+    step = step if towards > _0 else -step
+    one = w0 + w1 + w2 < _single(2.5)
+    return _limited(
+        bx + step * ex if one else ax,
+        by + step * ey if one else ay,
+        bz + step * ez if one else az,
+    )
+
+
+@_part
+def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight, bend):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a channel's part of the Gauss-Newton equations along two tangents of n.
+
+    The tangents are (-nz, 0, nx) and (0, -nz, ny).
+    """
+    d1 = n[0] * (gz + bend) - n[2] * gx
+    d2 = n[1] * (gz + bend) - n[2] * gy
+    w = weight / ((sigma * sigma + _MODEL2) * scale * scale)
+    e = w * (direct - f)
+    return w * d1 * d1, w * d1 * d2, w * d2 * d2, d1 * e, d2 * e
+
+
+@_part
+def _triple(w, first, j):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    return w[first * _B + j], w[(first + 1) * _B + j], w[(first + 2) * _B + j]
+
+
+@_part
+def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    w[first * _B + j] = values[0]
+    w[(first + 1) * _B + j] = values[1]
+    w[(first + 2) * _B + j] = values[2]
+
+
+@_part
+def _channels(w, j, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return what `_told` says of a node's three channels."""
+    r0, r1, r2 = _triple(w, _RATIO, j)
+    a0, a1, a2 = _triple(w, _AROUND, j)
+    g0, g1, g2 = _triple(w, _NOISE, j)
+    b0, b1, b2 = _triple(w, _MARKS, j)
+    s0, s1, s2 = _triple(w, _SCALED, j)
+    return (
+        _told(r0, a0, g0, b0, s0, dark[0], bounce, nz, shadows),
+        _told(r1, a1, g1, b1, s1, dark[1], bounce, nz, shadows),
+        _told(r2, a2, g2, b2, s2, dark[2], bounce, nz, shadows),
+    )
+
+
+@_part
+def _begin_block(w, rays, place, leds, dark, curves, table, gloss, bounce, shadows, warm):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Find lights, view and a first normal of a block's nodes.
+
+    Started `warm`, the stored normals are used where all three lights count.
+    """
+    flat = (_0, _0, -_1)
+    y, x_first, pitch = place
+    for j in range(_B):
+        d, at = w[_DEPTH * _B + j], _single(j)
+        wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
+        x = x_first + pitch * at + d * wx
+        short = _1 / sqrt(wx * wx + wy * wy + _1)
+        v = (wx * short, wy * short, -short)
+        l0, near0 = _light(leds[0], x, y + d * wy, d)
+        l1, near1 = _light(leds[1], x, y + d * wy, d)
+        l2, near2 = _light(leds[2], x, y + d * wy, d)
+        s0, s1, s2 = _triple(w, _SCALE, j)
+        _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
+        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, bounce, -_1, shadows)
+        f0 = _response(l0, flat, v, curves[0], table, gloss, 0)[0]
+        f1 = _response(l1, flat, v, curves[1], table, gloss, 1)[0]
+        f2 = _response(l2, flat, v, curves[2], table, gloss, 2)[0]
+        e0 = _least(-l0[2] * _most(d0, _0) / _most(f0, _DAMP), _1)
+        e1 = _least(-l1[2] * _most(d1, _0) / _most(f1, _DAMP), _1)
+        e2 = _least(-l2[2] * _most(d2, _0) / _most(f2, _DAMP), _1)
+        b0, b1, b2 = _triple(w, _MARKS, j)
+        nx, ny, nz = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, b0, b1, b2)
+        px, py = w[_NORMAL * _B + j], w[(_NORMAL + 1) * _B + j]
+        on = warm * (k0 + k1 + k2) > _single(2.5)
+        pz = -sqrt(_most(_1 - px * px - py * py, _TINY))
+        _put(w, _NORMAL, j, (px if on else nx, py if on else ny, pz if on else nz))
+        _put(w, _LIGHT, j, l0)
+        _put(w, _LIGHT + 3, j, l1)
+        _put(w, _LIGHT + 6, j, l2)
+        _put(w, _VIEW, j, v)
+
+
+@_part
+def _step_block(w, dark, curves, table, gloss, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Do one Gauss-Newton step at a block's nodes; return the square of the longest."""
+    for j in range(_B):
+        n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
+        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, bounce, n[2], shadows)
+        s0, s1, s2 = _triple(w, _SCALED, j)
+        g0, g1, g2 = _triple(w, _NOISE, j)
+        b0, b1, b2 = _0, _0, _0
+        if bounce is not None:
+            half = bounce * _HALF
+            a0, a1, a2 = _triple(w, _AROUND, j)
+            b0, b1, b2 = half * a0 * s0, half * a1 * s1, half * a2 * s2
+        f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)
+        a11, a12, a22, ag1, ag2 = _pull(f, gx, gy, gz, n, t0, s0, g0, k0, b0)
+        f, gx, gy, gz = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)
+        b11, b12, b22, bg1, bg2 = _pull(f, gx, gy, gz, n, t1, s1, g1, k1, b1)
+        f, gx, gy, gz = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)
+        c11, c12, c22, cg1, cg2 = _pull(f, gx, gy, gz, n, t2, s2, g2, k2, b2)
+        m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
+        h1, h2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
+        damp = _DAMP * (m11 + m22) + _TINY
+        m11, m22 = m11 + damp, m22 + damp
+        short = _1 / (m11 * m22 - m12 * m12)
+        m1, m2 = (m22 * h1 - m12 * h2) * short, (m11 * h2 - m12 * h1) * short
+        dx, dy, dz = -n[2] * m1, -n[2] * m2, n[0] * m1 + n[1] * m2
+        move = dx * dx + dy * dy + dz * dz + _TINY
+        held = _least(_LONGEST / sqrt(move), _1)
+        nx, ny, nz = _limited(n[0] + held * dx, n[1] + held * dy, n[2] + held * dz)
+        # What moved in earnest: a normal at the steepest that can be seen is pulled for ever.
+        move = (nx - n[0]) * (nx - n[0]) + (ny - n[1]) * (ny - n[1])
+        solved = (w[_KIND * _B + j] > _single(1.5)) & (k0 + k1 + k2 > _single(1.5))
+        w[_MOVED * _B + j] = move if solved else _0
+        _put(w, _NORMAL, j, (nx, ny, nz))
+    longest = _0
+    for j in range(_B):
+        longest = _most(longest, w[_MOVED * _B + j])
+    return longest
+
+
+@_part
+def _unseen(w, light, n, j, range_of, counts):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return 1 where a channel that counts has a cosine that no ball press has shown."""
+    c = _inner(_triple(w, light, j), n)
+    return counts if (c < range_of[0]) | (c > range_of[1]) else _0
+
+
+@_part
+def _end_block(w, rays, dark, bounce, coverage, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Turn a block's normals into slopes along the rays, their weights and their flags."""
+    for j in range(_B):
+        d, at = w[_DEPTH * _B + j], _single(j)
+        wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
+        n = _triple(w, _NORMAL, j)
+        # What is dark is judged with the light from around that the normal found receives.
+        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, bounce, n[2], shadows)
+        known = k0 + k1 + k2
+        solved = known > _single(1.5)
+        nx, ny, nz = n[0] if solved else _0, n[1] if solved else _0, n[2] if solved else -_1
+        along = nx * wx + ny * wy - nz
+        hidden = (nz > -_STEEPEST - _DAMP) or (along < _LEAST_ALONG)
+        trust = _1 if known > _single(2.5) else _ONE_DARK
+        trust = _UNSOLVED if hidden or not solved else trust
+        along = _1 / _most(along, _LEAST_ALONG)
+        # d_u = - n . (P0_u + d w_u) / (n . w): the surface point moves along its own ray.
+        slope_x = (
+            -(nx * (_1 + d * (rays[4] + at * rays[5])) + ny * d * (rays[6] + at * rays[7])) * along
+        )
+        slope_y = (
+            -(nx * d * (rays[8] + at * rays[9]) + ny * (_1 + d * (rays[10] + at * rays[11])))
+            * along
+        )
+        far = (
+            _unseen(w, _LIGHT, n, j, coverage[0], k0)
+            + _unseen(w, _LIGHT + 3, n, j, coverage[1], k1)
+            + _unseen(w, _LIGHT + 6, n, j, coverage[2], k2)
+        )
+        b0, b1, b2 = _triple(w, _MARKS, j)
+        invalid = w[(_MARKS + 3) * _B + j]
+        unlit = lit0 * lit1 * lit2 < _HALF
+        flag = (
+            (_F_HIDDEN if hidden else _0)
+            + (_F_SATURATED if b0 + b1 + b2 - _single(3.0) * invalid > _0 else _0)
+            + (_F_DARK if unlit else _0)
+            + (_F_FAR if solved and far > _0 else _0)
+            + _F_INVALID * invalid
+        )
+        kind = w[_KIND * _B + j]
+        usable = kind > _single(1.5)
+        w[_SLOPE * _B + j] = slope_x if usable else _0
+        w[(_SLOPE + 1) * _B + j] = slope_y if usable else _0
+        w[_TRUST * _B + j] = trust if usable else (_UNSOLVED if kind > _HALF else _1)
+        w[_FLAG * _B + j] = flag if usable else (_F_OUTSIDE + (_F_INVALID if kind > _HALF else _0))
+        w[_NORMAL * _B + j] = nx if usable else _0
+        w[(_NORMAL + 1) * _B + j] = ny if usable else _0
+
+
+@_part
+def _ray_value(rays, k, y, x):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a ray map between its nodes, continued straight beyond the outermost ones."""
+    i = min(max(int(np.floor(y)), 0), rays.shape[1] - 2)
+    j = min(max(int(np.floor(x)), 0), rays.shape[2] - 2)
+    fy, fx = _single(y - i), _single(x - j)
+    up = rays[k, i, j] + fx * (rays[k, i, j + 1] - rays[k, i, j])
+    low = rays[k, i + 1, j] + fx * (rays[k, i + 1, j + 1] - rays[k, i + 1, j])
+    return up + fy * (low - up)
+
+
+@_part
+def _ramp(rays, k, y, x, last, share):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    value = _ray_value(rays, k, y, x)
+    return value, (_ray_value(rays, k, y, last) - value) * share
+
+
+@_part
+def ray_ramps(scale, row, place, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return ray slope and its derivatives along a block of nodes: value and step of each.
+
+    Over a block they are straight lines within 1e-4. `row` and `place` are the first node's.
+    """
+    rays, step = scale.rays, scale.ray_step
+    y = (row + 0.5) * step - 0.5
+    x = (place + 0.5) * step - 0.5
+    last = (place + count - 0.5) * step - 0.5
+    share = _1 / _single(max(count - 1, 1))
+    a, a1 = _ramp(rays, 0, y, x, last, share)
+    b, b1 = _ramp(rays, 1, y, x, last, share)
+    c, c1 = _ramp(rays, 2, y, x, last, share)
+    d, d1 = _ramp(rays, 3, y, x, last, share)
+    e, e1 = _ramp(rays, 4, y, x, last, share)
+    f, f1 = _ramp(rays, 5, y, x, last, share)
+    return a, a1, b, b1, c, c1, d, d1, e, e1, f, f1
+
+
+@_part
+def _load(w, picture, depth, scale, corner, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Copy a block of row `i` into the work array."""
+    row, place = i + corner[0], begin + corner[1]
+    # Plain indices: a view of a row is counted, and threads would wait for the counter.
+    ratio, noise, around, marks = picture.ratio, picture.noise, picture.around, picture.marks
+    flat, kind = scale.flat, scale.kind
+    from_around = around.shape[2] > 1
+    for k in range(3):
+        for j in range(count):
+            w[(_RATIO + k) * _B + j] = ratio[k, i, begin + j]
+        for j in range(count):
+            w[(_NOISE + k) * _B + j] = noise[k, i, begin + j]
+        for j in range(count):
+            w[(_SCALE + k) * _B + j] = flat[k, row, place + j]
+        if from_around:
+            for j in range(count):
+                w[(_AROUND + k) * _B + j] = around[k, i, begin + j]
+    for j in range(count):
+        w[_DEPTH * _B + j] = depth[i, begin + j]
+    for j in range(count):
+        bits = marks[i, begin + j]
+        w[_MARKS * _B + j] = _single(bits & 1)
+        w[(_MARKS + 1) * _B + j] = _single((bits >> 1) & 1)
+        w[(_MARKS + 2) * _B + j] = _single((bits >> 2) & 1)
+        w[(_MARKS + 3) * _B + j] = _single((bits >> 3) & 1)
+        w[_KIND * _B + j] = _single(kind[row, place + j])
+    if warm:
+        for j in range(count):
+            w[_NORMAL * _B + j] = slopes.normal_x[i, begin + j]
+        for j in range(count):
+            w[(_NORMAL + 1) * _B + j] = slopes.normal_y[i, begin + j]
+    # What is left of a block that went before must not decide how many steps are done.
+    for j in range(count, _B):
+        w[_KIND * _B + j] = _0
+
+
+@_part
+def _store(w, plane, target, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    for j in range(count):
+        target[i, begin + j] = w[plane * _B + j]
+
+
+@_whole
+def solve_rows(first, last, picture, depth, scale, corner, membrane, steps, slopes):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Solve rows `first` to `last` of a region whose first node is `corner` (row, column).
+
+    Parameters
+    ----------
+    picture : Picture
+        Of the region.
+    depth : (rows, columns) float32
+        Present depth at each node's ray.
+    scale, membrane, steps
+        :class:`Scale`, :class:`MembraneNumbers`, :class:`Steps`.
+    slopes : Slopes
+        Written; its normals are read where the start is warm.
+    """
+    columns = depth.shape[1]
+    leds, dark, curves, table = membrane.leds, membrane.dark, membrane.curves, membrane.table
+    gloss, bounce, coverage = membrane.gloss, membrane.bounce, membrane.coverage
+    most, settled, shadows, warm = steps.most, _single(steps.settled), steps.shadows, steps.warm
+    w = np.zeros(_PLANES * _B, np.float32)
+    begun, pitch = _1 if warm else _0, _single(scale.pitch_mm)
+    for i in range(first, last):
+        y = _single(scale.y_mm + scale.pitch_mm * (i + corner[0]))
+        for begin in range(0, columns, _B):
+            count = min(_B, columns - begin)
+            place = corner[1] + begin
+            _load(w, picture, depth, scale, corner, slopes, warm, i, begin, count)
+            at = (y, _single(scale.x_mm + scale.pitch_mm * place), pitch)
+            rays = ray_ramps(scale, i + corner[0], place, count)
+            _begin_block(w, rays, at, leds, dark, curves, table, gloss, bounce, shadows, begun)
+            for _ in range(most):
+                if _step_block(w, dark, curves, table, gloss, bounce, shadows) < settled:
+                    break
+            _end_block(w, rays, dark, bounce, coverage, shadows)
+            _store(w, _SLOPE, slopes.slope_x, i, begin, count)
+            _store(w, _SLOPE + 1, slopes.slope_y, i, begin, count)
+            _store(w, _TRUST, slopes.weight, i, begin, count)
+            _store(w, _NORMAL, slopes.normal_x, i, begin, count)
+            _store(w, _NORMAL + 1, slopes.normal_y, i, begin, count)
+            for j in range(count):
+                slopes.flags[i, begin + j] = np.uint8(w[_FLAG * _B + j])

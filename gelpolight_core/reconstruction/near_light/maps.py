@@ -1,0 +1,286 @@
+"""What the near-light solve reads of a calibration, prepared once for each sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_fill_holes
+
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.masks import DARK_COSINE, usable
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
+from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers, Scale
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+from gelpolight_core.sensor_calibration import Calibration, FullModel
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+COARSE = 4
+"""Nodes of the calibration's grid to one node of the coarsest scale, along an axis."""
+DEGREE = 7
+CURVE_ERROR = 1e-3
+"""A polynomial that is off by more of its curve's top, 0.06 degrees of slope, is not used."""
+LEAST_SHARE = 1e-4
+"""Gloss or interreflection that is weaker than this changes no ratio by more, and is left out."""
+LEVELS = {np.dtype(np.uint8): 256, np.dtype(np.uint16): 65536}
+MISSING_CODE, MISSING_LIGHT = 65535, 2.0
+"""Float images are held in 16 bits: the code of a value that is not finite, and its light."""
+ALL_SEEN = ((-1.0, 2.0),) * 3
+
+
+@dataclass(frozen=True)
+class SensorMaps:
+    """All that does not change from frame to frame.
+
+    Parameters
+    ----------
+    calibration, full
+        The sensor's.
+    """
+
+    calibration: Calibration
+    full: FullModel
+
+    @cached_property
+    def usable(self) -> Mask:
+        """Nodes that can be solved, (rows, columns)."""
+        calibration = self.calibration
+        return usable(calibration.table.valid, self.full.background, calibration.factors)
+
+    @cached_property
+    def inside(self) -> Mask:
+        """Usable nodes with the holes among them filled: specks, dust, an LED in view."""
+        return np.asarray(binary_fill_holes(self.usable))
+
+    @cached_property
+    def flags(self) -> NDArray[np.uint8]:
+        """Flags of the whole grid while nothing is pressed."""
+        without_light = int(Flag.OUTSIDE | Flag.INVALID)
+        seen = np.where(self.calibration.table.valid, without_light, int(Flag.OUTSIDE))
+        return np.where(self.usable, 0, seen).astype(np.uint8)
+
+    @cached_property
+    def membrane(self) -> MembraneNumbers:
+        """Membrane and lights."""
+        return membrane_numbers(self.full, self.calibration.reflectance.coverage)
+
+    @cached_property
+    def _scales(self) -> dict[int, Scale]:
+        return {}
+
+    @cached_property
+    def _sources(self) -> dict[int, tuple[Map, Map, Map]]:
+        return {}
+
+    def scale(self, factor: int) -> Scale:
+        """Return the scale with `factor` nodes of the grid to a node: 1, 2 or 4."""
+        if factor not in self._scales:
+            self._scales[factor] = self._made(factor)
+        return self._scales[factor]
+
+    @cached_property
+    def rim_distance_mm(self) -> Map:
+        """How far nodes of the coarsest scale are from the boundary of the field."""
+        scale = self.scale(COARSE)
+        return rim_distance_mm(scale.kind > 0, scale.pitch_mm)
+
+    def source(self, factor: int) -> tuple[Map, Map, Map]:
+        """Return raw pixel (u, v) and background (..., 3) of each node at scale 1 or 2."""
+        if factor not in self._sources:
+            table = self.calibration.table
+            maps = (table.u_px, table.v_px, self.full.background)
+            found = maps if factor == 1 else tuple(block_average(m, factor) for m in maps)
+            self._sources[factor] = (found[0], found[1], found[2])
+        return self._sources[factor]
+
+    def _made(self, factor: int) -> Scale:
+        grid = self.calibration.table.grid
+        kind = kinds(self.usable, self.inside, factor)
+        x, y = (middles(axis, factor) for axis in (grid.x_mm, grid.y_mm))
+        place = (factor, float(x[0]), float(y[0]), grid.pitch_mm * factor)
+        if factor < COARSE:
+            # The flat membrane's brightness and the rays change little from node to node.
+            coarse = self.scale(COARSE)
+            flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
+            return Scale(*place, flat, kind, coarse.rays, factor / COARSE)
+        ray_slope = np.moveaxis(block_average(self.calibration.table.drift, factor), -1, 0)
+        return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor)
+
+
+def sensor_scale(
+    full: FullModel,
+    axes_mm: tuple[Array, Array],
+    ray_slope: NDArray[Any],
+    kind: Any,
+    *,
+    factor: int,
+) -> Scale:
+    """Return a scale with ray maps of its own.
+
+    Parameters
+    ----------
+    full : FullModel
+        Lights and membrane.
+    axes_mm : ((columns,), (rows,))
+        Nodes, x and y.
+    ray_slope : (2, rows, columns)
+        Sideways move of the rays per mm of depth; NaN where no ray arrives.
+    kind : (rows, columns) uint8
+        As in :class:`Scale`.
+    factor : int
+        As in :class:`Scale`.
+    """
+    x, y = axes_mm
+    pitch = float(x[1] - x[0])
+    whole = _whole(np.asarray(ray_slope, np.float64), x, y)
+    rays = np.empty((6, y.size, x.size), np.float32)
+    rays[:2] = whole
+    for place, axis in ((2, 1), (4, 0)):
+        for k in range(2):
+            rays[place + k] = np.gradient(whole[k], pitch, axis=axis)
+    flat = _flat_brightness(full, x, y, whole)
+    return Scale(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0)
+
+
+def kinds(usable: Mask, inside: Mask, factor: int) -> NDArray[np.uint8]:
+    """Return `Scale.kind`: a block is usable where all of it is, inside where most of it is."""
+    if factor == 1:
+        return np.where(usable, 2, inside).astype(np.uint8)
+    all_usable = block_average(usable.astype(np.float32), factor) > 0.99
+    mostly_inside = block_average(inside.astype(np.float32), factor) > 0.5
+    return np.where(all_usable, 2, mostly_inside).astype(np.uint8)
+
+
+def membrane_numbers(
+    full: FullModel, coverage: Sequence[Sequence[float]] | NDArray[Any] = ALL_SEEN
+) -> MembraneNumbers:
+    """Return membrane and lights as the compiled solve wants them.
+
+    Parameters
+    ----------
+    full : FullModel
+        The sensor's.
+    coverage : (3, 2), optional
+        Cosines of each light that the ball presses have shown; by default all.
+    """
+    membrane = full.membrane
+    curves, error = _polynomials(membrane)
+    leds = [_triple(led) for led in full.led_positions_mm]
+    glossy = membrane.gloss > LEAST_SHARE
+    return MembraneNumbers(
+        (leds[0], leds[1], leds[2]),
+        _triple(dark_brightness(membrane)),
+        curves,
+        None if error <= CURVE_ERROR else _table(membrane),
+        (_single(membrane.gloss), _single(membrane.roughness**2)) if glossy else None,
+        _single(membrane.bounce) if membrane.bounce > LEAST_SHARE else None,
+        tuple((_single(low), _single(high)) for low, high in np.asarray(coverage)),
+    )
+
+
+def light_levels(response: CameraResponse | None, dtype: np.dtype[Any], *, coded: bool) -> Map:
+    """Return the linear light (3, levels) of every number that an image of this kind holds.
+
+    Parameters
+    ----------
+    response : CameraResponse or None
+        Of the camera; None where the numbers are linear light already.
+    dtype : dtype
+        uint8 or uint16.
+    coded : bool
+        Whether `MISSING_CODE` stands for a value that was not finite.
+    """
+    levels = LEVELS[dtype]
+    numbers = np.arange(levels).astype(dtype)
+    if coded:
+        light = numbers / np.float32(MISSING_CODE - 1)
+        light[MISSING_CODE] = MISSING_LIGHT
+        return np.tile(light.astype(np.float32), (3, 1))
+    if response is None:
+        return np.tile((numbers / np.float32(levels - 1)).astype(np.float32), (3, 1))
+    seen = response.linearise(np.repeat(numbers[:, None, None], 3, axis=2))
+    return np.ascontiguousarray(seen[:, 0].T, np.float32)
+
+
+def _polynomials(membrane: Membrane) -> tuple[tuple[tuple[float, ...], ...], float]:
+    """Return the diffuse curves, over pi, as polynomials, and how far they are off."""
+    cosines = np.linspace(0.0, 1.0, CURVE_NODES)[1:]
+    wanted = membrane.diffuse_share(np.tile(cosines[:, None], (1, 3)))
+    curves, error = [], 0.0
+    for k in range(3):
+        fitted = np.polynomial.Polynomial.fit(cosines, wanted[:, k], DEGREE)
+        off = np.abs(fitted(cosines) - wanted[:, k]).max() / wanted[-1, k]
+        error = max(error, float(off))
+        share = np.asarray(fitted.convert(domain=(-1, 1)).coef, np.float64)
+        share *= (1.0 - membrane.gloss) / pi
+        curves.append(tuple(_single(v) for v in np.pad(share, (0, DEGREE + 1 - len(share)))))
+    return tuple(curves), error
+
+
+def _table(membrane: Membrane) -> Map:
+    """Return the diffuse curves, over pi, at even cosines."""
+    cosines = np.linspace(0.0, 1.0, CURVE_NODES)
+    share = membrane.diffuse_share(np.tile(cosines[:, None], (1, 3)))
+    return np.ascontiguousarray(share.T * (1.0 - membrane.gloss) / pi, np.float32)
+
+
+def _whole(ray_slope: Array, x_mm: Array, y_mm: Array) -> Array:
+    """Return ray slopes with unknown ones filled in by a plane through the rest."""
+    known = np.isfinite(ray_slope).all(axis=0)
+    if known.all() or not known.any():
+        return np.nan_to_num(ray_slope)
+    x, y = np.meshgrid(x_mm, y_mm)
+    terms = np.stack([x, y, np.ones_like(x)], axis=-1)
+    plane, *_ = np.linalg.lstsq(terms[known], ray_slope[:, known].T, rcond=None)
+    return np.asarray(np.where(known, ray_slope, np.moveaxis(terms @ plane, -1, 0)))
+
+
+def _flat_brightness(full: FullModel, x: Array, y: Array, ray_slope: Array) -> Map:
+    """Return `Scale.flat`."""
+    rows, columns = y.size, x.size
+    view = np.stack([*ray_slope, np.full((rows, columns), -1.0)], axis=-1).reshape(-1, 3)
+    view /= np.linalg.norm(view, axis=-1, keepdims=True)
+    up = np.tile([0.0, 0.0, -1.0], (rows * columns, 1))
+    points = np.stack([*np.meshgrid(x, y), np.zeros((rows, columns))], axis=-1).reshape(-1, 3)
+    to_led = full.led_positions_mm[None] - points[:, None]
+    distance = np.linalg.norm(to_led, axis=-1)
+    response = full.membrane.response(to_led / distance[..., None], up, view)
+    strength = response * to_led[..., 2] / distance**3
+    return np.ascontiguousarray(strength.T.reshape(3, rows, columns), np.float32)
+
+
+def block_average(values: NDArray[Any], factor: int) -> Map:
+    """Return averages over blocks of nodes."""
+    rows, columns = (n // factor for n in values.shape[:2])
+    whole = np.ascontiguousarray(values[: rows * factor, : columns * factor], np.float32)
+    return np.asarray(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA))
+
+
+def middles(axis_mm: Array, factor: int) -> Array:
+    """Return the middles of blocks of nodes along an axis."""
+    count = axis_mm.size // factor
+    return np.asarray(axis_mm[: count * factor].reshape(count, factor).mean(axis=1))
+
+
+def _single(value: float) -> float:
+    """Return a number that the compiled code takes as single precision."""
+    return np.float32(value)  # type: ignore[return-value]
+
+
+def _triple(values: NDArray[np.floating]) -> tuple[float, float, float]:
+    return (_single(values[0]), _single(values[1]), _single(values[2]))
+
+
+def dark_brightness(membrane: Membrane) -> NDArray[np.float64]:
+    """Return the membrane's brightness (3,) below which a channel is dark whatever its noise."""
+    share = membrane.diffuse_share(np.full(3, DARK_COSINE))
+    return np.asarray((1.0 - membrane.gloss) * share / pi)

@@ -1,0 +1,144 @@
+"""The compiled parts that bring a solved region to true positions on the whole grid."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from gelpolight_core.reconstruction.near_light.kernel import ray_ramps
+
+_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+_single = np.float32
+_0, _HALF, _1 = _single(0.0), _single(0.5), _single(1.0)
+_BLOCK = 64
+PLACE_ROUNDS = 14
+PLACED = 0.01
+FOLDED = 0.55
+
+
+@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True, forceinline=True)
+def _between(values, c, r, fc, fr):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    top = values[r, c] + fc * (values[r, c + 1] - values[r, c])
+    low = values[r + 1, c] + fc * (values[r + 1, c + 1] - values[r + 1, c])
+    return (
+        top + fr * (low - top),
+        (values[r, c + 1] - values[r, c]) * (_1 - fr)
+        + (values[r + 1, c + 1] - values[r + 1, c]) * fr,
+        low - top,
+    )
+
+
+@_whole
+def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    first, last, depth, scale, corner, true_positions, flags, hidden, placed, marks, place
+):
+    """Find the ray that sees each true position, and the depth there.
+
+    The ray of node j sees the surface at j + depth * ray slope: Newton's steps on the bilinear
+    depth, and half steps of the fixed point where the surface folds.
+
+    Parameters
+    ----------
+    depth, flags : (rows, columns)
+        At each node's ray, in a region of `scale` whose first node is `corner`.
+    true_positions : bool
+        Else every position is seen by its own ray.
+    hidden : int
+        Flag of positions that no ray sees.
+    placed, marks : (rows, columns)
+        Depth and flags at the true positions, written.
+    place : (2, rows, columns)
+        Column and row of the ray that sees each position, written.
+    """
+    rows, columns = depth.shape
+    per_pitch = _1 / _single(scale.pitch_mm)
+    if not true_positions:
+        per_pitch = _0
+    for i in range(first, last):
+        for begin in range(0, columns, _BLOCK):
+            count = min(_BLOCK, columns - begin)
+            ramps = ray_ramps(scale, i + corner[0], begin + corner[1], count)
+            for j in range(begin, begin + count):
+                at = _single(j - begin)
+                wx = (ramps[0] + at * ramps[1]) * per_pitch
+                wy = (ramps[2] + at * ramps[3]) * per_pitch
+                wxx, wyx = ramps[4] + at * ramps[5], ramps[6] + at * ramps[7]
+                wxy, wyy = ramps[8] + at * ramps[9], ramps[10] + at * ramps[11]
+                d = depth[i, j]
+                c, r = _single(j), _single(i)
+                x, y = c - d * wx, r - d * wy
+                missed = _0
+                n, m = j, i
+                for step in range(PLACE_ROUNDS):
+                    x = min(max(x, _0), _single(columns - 1))
+                    y = min(max(y, _0), _single(rows - 1))
+                    n, m = min(int(x), columns - 2), min(int(y), rows - 2)
+                    d, by_x, by_y = _between(depth, n, m, x - _single(n), y - _single(m))
+                    off_x, off_y = x - c, y - r
+                    ex = off_x + d * (wx + wxx * off_x + wxy * off_y)
+                    ey = off_y + d * (wy + wyx * off_x + wyy * off_y)
+                    missed = max(abs(ex), abs(ey))
+                    if missed < PLACED:
+                        break
+                    det = _1 + by_x * wx + by_y * wy
+                    if step < 5 and det > _single(0.3):
+                        along = (by_x * ex + by_y * ey) / det
+                        x -= ex - along * wx
+                        y -= ey - along * wy
+                    else:
+                        x -= _HALF * ex
+                        y -= _HALF * ey
+                placed[i, j] = d
+                near = flags[min(int(y + _HALF), rows - 1), min(int(x + _HALF), columns - 1)]
+                marks[i, j] = near | (hidden if missed > FOLDED else 0)
+                place[0, i, j], place[1, i, j] = x, y
+
+
+@_whole
+def show_depth(first, last, placed, placed_flags, factor, corner, outside, depth, flags):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Bring depth and flags from a coarser region to rows of the whole grid, bilinear."""
+    rows, columns = placed.shape
+    line = np.empty(columns, np.float32)
+    share = _1 / _single(factor)
+    for i in range(first, last):
+        y = (_single(i) + _HALF) * share - _HALF
+        m = min(max(int(np.floor(y)), 0), rows - 1)
+        m1 = min(m + 1, rows - 1)
+        f = min(max(y - _single(m), _0), _1)
+        a, b = placed[m], placed[m1]
+        for j in range(columns):
+            line[j] = a[j] + f * (b[j] - a[j])
+        marks, source = flags[corner[0] + i], placed_flags[i // factor]
+        out = depth[corner[0] + i]
+        for n in range(columns):
+            left, right = line[max(n - 1, 0)], line[min(n + 1, columns - 1)]
+            here = line[n]
+            mark = source[n] & ~outside
+            for k in range(factor):
+                at = corner[1] + n * factor + k
+                t = (_single(k) + _HALF) * share - _HALF
+                value = here + t * (right - here) if t > 0.0 else here + t * (here - left)
+                blind = marks[at] & outside
+                out[at] = value if blind == 0 else _0
+                marks[at] = marks[at] | mark
+
+
+@_whole
+def show_normals(first, last, normal_x, normal_y, place, factor, corner, normals):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Bring normals to their true positions on rows of the whole grid."""
+    rows, columns = normal_x.shape
+    share = _1 / _single(factor)
+    for i in range(first, last):
+        y = min(max((_single(i) + _HALF) * share - _HALF, _0), _single(rows - 1))
+        m = min(int(y), rows - 2)
+        for j in range(columns * factor):
+            x = min(max((_single(j) + _HALF) * share - _HALF, _0), _single(columns - 1))
+            n = min(int(x), columns - 2)
+            u = _between(place[0], n, m, x - _single(n), y - _single(m))[0]
+            v = _between(place[1], n, m, x - _single(n), y - _single(m))[0]
+            c, r = min(int(u), columns - 2), min(int(v), rows - 2)
+            nx = _between(normal_x, c, r, u - _single(c), v - _single(r))[0]
+            ny = _between(normal_y, c, r, u - _single(c), v - _single(r))[0]
+            to = normals[corner[0] + i, corner[1] + j]
+            to[0], to[1] = nx, ny
+            to[2] = -np.sqrt(max(_1 - nx * nx - ny * ny, _0))

@@ -1,0 +1,183 @@
+"""Press over background in a region, at the scale of the solve and at the coarsest scale."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.masks import SATURATED
+from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.near_light.denoise import quieted
+from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, light_levels
+from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.near_light.sampling import halve, sample_rows
+from gelpolight_core.reconstruction.near_light.structures import Picture
+from gelpolight_core.reconstruction.terms import Terms
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+Map = NDArray[np.float32]
+Gain = NDArray[np.float64]
+Rows = tuple[tuple[np.float32, ...], ...]
+_BEYOND_FINITE = np.float32(1.5)
+
+
+class Compared(NamedTuple):
+    """A region of an image beside the background.
+
+    Attributes
+    ----------
+    fine, coarse : Picture
+        At the scale of the solve, and at the coarsest scale.
+    edge : (rows, columns) float32 or None
+        How far denoising left the fine picture as it is, 0..1; None where it was not denoised.
+    """
+
+    fine: Picture
+    coarse: Picture
+    edge: Map | None
+
+
+class PressSampler:
+    """Compares raw images with the background.
+
+    Parameters
+    ----------
+    maps : SensorMaps
+        The sensor's.
+    workers : RowWorkers
+        Threads.
+    buffers : Buffers
+        Memory for its results, used again for each frame.
+    """
+
+    def __init__(self, maps: SensorMaps, workers: RowWorkers, buffers: Buffers) -> None:
+        self.maps = maps
+        self._workers = workers
+        self._take = buffers.take
+        self._inverse = np.linalg.inv(maps.calibration.crosstalk)
+        self._unmix = _as_rows(self._inverse)
+        self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
+
+    def compare(
+        self,
+        raw: NDArray[Any],
+        region: Region,
+        *,
+        factor: int,
+        linear: bool,
+        terms: Terms,
+        gain: Gain | None = None,
+    ) -> Compared:
+        """Return press over background.
+
+        Parameters
+        ----------
+        raw : (height, width, 3) uint8 or uint16
+            Raw image; :data:`MISSING_CODE` stands for what is not finite in a linear one.
+        region : Region
+            Where.
+        factor : int
+            Nodes of the grid to a node of the fine scale: 1, 2 or 4.
+        linear : bool
+            Whether its numbers are linear light, whatever the camera's response.
+        terms : Terms
+            What is left out.
+        gain : (3,), optional
+            Light of each channel over that at calibration.
+        """
+        # At scale 4 the image is read at scale 2: a node there sees 2 x 2 pixels.
+        at = min(factor, 2)
+        unmix = self._unmix if gain is None else _as_rows(self._inverse / gain)
+        sampled = self._sampled(raw, region, at, linear, terms, unmix)
+        edge = None
+        if factor == 1 and terms.denoising:
+            edge = quieted(sampled, self._noise(1), self._workers, self._take)
+        coarse = sampled
+        while at < COARSE:
+            at *= 2
+            coarse = self._halved(coarse, f"at {at}")
+        if self.maps.membrane.bounce is not None:
+            coarse = coarse._replace(around=self._around(coarse.ratio))
+        if factor == COARSE:
+            return Compared(coarse, coarse, None)
+        fine = sampled._replace(around=self._enlarged_around(coarse.around, sampled.marks.shape))
+        return Compared(fine, coarse, edge)
+
+    def _noise(self, factor: int) -> tuple[np.float32, ...]:
+        """Return the noise of press minus background; a node averages `factor` pixels squared."""
+        sd = self.maps.calibration.noise / np.sqrt(2.0) / factor
+        return tuple(np.float32(s) for s in sd)
+
+    def _picture(self, shape: tuple[int, int], name: str) -> Picture:
+        planes = [self._take(f"{part} {name}", (3, *shape)) for part in ("ratio", "noise")]
+        marks = self._take(f"marks {name}", shape, np.uint8)
+        return Picture(planes[0], planes[1], np.zeros((3, 1, 1), np.float32), marks)
+
+    def _sampled(
+        self,
+        raw: NDArray[Any],
+        region: Region,
+        factor: int,
+        linear: bool,
+        terms: Terms,
+        unmix: Rows,
+    ) -> Picture:
+        corner, shape = region.at(COARSE // factor)
+        picture = self._picture(shape, "sampled")
+        self._workers.run(
+            shape[0],
+            sample_rows,
+            raw,
+            self.levels(raw.dtype, linear),
+            np.float32(SATURATED) if terms.saturation else _BEYOND_FINITE,
+            self.maps.source(factor),
+            factor > 1,
+            (unmix, self._noise(factor)),
+            self.maps.scale(factor).kind,
+            corner,
+            picture,
+        )
+        return picture
+
+    def _halved(self, fine: Picture, name: str) -> Picture:
+        rows, columns = fine.marks.shape
+        coarse = self._picture((rows // 2, columns // 2), name)
+        self._workers.run(rows // 2, halve, fine, coarse)
+        return coarse
+
+    def _around(self, ratio: Map) -> Map:
+        """Return press over background, averaged over the neighbourhood; as `neighbourhood`."""
+        reach = self.maps.full.membrane.bounce_reach_mm / self.maps.scale(COARSE).pitch_mm
+        factor = max(int(reach / 4.0), 1)
+        rows, columns = ratio.shape[1:]
+        size = (max(columns // factor, 1), max(rows // factor, 1))
+        result = self._take("coarse around", ratio.shape)
+        for k in range(3):
+            known = np.clip(ratio[k], 0.0, 4.0)
+            small = cv2.resize(known, size, interpolation=cv2.INTER_AREA)
+            small = cv2.GaussianBlur(small, (0, 0), reach / factor)
+            cv2.resize(small, (columns, rows), result[k])
+        return result
+
+    def _enlarged_around(self, around: Map, shape: tuple[int, int]) -> Map:
+        if around.shape[2] == 1:
+            return around
+        result = self._take("around", (3, *shape))
+        for k in range(3):
+            cv2.resize(around[k], shape[::-1], result[k])
+        return result
+
+    def levels(self, dtype: np.dtype[Any], linear: bool) -> Map:
+        """Return the linear light (3, levels) of every number of an image."""
+        kind = (dtype, linear)
+        if kind not in self._light:
+            response = None if linear else self.maps.calibration.response
+            self._light[kind] = light_levels(response, dtype, coded=linear)
+        return self._light[kind]
+
+
+def _as_rows(matrix: NDArray[np.floating]) -> Rows:
+    return tuple(tuple(row) for row in matrix.astype(np.float32))

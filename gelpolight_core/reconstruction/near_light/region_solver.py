@@ -1,0 +1,283 @@
+"""Solves a region: rounds at the coarsest scale, and the last round at the scale of the effort."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.integration.weighted import (
+    WeightedIntegration,
+    integrate_weighted,
+)
+from gelpolight_core.reconstruction.near_light.boundary import (
+    Boundary,
+    find_boundary,
+    region_strips,
+)
+from gelpolight_core.reconstruction.near_light.kernel import UNSOLVED_WEIGHT, solve_rows
+from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps
+from gelpolight_core.reconstruction.near_light.ratio import Compared
+from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.near_light.rounds import (
+    Rounds,
+    held_back,
+    longest_step_mm,
+    near_light_rounds,
+)
+from gelpolight_core.reconstruction.near_light.settings import Settings
+from gelpolight_core.reconstruction.near_light.structures import (
+    Picture,
+    Scale,
+    Slopes,
+    Steps,
+    slopes_like,
+)
+from gelpolight_core.reconstruction.terms import Terms
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+FREE = 1e-4
+"""How firmly the border is held where a contact crosses it."""
+THIN = 2
+"""Along both axes, of the nodes whose unsolved ones are counted."""
+
+
+class Solved(NamedTuple):
+    """A solved region at the scale of its last round; it lies in the solver's buffers.
+
+    Attributes
+    ----------
+    region : Region
+        Where.
+    compared : Compared
+        The image there.
+    scale : Scale
+        Of the last round.
+    start_mm : (rows, columns) float32
+        Depth along the rays at which the last round was solved.
+    slopes : Slopes
+        Of the last round.
+    depth_mm : (rows, columns) float32
+        Along the rays.
+    weight, hold : (rows, columns) float32; hold None where the border is held everywhere
+        Of the integration.
+    boundary : Boundary
+        Where depth 0 is held.
+    place : (2, rows, columns) float32
+        Room for column and row of the ray that sees each true position.
+    integration_rounds : int
+        Of the last integration.
+    """
+
+    region: Region
+    compared: Compared
+    scale: Scale
+    start_mm: Map
+    slopes: Slopes
+    depth_mm: Map
+    weight: Map
+    hold: Map | None
+    boundary: Boundary
+    place: Map
+    integration_rounds: int
+
+
+class Start(NamedTuple):
+    """What the rounds at the coarsest scale leave to the last round.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float32
+        Along the rays.
+    normals : 2 of (rows, columns) float32, or None
+        x and y of the last normals; None where no round was done.
+    boundary : Boundary
+        Where depth 0 is held.
+    """
+
+    depth_mm: Map
+    normals: tuple[Map, Map] | None
+    boundary: Boundary
+
+
+class Weighted(NamedTuple):
+    """Slopes with the weights (rows, columns) and the hold of their integration."""
+
+    slopes: Slopes
+    weight: Map
+    hold: Map | None
+
+
+class RegionSolver:
+    """Solves regions of one sensor.
+
+    Parameters
+    ----------
+    maps : SensorMaps
+        The sensor's.
+    workers : RowWorkers
+        Threads.
+    buffers : Buffers
+        Memory for its results, used again for each frame.
+    """
+
+    def __init__(self, maps: SensorMaps, workers: RowWorkers, buffers: Buffers) -> None:
+        self.maps = maps
+        self._workers = workers
+        self._take = buffers.take
+        self._longest_mm = longest_step_mm(maps.full)
+
+    def rounds(
+        self, region: Region, compared: Compared, settings: Settings, terms: Terms
+    ) -> tuple[Rounds, Start]:
+        """Return the rounds at the coarsest scale, and from where the last round starts."""
+        scale, corner = self.maps.scale(COARSE), region.corner
+        normals: tuple[Map, Map] | None = None
+        boundary = None if terms.free_rim and terms.weights else Boundary()
+        tolerances = list(settings.round_tolerances)
+
+        def solve(depth: Map) -> Map:
+            nonlocal normals, boundary
+            slopes = self.slopes((scale, corner), compared.coarse, depth, settings, terms, normals)
+            normals = slopes.normal_x, slopes.normal_y
+            tolerance = tolerances.pop(0) if len(tolerances) > 1 else tolerances[0]
+
+            def integrated(free: Mask | None, tolerance: float = tolerance) -> Map:
+                weighted = _weighted(scale, corner, slopes, free)
+                return self._integrated(scale, weighted, depth, tolerance, terms).depth_mm
+
+            if boundary is not None:
+                return boundary.levelled(integrated(boundary.free))
+            held = integrated(None)
+            strips = region_strips(self.maps.rim_distance_mm, region, scale.pitch_mm)
+            fine = partial(integrated, tolerance=settings.round_tolerances[-1])
+            boundary = find_boundary(held, strips, fine, scale.pitch_mm)
+            return held if boundary.free is None else boundary.levelled(integrated(boundary.free))
+
+        rounds = near_light_rounds(
+            solve,
+            region.shape,
+            longest_mm=self._longest_mm,
+            wanted=terms.near_light_rounds,
+            shallow_mm=settings.shallow_mm,
+        )
+        return rounds, Start(rounds.depth_mm, normals, boundary or Boundary())
+
+    def last_slopes(
+        self,
+        region: Region,
+        compared: Compared,
+        start: Start,
+        settings: Settings,
+        terms: Terms,
+    ) -> tuple[Map, Slopes]:
+        """Solve at the scale of the settings, from depth and normals of the coarsest one.
+
+        Returns the depth at which the slopes were solved, and the slopes.
+        """
+        corner, shape = region.at(COARSE // settings.factor)
+        depth = _enlarged(start.depth_mm, shape)
+        known = start.normals
+        normals = None if known is None else tuple(_enlarged(n, shape) for n in known)
+        at = (self.maps.scale(settings.factor), corner)
+        return depth, self.slopes(at, compared.fine, depth, settings, terms, normals)
+
+    def last_depth(
+        self,
+        region: Region,
+        compared: Compared,
+        solved: tuple[Map, Slopes],
+        boundary: Boundary,
+        settings: Settings,
+        terms: Terms,
+    ) -> Solved:
+        """Integrate what :meth:`last_slopes` has returned."""
+        (depth, slopes), scale = solved, self.maps.scale(settings.factor)
+        corner, shape = region.at(COARSE // settings.factor)
+        weighted = _weighted(scale, corner, slopes, boundary.free)
+        found = self._integrated(scale, weighted, depth, settings.tolerance, terms)
+        return Solved(
+            region,
+            compared,
+            scale,
+            depth,
+            slopes,
+            held_back(depth, boundary.levelled(found.depth_mm), self._longest_mm),
+            weighted.weight,
+            weighted.hold,
+            boundary,
+            self._take("place", (2, *shape)),
+            found.rounds,
+        )
+
+    def slopes(
+        self,
+        at: tuple[Scale, tuple[int, int]],
+        picture: Picture,
+        depth: Map,
+        settings: Settings,
+        terms: Terms,
+        start: tuple[Map, ...] | None,
+    ) -> Slopes:
+        """Return slopes at the present depth; normals to start from, if any, are overwritten."""
+        slopes = slopes_like(depth, self._take)
+        if start is not None:
+            slopes = slopes._replace(normal_x=start[0], normal_y=start[1])
+        steps = Steps(settings.steps, settings.settled**2, terms.shadows, start is not None)
+        rows, membrane = len(depth), self.maps.membrane
+        self._workers.run(rows, solve_rows, picture, depth, *at, membrane, steps, slopes)
+        if not terms.ray_true_slopes:
+            down = -np.sqrt(1.0 - slopes.normal_x**2 - slopes.normal_y**2)
+            slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down
+        return slopes
+
+    def _integrated(
+        self, scale: Scale, weighted: Weighted, depth: Map, tolerance: float, terms: Terms
+    ) -> WeightedIntegration:
+        slopes, weight, hold = weighted
+        return integrate_weighted(
+            slopes.slope_x,
+            slopes.slope_y,
+            weight if terms.weights else np.ones_like(weight),
+            pitch_mm=scale.pitch_mm,
+            start_mm=depth if depth.any() else None,
+            hold=hold if terms.weights else None,
+            tolerance=tolerance,
+            workers=self._workers,
+        )
+
+
+def unsolved_share(solved: Solved) -> float:
+    """Return the share of the field's nodes that light does not decide, from some of them."""
+    kind, factor = solved.scale.kind, solved.scale.factor
+    (top, left), (rows, columns) = solved.region.at(COARSE // factor)
+    usable = kind[top : top + rows : THIN, left : left + columns : THIN] == 2
+    unsolved = usable & (solved.slopes.weight[::THIN, ::THIN] <= np.float32(UNSOLVED_WEIGHT))
+    every = np.count_nonzero(kind[::THIN, ::THIN] == 2)
+    return float(np.count_nonzero(unsolved)) / max(int(every), 1)
+
+
+def _weighted(scale: Scale, corner: tuple[int, int], slopes: Slopes, free: Mask | None) -> Weighted:
+    """Return the weights, and how firmly the border is held (None: everywhere)."""
+    weight = slopes.weight
+    if free is None:
+        return Weighted(slopes, weight, None)
+    (top, left), (rows, columns) = corner, weight.shape
+    repeat = rows // free.shape[0]
+    here = np.repeat(np.repeat(free, repeat, axis=0), repeat, axis=1)
+    hold = np.where(here, np.float32(FREE), np.float32(1.0))
+    inside = scale.kind[top : top + rows, left : left + columns] > 0
+    return Weighted(slopes, np.where(inside, weight, weight * hold), hold)
+
+
+def _enlarged(values: Map, shape: tuple[int, int]) -> Map:
+    """Return a map at a finer scale."""
+    if values.shape == shape:
+        return values
+    return np.asarray(cv2.resize(values, shape[::-1], interpolation=cv2.INTER_LINEAR))

@@ -1,0 +1,49 @@
+"""What each effort spends on a frame: parameter sets of the one near-light solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What an effort spends on a frame.
+
+    Attributes
+    ----------
+    factor : int
+        Scale of the last round: nodes of the calibration's grid to a node, along an axis.
+    round_tolerances : tuple of float
+        Of the integrations at the coarsest scale: these only have to find where the surface is.
+        The last one holds for all further rounds.
+    tolerance : float
+        Of the last integration.
+    steps : int
+        Gauss-Newton steps of a block of nodes, at most.
+    settled : float
+        Length of the step below which a block of nodes is done.
+    shallow_mm : float
+        Depth up to which one near-light round is enough: a second one moves the surface by about
+        twice its depth squared over the lights' height, here by less than half a micrometre.
+    """
+
+    factor: int
+    round_tolerances: tuple[float, ...] = (0.05, 0.005)
+    tolerance: float = 1e-3
+    steps: int = 4
+    settled: float = 3e-3
+    shallow_mm: float = 0.05
+
+
+SETTINGS: Mapping[str, Settings] = MappingProxyType(
+    {
+        "fast": Settings(4),
+        "balanced": Settings(2),
+        "best": Settings(1, (0.02, 0.002), 3e-4, 8, 5e-4),
+    }
+)
+
+MOVED = Settings(1, steps=3)
+"""Of normals that are moved by noise from where they were solved: a step or two is enough."""

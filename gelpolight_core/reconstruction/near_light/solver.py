@@ -1,0 +1,495 @@
+"""The near-light model: one solver for every scale and region.
+
+The efforts `fast`, `balanced` and `best` are parameter sets of it (:mod:`.settings`). What a frame
+does not need is left out; the bounds on what that may change are stated with each constant and held
+by tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from threading import Lock
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.health.finding import LightGain
+from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.near_light.boundary import Boundary
+from gelpolight_core.reconstruction.near_light.contact import ContactFinder, contact_finder
+from gelpolight_core.reconstruction.near_light.image_noise import image_noise
+from gelpolight_core.reconstruction.near_light.maps import COARSE, MISSING_CODE, SensorMaps
+from gelpolight_core.reconstruction.near_light.placement import (
+    place_rows,
+    show_depth,
+    show_normals,
+)
+from gelpolight_core.reconstruction.near_light.ratio import Compared, PressSampler
+from gelpolight_core.reconstruction.near_light.region import Region, padded_region
+from gelpolight_core.reconstruction.near_light.region_solver import (
+    RegionSolver,
+    Solved,
+    Start,
+    unsolved_share,
+)
+from gelpolight_core.reconstruction.near_light.rounds import Rounds
+from gelpolight_core.reconstruction.near_light.settings import MOVED, SETTINGS, Settings
+from gelpolight_core.reconstruction.near_light.structures import Slopes
+from gelpolight_core.reconstruction.near_light.uncertainty import (
+    DepthNoise,
+    depth_noise,
+    no_contact_noise,
+)
+from gelpolight_core.reconstruction.terms import ALL_TERMS, Terms
+from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reconstruction.trace import EFFORTS, Trace, TraceRecorder, TraceStep
+from gelpolight_core.sensor_calibration import Calibration, FullModel
+from gelpolight_core.translation import tr
+
+Map = NDArray[np.float32]
+MARGIN_DECAYS = 1.5
+"""Margin of the region around a contact; the drape falls by a factor e over its decay length."""
+LEAST_MARGIN_MM = 0.8
+RESOLVED = 0.5
+"""Widest node by the drape's decay length: with nodes of 0.57 a cylinder of 1 mm is 4 % low, with
+0.28 2 %."""
+WHOLE = 0.85
+"""A region with this share of the grid is extended to all of it."""
+SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 45, 88, 6
+"""Bytes that a sampled, a solved and a shown node must read and write once."""
+LOOKING = tr("looking for a contact")
+COMPARING = tr("resampling and comparing")
+COARSE_ROUNDS = tr("near light, quarter scale")
+INTEGRATION = tr("integration")
+PLACING = tr("true positions")
+LAST_ROUND = {
+    1: tr("near light, full scale"),
+    2: tr("near light, half scale"),
+    4: tr("near light, last round"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class NearLightDepth:
+    """A reconstruction by the near-light model, at true positions on the metric grid.
+
+    Attributes
+    ----------
+    depth_mm : (rows, columns) float32
+        At the grid's own (x, y).
+    normals : (rows, columns, 3) float32 or None
+        Unit normals, z < 0; None where they were not asked for.
+    flags : (rows, columns) uint8
+        Bits of :class:`Flag`.
+    boundary : Boundary
+        Where depth 0 was held.
+    rounds : Rounds or None
+        The rounds at the coarsest scale, and how they ended; None where nothing is pressed.
+    trace : Trace
+        What was done and what was left out.
+    noise : DepthNoise or None
+        How far it may be off, where that was asked for.
+    unsolved : float
+        Share of the usable nodes that light does not decide: less than two lights, or turned away.
+    visible_mm : float
+        Smallest depth of a flat face that is found.
+    """
+
+    depth_mm: Map
+    normals: Map | None
+    flags: NDArray[np.uint8]
+    boundary: Boundary
+    rounds: Rounds | None
+    trace: Trace
+    noise: DepthNoise | None = None
+    unsolved: float = 0.0
+    visible_mm: float = 0.0
+
+
+class Wanted(NamedTuple):
+    """What a caller asks for."""
+
+    effort: str
+    terms: Terms
+    normals: bool
+    uncertainty: bool
+
+
+class Image(NamedTuple):
+    """An image (height, width, 3) in whole numbers.
+
+    `linear` says whether they are linear light; `light` how the light differs from that at
+    calibration.
+    """
+
+    raw: NDArray[Any]
+    linear: bool
+    light: LightGain | None = None
+
+    @property
+    def gain(self) -> NDArray[np.float64] | None:
+        """Light of each channel (3,) over that at calibration; None: the same."""
+        return None if self.light is None else self.light.share
+
+
+class NearLightSolver:
+    """Reconstructs frames by the near-light model, doing for each what it needs.
+
+    Work buffers are kept from frame to frame; results are always new. It may be called from
+    several threads, which then wait for each other. Results do not depend on the number of
+    worker threads.
+
+    Parameters
+    ----------
+    calibration, full
+        The sensor's.
+    workers : int
+        Threads.
+    settings : mapping, optional
+        What each effort spends on a frame.
+    """
+
+    def __init__(
+        self,
+        calibration: Calibration,
+        full: FullModel,
+        *,
+        workers: int,
+        settings: Mapping[str, Settings] = SETTINGS,
+    ) -> None:
+        self._settings = settings
+        self.calibration = calibration
+        self.maps = SensorMaps(calibration, full)
+        self.workers = RowWorkers(workers)
+        self._margin_mm = max(MARGIN_DECAYS * full.decay_mm, LEAST_MARGIN_MM)
+        self._finders: dict[bool, ContactFinder] = {}
+        self.visible_mm = self._finder(False).visible_mm
+        buffers = Buffers()
+        self._take = buffers.take
+        self._sampler = PressSampler(self.maps, self.workers, buffers)
+        self._solver = RegionSolver(self.maps, self.workers, buffers)
+        self._lock = Lock()
+
+    def depth(
+        self,
+        frame: NDArray[Any],
+        *,
+        effort: str = "best",
+        terms: Terms = ALL_TERMS,
+        normals: bool = True,
+        uncertainty: bool = False,
+        everywhere: bool = False,
+        light: LightGain | None = None,
+    ) -> NearLightDepth:
+        """Reconstruct a raw frame (height, width, 3), uint8, uint16 or float.
+
+        Parameters
+        ----------
+        frame
+            RGB, as the camera encodes it; floats linear light 0..1.
+        effort : str, optional
+            ``best``, ``balanced`` or ``fast``.
+        terms : Terms, optional
+            What the model includes; by default everything.
+        normals : bool, optional
+            Whether they are wanted.
+        uncertainty : bool, optional
+            Whether to find out how far the depth may be off; needs ``best``.
+        everywhere : bool, optional
+            Whether to solve the whole grid without looking for a contact.
+        light : LightGain, optional
+            How the light differs from that at calibration, which is undone.
+
+        Raises
+        ------
+        ValueError
+            If standard deviations are wanted of a coarser scale.
+        """
+        if uncertainty and self._settings[effort].factor != 1:
+            raise ValueError(f"standard deviations need the effort best, not {effort}")
+        record, used = TraceRecorder(), self.effort_for(effort)
+        self._note_effort(record, effort, used)
+        wanted = Wanted(used, terms, normals, uncertainty)
+        with self._lock:
+            image = _image(frame, light)
+            region = self._region(image, record, everywhere)
+            return self._depth(image, region, wanted, record)
+
+    def needs(
+        self,
+        frame: NDArray[Any],
+        *,
+        effort: str = "best",
+        terms: Terms = ALL_TERMS,
+        light: LightGain | None = None,
+    ) -> Trace:
+        """Return which steps a frame needs, by looking for a contact only.
+
+        Parameters
+        ----------
+        frame, effort, terms, light
+            As in :meth:`depth`.
+        """
+        record, used = TraceRecorder(), self.effort_for(effort)
+        self._note_effort(record, effort, used)
+        factor = self._settings[used].factor
+        with self._lock:
+            region = self._region(_image(frame, light), record, False)
+        if region is None:
+            _nothing_pressed(record)
+        else:
+            names = (COMPARING, COARSE_ROUNDS, LAST_ROUND[factor], INTEGRATION, PLACING)
+            record.steps += [TraceStep(n, True, tr("a contact was found")) for n in names]
+            self._left_out(record, factor, terms)
+        return Trace(used, tuple(record.steps))
+
+    def effort_for(self, effort: str) -> str:
+        """Return the effort, or the first finer one whose nodes resolve the membrane's drape."""
+        pitch_mm, decay_mm = self.calibration.table.grid.pitch_mm, self.maps.full.decay_mm
+        finer = EFFORTS[EFFORTS.index(effort) :]
+        fits = (e for e in finer if self._settings[e].factor * pitch_mm <= RESOLVED * decay_mm)
+        return next(fits, EFFORTS[-1])
+
+    def _note_effort(self, record: TraceRecorder, wanted: str, used: str) -> None:
+        """Note that the images are too small for an effort."""
+        if wanted != used:
+            pitch_mm = self._settings[wanted].factor * self.calibration.table.grid.pitch_mm
+            why = tr("the images are too small: nodes of {p:.2f} mm are wider than the drape")
+            record.left_out(tr("effort {name}").format(name=wanted), why.format(p=pitch_mm))
+
+    def solved(
+        self, frame: NDArray[Any], *, effort: str = "best", everywhere: bool = False
+    ) -> Solved | None:
+        """Return the solved region of a frame, for experiments; None where nothing is pressed.
+
+        It lies in the solver's buffers, which the next frame overwrites.
+
+        Parameters
+        ----------
+        frame, effort, everywhere
+            As in :meth:`depth`.
+        """
+        record, wanted = TraceRecorder(), Wanted(effort, ALL_TERMS, False, False)
+        with self._lock:
+            image = _image(frame)
+            region = self._region(image, record, everywhere)
+            return None if region is None else self._solved(image, region, wanted, record)[1]
+
+    def coarse_depth(self, frame: NDArray[Any]) -> Map:
+        """Return the depth along the rays (rows / 4, columns / 4) of the whole field.
+
+        Parameters
+        ----------
+        frame
+            As in :meth:`depth`.
+        """
+        with self._lock:
+            raw, linear, _ = _image(frame)
+            region = Region((0, 0), self.maps.scale(COARSE).kind.shape)
+            found = self._sampler.compare(
+                raw, region, factor=COARSE, linear=linear, terms=ALL_TERMS
+            )
+            return self._solver.rounds(region, found, self._settings["best"], ALL_TERMS)[0].depth_mm
+
+    def _depth(
+        self, image: Image, region: Region | None, wanted: Wanted, record: TraceRecorder
+    ) -> NearLightDepth:
+        depth = np.zeros(self.maps.flags.shape, np.float32)
+        flags = self.maps.flags.copy()
+        shown = flat_normals(depth.shape) if wanted.normals else None
+        rounds, boundary, noise, unsolved = None, Boundary(), None, 0.0
+        if region is None:
+            _nothing_pressed(record)
+            noise = no_contact_noise(depth.shape) if wanted.uncertainty else None
+        else:
+            rounds, solved = self._solved(image, region, wanted, record)
+            boundary = solved.boundary
+            unsolved = unsolved_share(solved)
+            with record.done(PLACING, depth.size * SHOWN_BYTES) as reason:
+                self._show(solved, wanted.terms, depth, flags, shown)
+                if boundary.level_sd_mm > 0.0:
+                    flags[(flags & np.uint8(Flag.OUTSIDE)) == 0] |= np.uint8(Flag.UNANCHORED)
+                reason.append(tr("and to the scale of the whole grid"))
+            if wanted.uncertainty:
+                with record.done(tr("standard deviations"), depth.nbytes) as reason:
+                    noise = self._noise(image, solved, wanted.terms)
+                    reason.append(tr("asked for"))
+        if not wanted.normals:
+            record.left_out(tr("normals"), tr("not requested"))
+        if not wanted.uncertainty:
+            record.left_out(tr("standard deviations"), tr("not requested"))
+        trace = Trace(wanted.effort, tuple(record.steps))
+        return NearLightDepth(
+            depth, shown, flags, boundary, rounds, trace, noise, unsolved, self.visible_mm
+        )
+
+    def _noise(self, image: Image, solved: Solved, terms: Terms) -> DepthNoise:
+        """Return how far a solved region may be off."""
+        picture, at = solved.compared.fine, (solved.scale, solved.region.at(COARSE)[0])
+        # Solving again overwrites the slopes' buffers.
+        slopes = Slopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
+        kept = solved._replace(slopes=slopes, weight=solved.weight.copy())
+
+        def solve(ratio: Map, start: tuple[Map, Map]) -> Slopes:
+            shaken = picture._replace(ratio=ratio)
+            return self._solver.slopes(at, shaken, solved.start_mm, MOVED, terms, start)
+
+        levels = self._sampler.levels(image.raw.dtype, image.linear)
+        noise = image_noise(image.raw, levels, self.workers)
+        light_sd = None if image.light is None else image.light.sd
+        return depth_noise(kept, self.maps, noise, solve, self.workers, light_sd=light_sd)
+
+    def _finder(self, linear: bool) -> ContactFinder:
+        """Return what looks for contacts in raw images, or in those of linear light."""
+        straight = linear or self.calibration.response is None
+        if straight not in self._finders:
+            seen = replace(self.calibration, response=None) if straight else self.calibration
+            beside_mm = 2.0 * self._margin_mm
+            self._finders[straight] = contact_finder(seen, self.maps.full, beside_mm=beside_mm)
+        return self._finders[straight]
+
+    def _region(self, image: Image, record: TraceRecorder, everywhere: bool) -> Region | None:
+        scale = self.maps.scale(COARSE)
+        whole = Region((0, 0), scale.kind.shape)
+        if everywhere:
+            record.left_out(LOOKING, tr("the whole field is wanted"))
+            return whole
+        with record.done(LOOKING, image.raw.nbytes) as reason:
+            contact = self._finder(image.linear).find(image.raw, self.workers, image.gain)
+            if contact is None:
+                reason.append(
+                    tr("the image is that of the background; visible from {um:.0f} um").format(
+                        um=1e3 * self.visible_mm
+                    )
+                )
+                return None
+            region = padded_region(contact, scale, self._margin_mm)
+            share = region.nodes / whole.nodes
+            reason.append(tr("{share:.0%} of the field is solved").format(share=share))
+        return whole if share > WHOLE else region
+
+    def _solved(
+        self, image: Image, region: Region, wanted: Wanted, record: TraceRecorder
+    ) -> tuple[Rounds, Solved]:
+        """Solve a region."""
+        settings, terms = self._settings[wanted.effort], wanted.terms
+        factor = settings.factor
+        found, rounds, start = self._begun(image, region, wanted, record)
+        if start.boundary.cut:
+            record.left_out(LOOKING, tr("the contact goes on beyond it: the whole field is solved"))
+            region = Region((0, 0), self.maps.scale(COARSE).kind.shape)
+            found, rounds, start = self._begun(image, region, wanted, record)
+        nodes, count = region.nodes * (COARSE // factor) ** 2, len(rounds.changes_mm)
+        if count < terms.near_light_rounds:
+            record.left_out(tr("second near-light round"), tr("the press is that shallow"))
+        with record.done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
+            weighted = self._solver.last_slopes(region, found, start, settings, terms)
+            reason.append(tr("from the depth at quarter scale"))
+        with record.done(INTEGRATION, 5 * nodes * 4) as reason:
+            solved = self._solver.last_depth(
+                region, found, weighted, start.boundary, settings, terms
+            )
+            reason.append(
+                tr("conjugate gradients, rounds: {n}").format(n=solved.integration_rounds)
+            )
+        self._left_out(record, factor, terms)
+        if factor == 1 and terms.denoising and found.edge is None:
+            record.left_out(tr("denoising"), tr("the image has next to no noise"))
+        if start.boundary.free is None:
+            record.left_out(tr("free boundary"), tr("no contact crosses the boundary"))
+        return rounds, solved
+
+    def _begun(
+        self, image: Image, region: Region, wanted: Wanted, record: TraceRecorder
+    ) -> tuple[Compared, Rounds, Start]:
+        """Compare a region with the background, and do the rounds at the coarsest scale."""
+        settings, terms = self._settings[wanted.effort], wanted.terms
+        factor = settings.factor
+        nodes = region.nodes * (COARSE // factor) ** 2
+        with record.done(COMPARING, nodes * SAMPLED_BYTES) as reason:
+            found = self._sampler.compare(
+                image.raw,
+                region,
+                factor=factor,
+                linear=image.linear,
+                terms=terms,
+                gain=image.gain,
+            )
+            reason.append(tr("crosstalk and camera response undone on the way"))
+        size = terms.near_light_rounds * region.nodes * SOLVED_BYTES
+        with record.done(COARSE_ROUNDS, size) as reason:
+            rounds, start = self._solver.rounds(region, found, settings, terms)
+            count, deepest = len(rounds.changes_mm), float(rounds.depth_mm.max())
+            reason.append(tr("rounds: {n}; {d:.2f} mm deep").format(n=count, d=deepest))
+            if start.boundary.free is not None:
+                reason.append(tr("a contact crosses the boundary, which is free there"))
+        return found, rounds, start
+
+    def _left_out(self, record: TraceRecorder, factor: int, terms: Terms) -> None:
+        """Note what the scale, the membrane and the terms leave out."""
+        if factor > 1:
+            record.left_out(tr("denoising"), tr("averages over 2 x 2 pixels have half the noise"))
+            record.left_out(LAST_ROUND[1], tr("this effort does without it"))
+        elif not terms.denoising:
+            record.left_out(tr("denoising"), tr("left out by hand"))
+        if self.maps.membrane.bounce is None:
+            record.left_out(tr("interreflection"), tr("this membrane gives none"))
+        if self.maps.membrane.gloss is None:
+            record.left_out(tr("gloss"), tr("this membrane has none"))
+
+    def _show(
+        self,
+        solved: Solved,
+        terms: Terms,
+        depth: Map,
+        flags: NDArray[np.uint8],
+        normals: Map | None,
+    ) -> None:
+        """Bring a region to true positions, and to the scale of the whole grid."""
+        scale, slopes, place = solved.scale, solved.slopes, solved.place
+        corner, shape = solved.region.at(COARSE // scale.factor)
+        placed, marks = self._take("placed", shape), self._take("marks", shape, np.uint8)
+        self.workers.run(
+            shape[0],
+            place_rows,
+            solved.depth_mm,
+            scale,
+            corner,
+            terms.true_positions,
+            slopes.flags,
+            int(Flag.NOT_OBSERVABLE),
+            placed,
+            marks,
+            place,
+        )
+        at, whole = solved.region.at(COARSE)
+        outside, factor = int(Flag.OUTSIDE), scale.factor
+        self.workers.run(whole[0], show_depth, placed, marks, factor, at, outside, depth, flags)
+        if normals is not None:
+            x, y = slopes.normal_x, slopes.normal_y
+            self.workers.run(whole[0], show_normals, x, y, place, factor, at, normals)
+
+
+def _nothing_pressed(record: TraceRecorder) -> None:
+    for name in (COMPARING, tr("near light"), INTEGRATION):
+        record.left_out(name, tr("nothing is pressed into the membrane"))
+
+
+def flat_normals(shape: tuple[int, ...]) -> Map:
+    """Return normals (rows, columns, 3) of the flat membrane."""
+    normals = np.zeros((*shape, 3), np.float32)
+    normals[..., 2] = -1.0
+    return normals
+
+
+def _image(frame: NDArray[Any], light: LightGain | None = None) -> Image:
+    """Return a frame in whole numbers."""
+    if frame.dtype.kind != "f":
+        # numba would compile the kernel a second time for a read-only array.
+        return Image(np.require(frame, requirements=["C", "W"]), False, light)
+    finite = np.isfinite(frame)
+    code = np.clip(np.where(finite, frame, 0.0), 0.0, 1.0) * (MISSING_CODE - 1) + 0.5
+    return Image(np.where(finite, code, MISSING_CODE).astype(np.uint16), True, light)

@@ -1,0 +1,152 @@
+"""What the compiled near-light solve reads and writes, in named structures."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Map = NDArray[np.float32]
+Triple = tuple[float, float, float]
+NOT_FINITE = 8
+"""Bit of `Picture.marks`: a pixel was not a finite number."""
+
+
+class Picture(NamedTuple):
+    """Press over background in a region of one scale.
+
+    Attributes
+    ----------
+    ratio, noise, around : (3, rows, columns) float32
+        Press over background, its standard deviation, and its average over the neighbourhood
+        (``around`` is (3, 1, 1) where the membrane gives no light to itself).
+    marks : (rows, columns) uint8
+        Bits 0 to 2: the channel is saturated; `NOT_FINITE`.
+    """
+
+    ratio: Map
+    noise: Map
+    around: Map
+    marks: NDArray[np.uint8]
+
+
+class Scale(NamedTuple):
+    """What one scale of the solve reads of a sensor, for the whole grid.
+
+    Attributes
+    ----------
+    factor : int
+        Nodes of the calibration's grid to one node of this scale, along an axis.
+    x_mm, y_mm : float
+        First node, sensor frame.
+    pitch_mm : float
+        Distance between nodes.
+    flat : (3, rows, columns) float32
+        Brightness of the flat membrane under each light, times z / r^3.
+    kind : (rows, columns) uint8
+        2 usable, 1 inside but not usable, 0 outside.
+    rays : (6, coarse rows, coarse columns) float32
+        Ray slope by depth (x, y), and its derivatives along x (x, y) and along y (x, y).
+    ray_step : float
+        Nodes of `rays` to one node of this scale.
+    """
+
+    factor: int
+    x_mm: float
+    y_mm: float
+    pitch_mm: float
+    flat: Map
+    kind: NDArray[np.uint8]
+    rays: Map
+    ray_step: float
+
+
+class MembraneNumbers(NamedTuple):
+    """Membrane and lights as plain numbers in single precision.
+
+    Attributes
+    ----------
+    leds : 3 x 3
+        Positions, sensor frame, mm.
+    dark : 3
+        Brightness below which a channel is dark.
+    curves : 3 x 8
+        Polynomials of the diffuse share by the cosine, over pi, constant first.
+    table : (3, nodes) float32 or None
+        The same at even cosines, where no polynomial follows the curve.
+    gloss : 2, or None
+        Share and squared roughness of the glossy lobe.
+    bounce : float or None
+        Share of the light from the surroundings (interreflection).
+    coverage : 3 x 2
+        Cosines of each light that the ball presses have shown.
+    """
+
+    leds: tuple[Triple, Triple, Triple]
+    dark: Triple
+    curves: tuple[tuple[float, ...], ...]
+    table: Map | None
+    gloss: tuple[float, float] | None
+    bounce: float | None
+    coverage: tuple[tuple[float, float], ...]
+
+
+class Steps(NamedTuple):
+    """How far the normals are solved.
+
+    Attributes
+    ----------
+    most : int
+        Gauss-Newton steps at most.
+    settled : float
+        Square of the move below which a block of nodes is done.
+    shadows : bool
+        Whether a dark channel is missing information; else its value is believed.
+    warm : bool
+        Whether to start from the normals that `Slopes` holds.
+    """
+
+    most: int
+    settled: float
+    shadows: bool
+    warm: bool
+
+
+class Slopes(NamedTuple):
+    """Slopes along the rays of a region, as the integration wants them, (rows, columns) each.
+
+    Attributes
+    ----------
+    slope_x, slope_y : float32
+        Change of the depth from node to node, per mm.
+    weight : float32
+        How far the slopes are to be trusted, 0..1.
+    flags : uint8
+        Bits of :class:`Flag`.
+    normal_x, normal_y : float32
+        Of the unit normal, z < 0.
+    """
+
+    slope_x: Map
+    slope_y: Map
+    weight: Map
+    flags: NDArray[np.uint8]
+    normal_x: Map
+    normal_y: Map
+
+
+def slopes_like(depth_mm: Map, take: Any = None) -> Slopes:
+    """Return room for the slopes of a region; `take` lends arrays by name, shape and kind."""
+
+    def lend(name: str, kind: type[np.generic] = np.float32) -> Any:
+        return np.empty(depth_mm.shape, kind) if take is None else take(name, depth_mm.shape, kind)
+
+    return Slopes(
+        lend("slope x"),
+        lend("slope y"),
+        lend("weight"),
+        lend("flags", np.uint8),
+        lend("normal x"),
+        lend("normal y"),
+    )

@@ -1,0 +1,455 @@
+"""How far noise and what the model does not explain move slopes and depth of the near-light model.
+
+Slopes: each channel is moved up and down by its noise and the normals are solved again, so that
+conditioning, missing channels and weights all count as they did in the answer. Depth: random fields
+of slope errors are integrated with the answer's own weights at quarter scale. Noise is white;
+each octave of its wavelengths adds alike to the depth's variance, and of the two octaves that
+quarter scale leaves out, the average of the even parts has removed most. Repeats of an image
+scatter by that. What the ball presses leave unexplained errs over lengths like the drape's and only
+where the membrane is disturbed; it is the same in every repeat and another in every press. What the
+calibration adds is common to all presses and is kept with it (:class:`ScaleSd`).
+
+Outside the solved region the depth is 0 in every repeat; what was left out there is part of the
+model's own error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.near_light.denoise import QUIET_PX
+from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise
+from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, block_average
+from gelpolight_core.reconstruction.near_light.region_solver import Solved
+from gelpolight_core.reconstruction.near_light.structures import Scale, Slopes, slopes_like
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+Map = NDArray[np.float32]
+EXAMPLES = 64
+"""The standard deviation of 64 examples is known to 1 / sqrt(128), a twelfth of itself."""
+MODEL_EXAMPLES = 16
+"""What the model leaves open is known less well anyway."""
+DEPARTURE = 0.3
+"""Press over background departs from 1 by about this where balls are pressed; there the joint
+refinement found its misfit. Where the membrane is less disturbed, less can be wrong."""
+TOLERANCE = 0.03
+"""An example needs to be right to a few percent only."""
+LEAST_NOISE = 1e-5
+"""A share of the brightness below any camera's noise; zero would say nothing of conditioning."""
+LEFT_OUT_MM, LEFT_OUT_SLOPE = 2e-3, 3e-3
+"""Standard deviation of depth and slope outside the solved region, where they are taken as 0."""
+
+Solve = Callable[[Map, tuple[Map, Map]], Slopes]
+
+
+@dataclass(frozen=True, slots=True)
+class SlopeNoise:
+    """What the noise of each channel does to the slopes.
+
+    Attributes
+    ----------
+    moved_x, moved_y : (3, rows, columns) float32
+        Change of the slopes along the rays by one standard deviation of each channel's noise.
+    moved : (3, rows, columns) float32
+        Size of the change of the surface's slopes, the root mean square of x and y.
+    """
+
+    moved_x: Map
+    moved_y: Map
+    moved: Map
+
+
+@dataclass(frozen=True, slots=True)
+class DepthNoise:
+    """How far slopes and depth may be off, on the metric grid.
+
+    Attributes
+    ----------
+    slope_sd, depth_sd_mm : (rows, columns) float32
+        Standard deviations from the noise of a single image.
+    slope_model_sd, depth_model_sd_mm : (rows, columns) float32
+        Standard deviations from what the model does not explain of a press.
+    examples_mm : (examples, rows / 4, columns / 4) float32
+        Errors of the depth that this noise could as well have made; each is one whole map, so that
+        what is computed from a depth map can be given its own standard deviation.
+    """
+
+    slope_sd: Map
+    depth_sd_mm: Map
+    slope_model_sd: Map
+    depth_model_sd_mm: Map
+    examples_mm: Map
+
+
+def no_contact_noise(shape: tuple[int, ...]) -> DepthNoise:
+    """Return what may be off where nothing is solved."""
+    rows, columns = shape
+    zero, depth, slope = (
+        np.full(shape, value, np.float32) for value in (0.0, LEFT_OUT_MM, LEFT_OUT_SLOPE)
+    )
+    examples = np.zeros((EXAMPLES, rows // COARSE, columns // COARSE), np.float32)
+    return DepthNoise(zero, zero.copy(), slope, depth, examples)
+
+
+def depth_noise(
+    answer: Solved,
+    maps: SensorMaps,
+    noise: ImageNoise,
+    solve: Solve,
+    workers: RowWorkers,
+    *,
+    light_sd: NDArray[np.float64] | None = None,
+) -> DepthNoise:
+    """Follow an image's noise, and the model's misfit, to the metric grid.
+
+    Parameters
+    ----------
+    answer : Solved
+        What was solved.
+    maps : SensorMaps
+        The sensor's.
+    noise : ImageNoise
+        Of the raw image.
+    solve : function
+        Returns the slopes of another ratio (3, rows, columns), from first normals (x, y) that it
+        overwrites.
+    workers : RowWorkers
+        Threads.
+    light_sd : (3,), optional
+        Standard deviation of each channel's gain, where the image was corrected for it.
+    """
+    (top, left), (rows, columns) = answer.region.at(COARSE)
+    here = np.s_[top : top + rows, left : left + columns]
+    count = pixels_per_node(maps.calibration.table, here)
+    share, share_placed = (noise_left(answer.compared.edge, count, resampled=n) for n in (1, 2))
+    sd = _ratio_sd(answer.compared.fine.ratio, maps, noise, share, here, workers)
+    moves = slope_noise(answer.compared.fine.ratio, sd, answer.slopes, solve)
+    # A block's average has the noise of all raw pixels in it; no filter reduces that.
+    block = (1.0 / (COARSE * np.sqrt(count) * share)).astype(np.float32)
+    times = model_times(answer.compared.fine.ratio, sd, maps.full.misfit)
+    coarse = maps.scale(COARSE)
+    white = depth_examples(moves, block, answer, coarse.pitch_mm, workers=workers)
+    model = depth_examples(
+        moves,
+        times,
+        answer,
+        coarse.pitch_mm,
+        reach_mm=maps.full.decay_mm,
+        examples=MODEL_EXAMPLES,
+        workers=workers,
+    )
+    placed, placed_model = (place_examples(e, answer, coarse) for e in (white, model))
+    result = no_contact_noise(maps.flags.shape)
+    # Bringing normals to true positions averages them once more.
+    slope_sd = np.sqrt((moves.moved**2).sum(axis=0)) * share_placed / share
+    slope_model_sd = np.sqrt(((moves.moved * times) ** 2).sum(axis=0))
+    result.slope_sd[here] = _at(slope_sd, answer.place)
+    result.slope_model_sd[here] = _at(slope_model_sd, answer.place)
+    result.depth_sd_mm[here] = _root_mean_square(placed, (rows, columns))
+    model_sd = _root_mean_square(placed_model, (rows, columns))
+    one_sided = answer.boundary.depth_sd * np.abs(_at(answer.depth_mm, answer.place))
+    level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
+    if light_sd is not None:
+        shares = light_sd.astype(np.float32)[:, None, None]
+        moved = gain_errors(moves, shares * answer.compared.fine.ratio / sd, answer, coarse)
+        moved_sd = _root_mean_square(place_examples(moved, answer, coarse), (rows, columns))
+        level_sd = np.hypot(level_sd, np.sqrt(len(moved)) * moved_sd)
+    result.depth_model_sd_mm[here] = np.hypot(model_sd, level_sd)
+    (top, left), (rows, columns) = answer.region.corner, answer.region.shape
+    result.examples_mm[:, top : top + rows, left : left + columns] = placed
+    return result
+
+
+def _ratio_sd(
+    ratio: Map,
+    maps: SensorMaps,
+    noise: ImageNoise,
+    share: Map,
+    here: tuple[slice, slice],
+    workers: RowWorkers,
+) -> Map:
+    """Return the standard deviation (3, rows, columns) of press over background."""
+    mix = maps.calibration.crosstalk.astype(np.float32)
+    unmix = np.linalg.inv(maps.calibration.crosstalk) ** 2
+    base = maps.full.background[here]
+    # A step of a hundredth of the light: the curves are straight lines between few levels.
+    even = np.linspace(0.0, 1.0, 101, dtype=np.float32)
+    table = noise.at(np.repeat(even[None, None], 3, axis=0))[:, 0]
+    sd = np.empty_like(ratio)
+    workers.run(
+        len(share), _noise_of_ratio, ratio, base, mix, unmix.astype(np.float32), table, share, sd
+    )
+    return sd
+
+
+@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+def _noise_of_ratio(first, last, ratio, base, mix, unmix, table, share, sd):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    least = np.float32(LEAST_NOISE)
+    variance = np.empty(3, np.float32)
+    top = table.shape[1] - 1
+    for i in range(first, last):
+        for j in range(share.shape[1]):
+            for k in range(3):
+                seen = np.float32(0.0)
+                for c in range(3):
+                    seen += mix[k, c] * ratio[c, i, j] * base[i, j, c]
+                place = min(max(seen, np.float32(0.0)), np.float32(1.0)) * np.float32(top)
+                n = min(int(place), top - 1)
+                rest = place - np.float32(n)
+                variance[k] = table[k, n] + rest * (table[k, n + 1] - table[k, n])
+            for k in range(3):
+                own = np.float32(0.0)
+                for c in range(3):
+                    own += unmix[k, c] * variance[c]
+                value = share[i, j] * np.sqrt(own) / max(base[i, j, k], least)
+                sd[k, i, j] = max(value, least)
+
+
+def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> SlopeNoise:
+    """Move each channel by its noise, and solve the normals again.
+
+    Parameters
+    ----------
+    ratio, ratio_sd : (3, rows, columns) float32
+        Press over background, and its standard deviation, > 0.
+    slopes : Slopes
+        The answer's.
+    solve : function
+        As for :func:`depth_noise`.
+    """
+    moved_x, moved_y, moved = (np.empty_like(ratio) for _ in range(3))
+    shaken = ratio.copy()
+    high = slopes_like(ratio[0])
+    for k in range(3):
+        for sign in (1.0, -1.0):
+            np.add(ratio[k], np.float32(sign) * ratio_sd[k], out=shaken[k])
+            found = solve(shaken, (slopes.normal_x.copy(), slopes.normal_y.copy()))
+            if sign > 0.0:
+                high.slope_x[:], high.slope_y[:] = found.slope_x, found.slope_y
+                high.normal_x[:], high.normal_y[:] = found.normal_x, found.normal_y
+        shaken[k] = ratio[k]
+        _half_differences(high, found, moved_x[k], moved_y[k], moved[k])
+    return SlopeNoise(moved_x, moved_y, moved)
+
+
+@numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+def _half_differences(high, low, moved_x, moved_y, moved):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    half, least, one = np.float32(0.5), np.float32(1e-6), np.float32(1.0)
+    for i in range(moved.shape[0]):
+        for j in range(moved.shape[1]):
+            moved_x[i, j] = half * (high.slope_x[i, j] - low.slope_x[i, j])
+            moved_y[i, j] = half * (high.slope_y[i, j] - low.slope_y[i, j])
+            a, b = high.normal_x[i, j], high.normal_y[i, j]
+            c, d = low.normal_x[i, j], low.normal_y[i, j]
+            up = one / np.sqrt(max(one - a * a - b * b, least))
+            down = one / np.sqrt(max(one - c * c - d * d, least))
+            x, y = a * up - c * down, b * up - d * down
+            moved[i, j] = np.sqrt(np.float32(0.125) * (x * x + y * y))
+
+
+def depth_examples(
+    noise: SlopeNoise,
+    times: Map,
+    answer: Solved,
+    pitch_mm: float,
+    *,
+    reach_mm: float = 0.0,
+    examples: int = EXAMPLES,
+    workers: RowWorkers,
+) -> Map:
+    """Integrate examples of slope errors at quarter scale.
+
+    Parameters
+    ----------
+    noise : SlopeNoise
+        At full scale.
+    times : (3, rows, columns) or (rows, columns) float32
+        How many standard deviations of `noise` an average over 4 x 4 nodes errs by.
+    answer : Solved
+        Its weights are used.
+    pitch_mm : float
+        Distance between nodes at quarter scale.
+    reach_mm : float, optional
+        Over which errors hang together; 0: they are white.
+    examples : int, optional
+        How many.
+    workers : RowWorkers
+        Threads.
+
+    Returns
+    -------
+    (examples, rows / 4, columns / 4) float32
+        Along the rays.
+    """
+    moved_x, moved_y = (
+        np.stack([block_average(m, COARSE) for m in part * times])
+        for part in (noise.moved_x, noise.moved_y)
+    )
+    # Two draws with the covariance that three channels' noise gives the two slopes.
+    along = np.sqrt((moved_x**2).sum(axis=0))
+    across = (moved_x * moved_y).sum(axis=0) / np.maximum(along, 1e-12)
+    own = np.sqrt(np.maximum((moved_y**2).sum(axis=0) - across**2, 0.0))
+    weight = block_average(answer.weight, COARSE)
+    hold = None if answer.hold is None else block_average(answer.hold, COARSE)
+    sigma = reach_mm / (pitch_mm * np.sqrt(2.0))
+    found = np.empty((examples, *weight.shape), np.float32)
+
+    def draw(first: int, last: int) -> None:
+        for n in range(first, last):
+            # Each example has its own source, so that the threads do not matter.
+            random = np.random.default_rng(n)
+            drawn = random.standard_normal((2, *weight.shape), dtype=np.float32)
+            if sigma > 0.0:
+                drawn = np.stack([cv2.GaussianBlur(d, (0, 0), sigma) for d in drawn])
+                drawn /= drawn.std()
+            found[n] = integrate_weighted(
+                along * drawn[0],
+                across * drawn[0] + own * drawn[1],
+                weight,
+                pitch_mm=pitch_mm,
+                hold=hold,
+                tolerance=TOLERANCE,
+            ).depth_mm
+
+    workers.run(examples, draw)
+    return found
+
+
+def gain_errors(noise: SlopeNoise, times: Map, answer: Solved, coarse: Scale) -> Map:
+    """Integrate what the gain of each channel errs by, at quarter scale.
+
+    Parameters
+    ----------
+    noise : SlopeNoise
+        Slopes moved by each channel.
+    times : (3, rows, columns) float32
+        How many standard deviations of `noise` the gain errs by.
+    answer : Solved
+        Its weights are used.
+    coarse : Scale
+        Of the whole grid.
+
+    Returns
+    -------
+    (3, rows / 4, columns / 4) float32
+        Depth along the rays.
+    """
+    weight = block_average(answer.weight, COARSE)
+    hold = None if answer.hold is None else block_average(answer.hold, COARSE)
+    return np.stack(
+        [
+            integrate_weighted(
+                block_average(x * n, COARSE),
+                block_average(y * n, COARSE),
+                weight,
+                pitch_mm=coarse.pitch_mm,
+                hold=hold,
+                tolerance=TOLERANCE,
+            ).depth_mm
+            for x, y, n in zip(noise.moved_x, noise.moved_y, times, strict=True)
+        ]
+    )
+
+
+def model_times(ratio: Map, ratio_sd: Map, misfit: float) -> Map:
+    """Return the model's own error in units of the noise, (3, rows, columns).
+
+    Parameters
+    ----------
+    ratio, ratio_sd : (3, rows, columns) float32
+        Press over background and its noise.
+    misfit : float
+        What the joint refinement left of it on the ball presses.
+    """
+    disturbed = np.minimum(np.abs(ratio - 1.0) / DEPARTURE, 1.0)
+    return np.asarray(misfit * disturbed / ratio_sd, np.float32)
+
+
+def place_examples(examples_mm: Map, answer: Solved, coarse: Scale) -> Map:
+    """Bring examples (examples, rows / 4, columns / 4) from the rays to true positions.
+
+    Parameters
+    ----------
+    examples_mm : (examples, rows / 4, columns / 4) float32
+        Along the rays.
+    answer : Solved
+        Its normals and places.
+    coarse : Scale
+        Of the whole grid.
+    """
+    (top, left), (rows, columns) = answer.region.corner, answer.region.shape
+    ray_x, ray_y = coarse.rays[:2, top : top + rows, left : left + columns]
+    normal_x, normal_y = (
+        block_average(n, COARSE) for n in (answer.slopes.normal_x, answer.slopes.normal_y)
+    )
+    down = -np.sqrt(np.maximum(1.0 - normal_x**2 - normal_y**2, 1e-3))
+    # A ray's point slides along the surface as it goes deeper: D(P0 + d w) = d.
+    stretch = np.abs((down - normal_x * ray_x - normal_y * ray_y) / down)
+    first = np.float32(0.5 * (COARSE - 1))
+    at = np.stack([(block_average(p, COARSE) - first) / np.float32(COARSE) for p in answer.place])
+    return np.stack([_at(e * stretch, at) for e in examples_mm])
+
+
+def _at(values: Map, place: Map) -> Map:
+    """Return values of the rays at true positions."""
+    return np.asarray(
+        cv2.remap(
+            np.asarray(values, np.float32),
+            place[0],
+            place[1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+    )
+
+
+def _root_mean_square(examples_mm: Map, shape: tuple[int, int]) -> Map:
+    variance = cv2.resize(np.mean(examples_mm**2, axis=0), shape[::-1])
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)), np.float32)
+
+
+def noise_left(edge: Map | None, pixels_per_node: Map, *, resampled: int) -> Map:
+    """Return the share (rows, columns) of a raw pixel's noise that a denoised node still has.
+
+    Bilinear resampling (a tent of variance 1/6 pixel^2 per axis) and the average over `QUIET_PX`
+    are taken together as Gaussians. Where the image is left as it is, the tents alone count:
+    averaged over where a node falls between the pixels, one leaves 2/3 of the variance per axis,
+    two together (a cubic B-spline) leave 151/315. Wider averages are not included.
+
+    Parameters
+    ----------
+    edge : (rows, columns) float32 or None
+        How far a node was left as it is, 0..1; None where all were.
+    pixels_per_node : (rows, columns) float32
+        Raw pixels in the area of one node.
+    resampled : int
+        How many times, 1 or 2.
+    """
+    kept = np.ones_like(pixels_per_node) if edge is None else edge
+    tent = resampled / (3.0 * pixels_per_node)
+    bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2
+
+    def shared(average_px2: float) -> Map:
+        return np.asarray(1.0 / (2.0 * np.pi * pixels_per_node * (average_px2 + tent)))
+
+    even = 1.0 - kept
+    variance = even**2 * shared(2.0 * QUIET_PX**2) + kept**2 * bare
+    variance += 2.0 * even * kept * shared(QUIET_PX**2)
+    return np.sqrt(variance).astype(np.float32)
+
+
+def pixels_per_node(table: ResamplingTable, here: tuple[slice, slice]) -> Map:
+    """Return how many raw pixels lie in the area of one node of a region, (rows, columns)."""
+    u_row, u_column = np.gradient(table.u_px[here])
+    v_row, v_column = np.gradient(table.v_px[here])
+    count = np.abs(u_column * v_row - u_row * v_column)
+    # At the edge of what is seen the differences mean nothing.
+    return np.asarray(np.where(table.valid[here], np.clip(count, 0.1, 10.0), 1.0), np.float32)

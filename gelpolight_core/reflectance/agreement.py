@@ -1,0 +1,275 @@
+"""Judge each ball press against the others: does the stated radius agree with them.
+
+The other presses give the membrane's curve (brightness over the light's cosine, Eq. 6); with that
+curve the radius and the centre of a press follow from its own shading. A press whose radius comes
+out as stated agrees with the others. An error that all presses share cannot be seen this way.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.masks import SATURATED
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.quality import Figure, judge
+from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress, contact_mask
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+
+LEAST_PRESSES = 4
+"""With fewer, nobody knows which of two that disagree is wrong."""
+MOST_PIXELS = 1500
+BINS = np.linspace(0.05, 1.0, 39)
+LEAST_IN_BIN = 8
+RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 15.0, 25.0
+ODD_CHANGE = 0.2
+ODD_WARN_PERCENT = 15.0
+MOVED_SHARE = 0.25
+"""Share of the contact radius by which a circle that is in its place is never moved."""
+
+
+@dataclass(frozen=True, slots=True)
+class PressAgreement:
+    """How a press agrees with the others.
+
+    Attributes
+    ----------
+    name : str
+        The image's file.
+    stated_radius_mm, radius_mm : float
+        Of the ball: as stated, and as the press's shading asks for.
+    moved_share : float
+        How far the shading moves the centre, of the contact radius.
+    misfit : float
+        Relative misfit (robust) of the shading with the stated radius.
+    own_misfit : float
+        The same with the radius and centre that fit best.
+    odd_share : float
+        Share of the contact that differs by more than a fifth from that best fit.
+    usual_odd_share : float
+        Its median over all presses.
+    """
+
+    name: str
+    stated_radius_mm: float
+    radius_mm: float
+    moved_share: float
+    misfit: float
+    own_misfit: float
+    odd_share: float
+    usual_odd_share: float = 0.0
+
+    @property
+    def radius_off_percent(self) -> float:
+        """How much larger or smaller the stated radius is, the larger over the smaller."""
+        ratio = self.stated_radius_mm / self.radius_mm
+        return 100.0 * (max(ratio, 1.0 / ratio) - 1.0)
+
+    @property
+    def fault(self) -> str:
+        """The most likely cause, with the remedy; empty where the press agrees."""
+        limit = ODD_WARN_PERCENT / 100.0
+        if self.usual_odd_share > limit:
+            return tr(
+                "no press looks like a ball under these lights: check the LEDs, the exposure and"
+                " the ball radii, and repeat mirror, whiteboard and background"
+            )
+        if self.odd_share > limit:
+            return tr(
+                "{share:.0f} % of the contact in {name} does not look like a ball: remove dirt,"
+                " clean the membrane and press again, or leave the capture out"
+            ).format(name=self.name, share=100.0 * self.odd_share)
+        if self.radius_off_percent > RADIUS_WARN_PERCENT:
+            return tr(
+                "the radius of {name} is stated as {stated:g} mm, but {fitted:.2g} mm fits the"
+                " other presses: correct the radius (not the diameter), or check the circle"
+            ).format(name=self.name, stated=self.stated_radius_mm, fitted=self.radius_mm)
+        if self.moved_share > MOVED_SHARE:
+            return tr(
+                "the circle of {name} is misplaced by {share:.0f} % of its radius: drag it onto the"
+                " contact's edge"
+            ).format(name=self.name, share=100.0 * self.moved_share)
+        return ""
+
+
+@dataclass(frozen=True, slots=True)
+class _PressPixels:
+    """Thinned pixels of one contact: place from its centre, light, and value over L rho."""
+
+    offset_mm: Array
+    light: Array
+    value: Array
+    known: NDArray[np.bool_]
+
+    def cosines(self, shift_mm: Array, curvature: float) -> Array:
+        """Return (N, 3) cosines on a ball of radius 1 / curvature."""
+        slope = (self.offset_mm - shift_mm) * curvature
+        square = np.minimum((slope**2).sum(axis=1), 0.98)
+        normal = np.column_stack([slope, -np.sqrt(1.0 - square)])
+        return np.asarray(np.einsum("nkc,nc->nk", self.light, normal))
+
+
+def compare_presses(
+    presses: Sequence[BallPress],
+    pictures: Sequence[Map],
+    table: ResamplingTable,
+    led_positions_mm: Array,
+    radiance: RadianceResult,
+    factors: Map,
+) -> tuple[PressAgreement, ...]:
+    """Judge each ball press against the others.
+
+    Parameters
+    ----------
+    presses, pictures, table, led_positions_mm, radiance, factors
+        As for :func:`~gelpolight_core.reflectance.stage.ball_scatter`.
+
+    Returns
+    -------
+    tuple of PressAgreement
+        In the order of the presses; empty with fewer than four, which say nothing of each other.
+    """
+    if len(presses) < LEAST_PRESSES:
+        return ()
+    strength = radiance.radiance * factors
+    pixels = [
+        _gather(press, picture, table, led_positions_mm, strength, radiance.usable)
+        for press, picture in zip(presses, pictures, strict=True)
+    ]
+    curves = np.array([_curve(p, b) for p, b in zip(presses, pixels, strict=True)])
+    found = []
+    for k, (press, own) in enumerate(zip(presses, pixels, strict=True)):
+        if own.known.any():
+            found.append(_agreement(press, own, _median(np.delete(curves, k, axis=0))))
+    usual = float(np.median([a.odd_share for a in found])) if found else 0.0
+    return tuple(replace(a, usual_odd_share=usual) for a in found)
+
+
+def agreement_figures(agreements: Sequence[PressAgreement]) -> tuple[Figure, ...]:
+    """Judge the press that agrees least; nothing where the presses could not be compared."""
+    if not agreements:
+        return ()
+    odd = max(agreements, key=lambda a: a.radius_off_percent)
+    poor = max(agreements, key=lambda a: a.odd_share)
+    return (
+        judge(
+            "press_radius_percent",
+            tr("Stated radius against the other presses, worst ({name})").format(name=odd.name),
+            odd.radius_off_percent,
+            "%",
+            warn=RADIUS_WARN_PERCENT,
+            fail=RADIUS_FAIL_PERCENT,
+            advice=_sentence(odd.fault),
+        ),
+        judge(
+            "press_dirt_percent",
+            tr("Contact that does not look like a ball, worst ({name})").format(name=poor.name),
+            100.0 * poor.odd_share,
+            "%",
+            warn=ODD_WARN_PERCENT,
+            advice=_sentence(poor.fault),
+        ),
+    )
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _gather(
+    press: BallPress,
+    picture: Map,
+    table: ResamplingTable,
+    led_positions_mm: Array,
+    strength: Map,
+    usable: NDArray[np.bool_],
+) -> _PressPixels:
+    rows, columns = np.nonzero(contact_mask(press, table) & usable)
+    stride = max(rows.size // MOST_PIXELS, 1)
+    rows, columns = rows[::stride], columns[::stride]
+    points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
+    top = np.concatenate([points, np.zeros_like(points[:, :1])], axis=1)
+    light, _ = light_directions(led_positions_mm, top)
+    drift = table.drift[rows, columns].astype(np.float64)
+    centre = press.seen_centre_mm(drift.mean(axis=0)) if rows.size else np.zeros(2)
+    raw = picture[rows, columns].astype(np.float64)
+    level = strength[rows, columns].astype(np.float64)
+    known = (raw > LEAST_VALUE) & (raw < SATURATED) & (level > 0.0)
+    value = np.divide(raw, level, out=np.zeros_like(raw), where=level > 0.0)
+    return _PressPixels(points - centre, light, value, known)
+
+
+def _curve(press: BallPress, pixels: _PressPixels) -> Array:
+    """Return the median value (3, bins) of a press over the light's cosine; NaN where unseen."""
+    cosines = pixels.cosines(np.zeros(2), 1.0 / press.pose.radius_mm)
+    curve = np.full((3, len(BINS) - 1), np.nan)
+    for k in range(3):
+        known = pixels.known[:, k]
+        place = np.digitize(cosines[known, k], BINS) - 1
+        value = pixels.value[known, k]
+        for b in range(len(BINS) - 1):
+            inside = place == b
+            if inside.sum() >= LEAST_IN_BIN:
+                curve[k, b] = np.median(value[inside])
+    return curve
+
+
+def _median(curves: Array) -> Array:
+    """Return the median of curves (presses, 3, bins), held beyond its ends."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a bin that no press has seen
+        middle = np.nanmedian(curves, axis=0)
+    centres = 0.5 * (BINS[1:] + BINS[:-1])
+    for channel in middle:
+        seen = np.isfinite(channel)
+        channel[:] = np.interp(centres, centres[seen], channel[seen]) if seen.any() else 0.0
+    return np.asarray(middle)
+
+
+def _agreement(press: BallPress, pixels: _PressPixels, curve: Array) -> PressAgreement:
+    centres = 0.5 * (BINS[1:] + BINS[:-1])
+    scale = float(np.median(curve[curve > 0.0])) if (curve > 0.0).any() else 1.0
+    contact = press.contact_radius_mm
+
+    def error(parameters: Array) -> Array:
+        cosines = pixels.cosines(parameters[:2] * contact, parameters[2] / contact)
+        expected = np.stack([np.interp(cosines[:, k], centres, curve[k]) for k in range(3)], 1)
+        return np.asarray(((pixels.value - expected) / scale)[pixels.known])
+
+    # In units of the contact radius: the centre's move, and contact radius over ball radius.
+    start = np.array([0.0, 0.0, contact / press.pose.radius_mm])
+    stated = error(start)
+    fits = [
+        least_squares(
+            error,
+            [0.0, 0.0, steep],
+            bounds=([-0.6, -0.6, 0.02], [0.6, 0.6, 0.98]),
+            loss="soft_l1",
+            f_scale=0.02,
+        )
+        for steep in (float(np.clip(start[2], 0.03, 0.97)), 0.5)
+    ]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return PressAgreement(
+        press.name,
+        press.pose.radius_mm,
+        contact / float(best.x[2]),
+        float(np.hypot(best.x[0], best.x[1])),
+        _spread(stated),
+        _spread(error(best.x)),
+        float(np.mean(np.abs(error(best.x)) > ODD_CHANGE)),
+    )
+
+
+def _spread(error: Array) -> float:
+    return 1.4826 * float(np.median(np.abs(error)))

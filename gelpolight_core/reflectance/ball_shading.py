@@ -1,0 +1,301 @@
+"""The shading of a pressed ball, fitted as a whole: where it is and whether it is a ball.
+
+Around a ball the membrane's slopes run through all directions: they grow from the middle to the
+contact's edge and die away in the drape. Whatever the lights, a channel's brightness is a smooth
+function of slope, here a polynomial of degree 2 whose coefficients are free for each channel. So
+the only shape in the fit is the ball's: centre, contact radius and decay length. All pixels take
+part, none of them alone decides, and pixels without a value are simply left out. What such a fit
+leaves unexplained tells a ball from anything else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reflectance.contour import Circle
+
+Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+BALL_EXPLAINED = 0.55
+"""A ball's shading explains 0.66 to 0.99 of the change around it, texture and shadows included."""
+_MOST_PIXELS = 1500
+_REACH = 2.2
+_STEPS = 12
+_COARSE, _FINE = 0.02, 0.004
+_ROBUST = 0.3
+_INNER = 0.6
+_STARTS = ((0.75, 0.4), (0.5, 0.4))
+
+
+@dataclass(frozen=True, slots=True)
+class ShadingFit:
+    """A ball's shading, fitted.
+
+    Attributes
+    ----------
+    circle : Circle
+        The contact's edge, pixels.
+    decay_px : float
+        Decay length of the drape.
+    centre_sd_px : float
+        Standard deviation of the centre per axis that follows from what is left unexplained.
+    axis_ratio : float
+        Shorter over longer axis, if the ball is fitted as an ellipse.
+    explained : float
+        Share of the change of brightness that the ball's shading explains, 0..1, noise taken out.
+    inner_change : float
+        Change of brightness across the inner half over that of the fit: 1 for a ball, near 0 for
+        a flat face.
+    direction_share : float
+        Share of the explained change that has a direction, the slope's own part: near 1 for
+        coloured lights from the sides, near 0 for a membrane that only darkens with depth.
+    colour_spread : float
+        Smaller over larger singular value of the channels' directions, 0..1: 1 for lights from
+        all sides, 0 if all channels change alike.
+    """
+
+    circle: Circle
+    decay_px: float
+    centre_sd_px: float
+    axis_ratio: float
+    explained: float
+    inner_change: float
+    direction_share: float
+    colour_spread: float
+
+
+def fit_shading(
+    change: Array32,
+    usable: Mask,
+    start: Circle,
+    *,
+    noise: float = 0.0,
+    largest_px: float = np.inf,
+) -> ShadingFit | None:
+    """Fit a ball's shading to the change of brightness around a rough circle.
+
+    Parameters
+    ----------
+    change : (rows, columns, 3)
+        Relative change against the background, such as the logarithm of their ratio.
+    usable : (rows, columns) bool
+        Which pixels count.
+    start : Circle
+        Rough circle about the contact and part of its drape.
+    noise : float, optional
+        Standard deviation of `change` per pixel without contact.
+    largest_px : float, optional
+        The contact's radius is not larger than this: nearly the ball's, if that is known.
+
+    Returns
+    -------
+    ShadingFit or None
+        None where too few pixels are usable.
+    """
+    x, y, values = _gather(change, usable, start)
+    if len(x) < 60:
+        return None
+    scale = _ROBUST * float(np.sqrt(np.mean(values**2))) + 1e-9
+    fitted = _fit_best(_Pixels(x, y, values, scale, largest_px, False), start, noise)
+    if fitted.explained < BALL_EXPLAINED:
+        # Sensors with light from all sides measure by darkness, which is a matter of depth.
+        dark = _fit_best(_Pixels(x, y, values, scale, largest_px, True), start, noise)
+        return dark if dark.explained > BALL_EXPLAINED else fitted
+    return fitted
+
+
+def _fit_best(pixels: _Pixels, start: Circle, noise: float) -> ShadingFit:
+    """Fit from a large and a small circle, carry on with the better one, then as an ellipse."""
+    radius = start.radius
+    first = [_descend(pixels, _first(pixels, start, *s), radius, 4, _COARSE) for s in _STARTS]
+    best = min((_reweighted(pixels, f) for f in first), key=lambda f: f.cost)
+    for enough in (_COARSE, _FINE):
+        best = _reweighted(pixels, _descend(pixels, best, radius, 4, enough))
+    oval = _descend(pixels, best, radius, 6, _COARSE)
+    return _describe(best, oval, pixels, noise)
+
+
+@dataclass(frozen=True, slots=True)
+class _Solution:
+    shape: Array
+    """cx, cy, log radius, log decay, and the ellipse: along the axes and along the diagonals."""
+    root: Array
+    """Roots of the weights (channels, pixels)."""
+    residual: Array
+    """Weighted (channels, pixels)."""
+    coefficients: Array
+    """(terms, channels)."""
+    cost: float
+    design: Array
+    """(pixels, terms)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Pixels:
+    x: Array
+    y: Array
+    values: Array
+    scale: float
+    largest: float
+    by_depth: bool
+
+
+def _gather(change: Array32, usable: Mask, start: Circle) -> tuple[Array, Array, Array]:
+    reach = _REACH * start.radius
+    rows, columns = usable.shape
+    top, bottom = max(int(start.y - reach), 0), min(int(start.y + reach) + 1, rows)
+    left, right = max(int(start.x - reach), 0), min(int(start.x + reach) + 1, columns)
+    window = usable[top:bottom, left:right]
+    stride = max(1, int(np.sqrt(window.size * np.pi / 4.0 / _MOST_PIXELS)))
+    y, x = np.mgrid[top:bottom:stride, left:right:stride]
+    part = change[top:bottom:stride, left:right:stride]
+    near = (np.hypot(x - start.x, y - start.y) < reach) & window[::stride, ::stride]
+    near &= np.isfinite(part).all(axis=-1)
+    values = part[near].astype(np.float64)
+    return x[near].astype(np.float64), y[near].astype(np.float64), values
+
+
+def _basis(x: Array, y: Array, shape: Array, by_depth: bool) -> Array:
+    """Return (N, 5): slope x and y and their products, or (N, 6) with depth; 1 at the edge."""
+    dx, dy = x - shape[0], y - shape[1]
+    # Slopes keep their direction in the stretched frame: enough to tell how oval the ball is.
+    dx, dy = (1.0 + shape[4]) * dx + shape[5] * dy, shape[5] * dx + (1.0 - shape[4]) * dy
+    radius, decay = np.exp(shape[2]), np.exp(shape[3])
+    r = np.sqrt(dx * dx + dy * dy)
+    fall = np.exp(-np.maximum(r - radius, 0.0) / decay)
+    outside = fall / np.maximum(r, radius)
+    p, q = outside * dx, outside * dy
+    if not by_depth:
+        return np.stack([p, q, p * p, p * q, q * q], axis=1)
+    # The integral of the slope inwards: the drape's, and inside the contact the ball's as well.
+    depth = fall * (decay / radius) + 0.5 * np.maximum(1.0 - (r / radius) ** 2, 0.0)
+    return np.stack([p, q, p * p, p * q, q * q, depth], axis=1)
+
+
+def _first(pixels: _Pixels, start: Circle, part: float, decay: float) -> _Solution:
+    size = np.log(min(part * start.radius, 0.9 * pixels.largest))
+    shape = np.array([start.x, start.y, size, size + np.log(decay), 0.0, 0.0])
+    return _solve(pixels, np.ones(pixels.values.shape[::-1]), shape)
+
+
+def _reweighted(pixels: _Pixels, now: _Solution) -> _Solution:
+    """Return the solution with Cauchy weights that follow from its residuals."""
+    raw = pixels.values - now.design @ now.coefficients
+    root = 1.0 / np.sqrt(1.0 + (raw.T / pixels.scale) ** 2)
+    return _solve(pixels, root, now.shape)
+
+
+def _descend(pixels: _Pixels, now: _Solution, radius: float, free: int, enough: float) -> _Solution:
+    """Take Levenberg-Marquardt steps in the first `free` of the shape's parameters.
+
+    Stops when a step moves the circle by less than `enough` of the radius.
+    """
+    largest = np.log(min(1.8 * radius, pixels.largest))
+    low = np.array([-np.inf, -np.inf, np.log(0.2 * radius), np.log(0.05 * radius), -0.5, -0.5])
+    high = np.array([np.inf, np.inf, largest, np.log(1.5 * radius), 0.5, 0.5])
+    unit = np.array([radius, radius, 1.0, 10.0, 1.0, 1.0])[:free]
+    limit = np.array([0.4 * radius, 0.4 * radius, 0.3, 0.7, 0.1, 0.1])[:free]
+    damping = 1e-2
+    jacobian = _jacobian(pixels, now, free)
+    for _ in range(_STEPS):
+        normal = jacobian.T @ jacobian
+        normal += damping * np.diag(np.diag(normal) + 1e-12)
+        gradient = jacobian.T @ now.residual.ravel()
+        move = np.clip(np.linalg.solve(normal, -gradient), -limit, limit)
+        shape = now.shape.copy()
+        shape[:free] += move
+        trial = _solve(pixels, now.root, np.clip(shape, low, high))
+        if (trial.residual**2).sum() < (now.residual**2).sum():
+            now, damping = trial, 0.3 * damping
+            if bool((np.abs(move) < enough * unit).all()):
+                break
+            jacobian = _jacobian(pixels, now, free)
+        else:
+            damping *= 6.0
+            if damping > 1e3:
+                break
+    return now
+
+
+def _solve(pixels: _Pixels, root: Array, shape: Array) -> _Solution:
+    """Solve for the coefficients of each channel at a given shape."""
+    design = _basis(pixels.x, pixels.y, shape, pixels.by_depth)
+    weighted = design[None] * root[..., None]
+    values = np.asarray(pixels.values.T * root)
+    normal = weighted.transpose(0, 2, 1) @ weighted + _ridge(design)
+    right = weighted.transpose(0, 2, 1) @ values[..., None]
+    own = np.linalg.solve(normal, right)
+    residual = np.asarray(values - (weighted @ own)[..., 0])
+    coefficients = np.asarray(own[..., 0].T, np.float64)
+    cost = float(np.log1p(((residual / root) / pixels.scale) ** 2).sum())
+    return _Solution(shape, root, residual, coefficients, cost, design)
+
+
+def _ridge(design: Array) -> Array:
+    return np.asarray(1e-6 * len(design) * np.eye(design.shape[1]))
+
+
+def _jacobian(pixels: _Pixels, now: _Solution, free: int) -> Array:
+    """Return how the residuals follow the shape, coefficients solved for (Kaufman, 1975)."""
+    radius = float(np.exp(now.shape[2]))
+    steps = np.array([1e-3 * radius, 1e-3 * radius, 1e-3, 1e-3, 1e-3, 1e-3])
+    weighted = now.design[None] * now.root[..., None]
+    changes = np.empty((*now.residual.shape, free))
+    for i in range(free):
+        shape = now.shape.copy()
+        shape[i] += steps[i]
+        moved = (_basis(pixels.x, pixels.y, shape, pixels.by_depth) - now.design) / steps[i]
+        changes[..., i] = (moved @ now.coefficients).T * now.root
+    normal = weighted.transpose(0, 2, 1) @ weighted + _ridge(now.design)
+    inside = np.linalg.solve(normal, weighted.transpose(0, 2, 1) @ changes)
+    return np.asarray((weighted @ inside - changes).reshape(-1, free))
+
+
+def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -> ShadingFit:
+    values = pixels.values
+    circle = Circle(float(best.shape[0]), float(best.shape[1]), float(np.exp(best.shape[2])))
+    decay = float(np.exp(best.shape[3]))
+    raw = values - best.design @ best.coefficients
+    floor = noise**2 * values.size
+    signal = max(float((values**2).sum()) - floor, 1e-12)
+    left = max(float((raw**2).sum()) - floor, 0.0)
+    stretch = min(float(np.hypot(oval.shape[4], oval.shape[5])), 0.9)
+    directions = best.coefficients[:2]
+    large, small = np.linalg.svd(directions, compute_uv=False)[:2]
+    odd = float(((best.design[:, :2] @ directions) ** 2).sum())
+    even = float(((best.design[:, 2:] @ best.coefficients[2:]) ** 2).sum())
+    # Residuals of a smooth misfit hang together over a fraction of the radius: there are far
+    # fewer independent ones than pixels.
+    spacing = np.sqrt(np.pi * (_REACH * circle.radius) ** 2 / len(values))
+    share = min(1.0, (spacing / (0.25 * circle.radius)) ** 2)
+    variance = float((best.residual**2).mean()) / max(share, 1e-6)
+    jacobian = _jacobian(pixels, best, 4)
+    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian)
+    sd = float(np.sqrt(0.5 * np.trace(covariance[:2, :2])))
+    return ShadingFit(
+        circle,
+        decay,
+        sd,
+        float((1.0 - stretch) / (1.0 + stretch)),
+        1.0 - left / signal,
+        _inner_change(pixels, best),
+        odd / max(odd + even, 1e-12),
+        float(small / max(large, 1e-12)),
+    )
+
+
+def _inner_change(pixels: _Pixels, best: _Solution) -> float:
+    """Return the slope of what is seen over what is fitted, within the inner half."""
+    radius = float(np.exp(best.shape[2]))
+    inner = np.hypot(pixels.x - best.shape[0], pixels.y - best.shape[1]) < _INNER * radius
+    if np.count_nonzero(inner) < 12:
+        return 1.0
+    fitted = (best.design @ best.coefficients)[inner]
+    seen = pixels.values[inner]
+    fitted = fitted - fitted.mean(axis=0)
+    return float((fitted * seen).sum() / max(float((fitted**2).sum()), 1e-12))

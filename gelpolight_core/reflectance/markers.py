@@ -1,0 +1,248 @@
+"""Markers printed on the membrane: found by their regular pattern, excluded, and filled.
+
+Many gels carry a grid of dark dots. A dot moves with the membrane when something is pressed in, so
+it differs from the background on both sides of its old place, more strongly than the shading
+does. Every step that compares an image with the background has to leave the dots out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+_WIDEST_PX = 480
+_LEAST_MARKERS = 12
+_DARKER_BY = 0.15
+# Dots of one print are alike; dust and scratches are not.
+_SIZE_FACTOR = 3.0
+_LEAST_ALIKE = 0.5
+# Perspective and a curved gel bend a row by less than this share of the distance.
+_ROW_TOLERANCE = 0.25
+_LEAST_IN_ROWS = 0.5
+_LARGEST_SHARE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Markers:
+    """Markers printed on a membrane, as seen in an image without contact.
+
+    Attributes
+    ----------
+    mask : (rows, columns) bool
+        The markers with their soft edges; all False on a plain gel.
+    centres_px : (N, 2) float64
+        (x, y) of each marker.
+    diameter_px : float
+        Typical diameter; 0 on a plain gel.
+    pitch_px : float
+        Typical distance to the nearest other marker; 0 on a plain gel.
+    """
+
+    mask: Mask
+    centres_px: NDArray[np.float64]
+    diameter_px: float
+    pitch_px: float
+
+    def __bool__(self) -> bool:
+        """Return whether the gel carries markers."""
+        return len(self.centres_px) > 0
+
+    def covered(self, image: Array) -> Mask:
+        """Return where a marker hides the membrane, in the background or in an image with contact.
+
+        Parameters
+        ----------
+        image : (rows, columns, 3) float32
+            With contact; the markers have moved with the membrane.
+
+        Returns
+        -------
+        (rows, columns) bool
+            The markers of the background and the dots of about their size in `image`.
+        """
+        if not self:
+            return self.mask
+        dark, factor = _darker_than_around(image, self.diameter_px)
+        spots = _spots(dark)
+        area = np.pi * (0.5 * self.diameter_px / factor) ** 2
+        moved = (spots.area > 0.2 * area) & (spots.area < 4.0 * area)
+        keep = np.concatenate([[False], moved])[spots.labels]
+        return np.asarray(self.mask | _grown(keep, self.mask.shape, factor))
+
+
+def no_markers(shape: tuple[int, int]) -> Markers:
+    """Return the markers of a plain gel of (rows, columns) pixels."""
+    return Markers(np.zeros(shape, np.bool_), np.empty((0, 2)), 0.0, 0.0)
+
+
+def find_markers(background: Array, valid: Mask | None = None) -> Markers:
+    """Find the markers printed on a membrane.
+
+    Dark spots count as markers only where there are a dozen or more of about one size and in
+    rows. So dust, scratches and the membrane's texture are none.
+
+    Parameters
+    ----------
+    background : (rows, columns, 3) float32
+        Image without contact, RGB, 0..1.
+    valid : (rows, columns) bool, optional
+        The working area; by default the whole image.
+
+    Returns
+    -------
+    Markers
+        Empty on a plain gel.
+    """
+    shape = background.shape[0], background.shape[1]
+    for share in (1.0 / 16.0, 1.0 / 32.0):
+        dark, factor = _darker_than_around(background, 0.5 * share * max(shape))
+        if valid is not None:
+            small = cv2.resize(valid.astype(np.uint8), dark.shape[::-1]) > 0
+            dark = np.where(small, dark, np.float32(0.0))
+        found = _regular(_spots(dark), shape, factor)
+        if found:
+            return found
+    return no_markers(shape)
+
+
+def fill(values: Array, holes: Mask) -> Array:
+    """Fill holes smoothly from the pixels around them.
+
+    Averages of the known pixels on coarser and coarser grids; each hole takes the finest one that
+    reaches it ("pull-push" of Gortler et al., The Lumigraph, 1996).
+
+    Parameters
+    ----------
+    values : (rows, columns, channels) float32
+        The image.
+    holes : (rows, columns) bool
+        Which pixels to fill.
+
+    Returns
+    -------
+    (rows, columns, channels) float32
+        A copy with the holes filled; `values` itself where there are none.
+    """
+    if not holes.any():
+        return values
+    known = (~holes).astype(np.float32)
+    sums, weights = [values * known[..., None]], [known]
+    while min(weights[-1].shape) > 2 and len(weights) < 8:
+        rows, columns = weights[-1].shape
+        smaller = np.asarray(cv2.pyrDown(sums[-1]), np.float32)
+        sums.append(smaller.reshape(-(-rows // 2), -(-columns // 2), -1))
+        weights.append(np.asarray(cv2.pyrDown(weights[-1]), np.float32))
+    coarse = sums[-1] / np.maximum(weights[-1], 1e-6)[..., None]
+    for total, weight in zip(reversed(sums[:-1]), reversed(weights[:-1]), strict=True):
+        size = weight.shape[1], weight.shape[0]
+        larger = np.atleast_3d(cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR))
+        trust = np.minimum(weight, 1.0)[..., None]
+        own = total / np.maximum(weight, 1e-6)[..., None]
+        coarse = trust * own + (1.0 - trust) * larger.reshape(own.shape)
+    return np.asarray(np.where(holes[..., None], coarse, values), np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class _Spots:
+    labels: NDArray[np.int32]
+    area: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    fullness: NDArray[np.float64]
+    shape: tuple[int, int]
+
+
+def _darker_than_around(image: Array, diameter_px: float) -> tuple[Array, int]:
+    """Return by which share each pixel is darker than its surroundings, and the grid's factor."""
+    factor = max(1, -(-max(image.shape[:2]) // _WIDEST_PX))
+    grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.float32)
+    if factor > 1:
+        size = image.shape[1] // factor, image.shape[0] // factor
+        grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
+    grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), 0.7))
+    width = 2 * round(0.9 * diameter_px / factor) + 3
+    around = np.asarray(cv2.morphologyEx(grey, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8)))
+    return np.asarray((around - grey) / np.maximum(around, np.float32(0.02))), factor
+
+
+def _spots(dark: Array) -> _Spots:
+    _, labels, stats, centres = cv2.connectedComponentsWithStats(
+        (dark > _DARKER_BY).astype(np.uint8)
+    )
+    longer = np.maximum(stats[1:, cv2.CC_STAT_WIDTH], stats[1:, cv2.CC_STAT_HEIGHT])
+    area = stats[1:, cv2.CC_STAT_AREA].astype(np.float64)
+    fullness = area / np.maximum(longer, 1).astype(np.float64) ** 2
+    return _Spots(
+        np.asarray(labels, np.int32),
+        area,
+        np.asarray(centres[1:], np.float64),
+        fullness,
+        dark.shape,
+    )
+
+
+def _regular(spots: _Spots, shape: tuple[int, int], factor: int) -> Markers | None:
+    """Return the spots that form a print, or None."""
+    round_ones = (spots.fullness > 0.4) & (spots.area >= 4.0)
+    if np.count_nonzero(round_ones) < _LEAST_MARKERS:
+        return None
+    typical = float(np.median(spots.area[round_ones]))
+    alike = (
+        round_ones & (spots.area > typical / _SIZE_FACTOR) & (spots.area < typical * _SIZE_FACTOR)
+    )
+    count = int(np.count_nonzero(alike))
+    if count < _LEAST_MARKERS or count < _LEAST_ALIKE * np.count_nonzero(spots.area >= 4.0):
+        return None
+    centres = spots.centre[alike]
+    pitch = _lattice_pitch(centres)
+    if pitch is None:
+        return None
+    if spots.area[alike].sum() > _LARGEST_SHARE * spots.labels.size:
+        return None
+    # A print's outermost dots may be cut or merged; they hide the membrane all the same.
+    print_like = (spots.area > 0.2 * typical) & (spots.area < 6.0 * typical)
+    keep = np.concatenate([[False], print_like])[spots.labels]
+    offset = 0.5 * (factor - 1)
+    return Markers(
+        _grown(keep, shape, factor),
+        centres * factor + offset,
+        factor * 2.0 * float(np.sqrt(typical / np.pi)),
+        factor * pitch,
+    )
+
+
+def _lattice_pitch(centres: NDArray[np.float64]) -> float | None:
+    """Return the typical distance to the nearest spot if the spots lie in rows, else None.
+
+    In a row, the nearest spot has a counterpart at the same distance on the other side. Among
+    spots at random hardly one in ten has.
+    """
+    to_others = centres[None] - centres[:, None]
+    apart = np.hypot(to_others[..., 0], to_others[..., 1])
+    np.fill_diagonal(apart, np.inf)
+    nearest = apart.argmin(axis=1)
+    step = apart.min(axis=1)
+    opposite = centres - to_others[np.arange(len(centres)), nearest]
+    miss = np.hypot(*(opposite[:, None] - centres[None]).transpose(2, 0, 1)).min(axis=1)
+    if np.mean(miss < _ROW_TOLERANCE * step) < _LEAST_IN_ROWS:
+        return None
+    return float(np.median(step))
+
+
+def _grown(keep: Mask, shape: tuple[int, ...], factor: int) -> Mask:
+    """Return a mask at full size, with the soft edge of the dots."""
+    large = np.zeros(shape, np.uint8)
+    scaled = np.repeat(np.repeat(keep.astype(np.uint8), factor, axis=0), factor, axis=1)
+    large[: scaled.shape[0], : scaled.shape[1]] = scaled
+    if scaled.shape != shape:
+        rows, columns = scaled.shape
+        large[rows:, :columns] = scaled[-1:, :]
+        large[:, columns:] = large[:, columns - 1 : columns]
+    width = 4 * factor + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
+    return np.asarray(cv2.dilate(large, disc) > 0)

@@ -1,0 +1,63 @@
+"""Description of the printed checkerboard."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSpec:
+    """The printed checkerboard.
+
+    Attributes
+    ----------
+    inner_corners : (columns, rows)
+        Number of points where four squares meet; one less than the squares in each direction.
+    square_mm : float
+        Side of a square.
+    """
+
+    inner_corners: tuple[int, int] = (9, 6)
+    square_mm: float = 3.0
+
+    def __post_init__(self) -> None:
+        """Refuse an impossible board.
+
+        Raises
+        ------
+        InputError
+            If there are fewer than 3 corners in a direction or the square size is not positive.
+        """
+        if min(self.inner_corners) < 3:
+            raise InputError(
+                tr("The board has only {w} x {h} inner corners").format(
+                    w=self.inner_corners[0], h=self.inner_corners[1]
+                ),
+                where=tr("checkerboard"),
+                advice=tr(
+                    "Use a board with at least 3 x 3 inner corners (points where four squares meet)"
+                ),
+            )
+        if not (math.isfinite(self.square_mm) and self.square_mm > 0.0):
+            raise InputError(
+                tr("The side of the squares is {s} mm").format(s=self.square_mm),
+                where=tr("checkerboard"),
+                advice=tr("Measure the side of a square and enter it in mm"),
+            )
+
+    @property
+    def points_mm(self) -> Array:
+        """(N, 3) corners on the board, row by row; z is 0."""
+        columns, rows = self.inner_corners
+        x, y = np.meshgrid(np.arange(columns), np.arange(rows))
+        flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+        return flat * np.float64(self.square_mm)

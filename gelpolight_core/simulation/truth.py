@@ -1,0 +1,112 @@
+"""What a simulated session says of the truth behind its images."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from gelpolight_core.design.parts import BallPress
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.simulation.drape import contact_radius
+from gelpolight_core.simulation.indenters import Ball
+from gelpolight_core.simulation.plan import AVERAGED, press_names
+from gelpolight_core.simulation.rays import camera_points
+from gelpolight_core.simulation.virtual_sensor import VirtualSensor
+
+
+def truth_csv(design: SensorDesign) -> str:
+    """Return the content of presses/truth.csv."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["file", "shape", "diameter_mm", "side_mm", "height_mm"])
+    for name, item in zip(press_names(design.presses), design.presses, strict=True):
+        if item.shape in ("cylinder", "cuboid"):
+            size = [item.size_mm, ""] if item.shape == "cylinder" else ["", item.size_mm]
+            writer.writerow([f"{name}.png", item.shape, *size, item.depth_mm])
+    return stream.getvalue()
+
+
+def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
+    """Return the truth behind the images, as plain values for JSON.
+
+    Parameters
+    ----------
+    sensor : VirtualSensor
+        That rendered them.
+    stages : sequence of str
+        Image folders of the session.
+    """
+    design = sensor.design
+    camera, layers, membrane = design.camera, design.layers, design.membrane
+    places = [
+        camera_points(layers, np.array([led.x_mm, led.y_mm, -led.height_mm])) for led in design.leds
+    ]
+    return {
+        "camera": {
+            "fx": camera.fx,
+            "fy": camera.fy,
+            "cx": camera.cx,
+            "cy": camera.cy,
+            "k1_k2_p1_p2": list(camera.distortion),
+        },
+        "top_plane": {
+            "normal_camera": layers.normal_camera.tolist(),
+            "offset_mm": layers.top_distance_mm,
+        },
+        "leds": {
+            name: {"camera_mm": place.tolist(), "relative_power": led.power}
+            for name, place, led in zip("RGB", places, design.leds, strict=True)
+        },
+        "crosstalk_camera_from_led": [list(row) for row in design.photometry.crosstalk],
+        "balls": [
+            {
+                "file": f"ball_{number:02d}.png",
+                "radius_mm": ball.radius_mm,
+                "depth_mm": ball.depth_mm,
+                "contact_radius_mm": _ball_contact(ball, membrane.decay_length_mm),
+                "centre_sensor_xy_mm": [ball.x_mm, ball.y_mm],
+            }
+            for number, ball in enumerate(design.balls)
+        ],
+        "membrane": {
+            "kind": "blend" if membrane.specular_weight > 0.0 else "diffuse",
+            "diffuse": membrane.diffuse_reflectance,
+            "spec_weight": membrane.specular_weight,
+            "alpha": membrane.roughness,
+            "spec_scale": membrane.specular_reflectance,
+            "rho_texture": membrane.variation > 0.0 or membrane.speck_count > 0,
+            "decay_length_mm": membrane.decay_length_mm,
+        },
+        "photometry": _photometry_table(sensor, stages),
+        "transport": "direct light of the LEDs with cast shadows only",
+    }
+
+
+def _photometry_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
+    camera = sensor.design.camera
+    full = 2**camera.bit_depth - 1
+    signal = 200.0 / 255.0
+    sd = math.sqrt(camera.shot_variance * signal + camera.read_sd**2)
+    return {
+        "response": {
+            "linear": f"linear (gamma 1); value = {full}*linear",
+            "srgb": f"sRGB (IEC 61966-2-1); value = {full}*encoded",
+            "gamma": f"gamma {camera.gamma:g}; value = {full}*linear^(1/{camera.gamma:g})",
+        }[camera.response],
+        "exposure_membrane": sensor.exposure,
+        "whiteboard_exposure_relative_to_membrane": 1.0,
+        "psf_gaussian_sigma_px": camera.blur_sigma_px,
+        "noise": {"shot_var_per_unit": camera.shot_variance, "read_sigma": camera.read_sd},
+        "snr_db_at_200": 20.0 * math.log10(signal / sd) if sd > 0.0 else None,
+        "averaged_frames": {s: AVERAGED[s] for s in stages},
+    }
+
+
+def _ball_contact(ball: BallPress, decay_mm: float) -> float:
+    shape = Ball(ball.radius_mm, ball.depth_mm)
+    return contact_radius(shape.profile, shape.reach_mm, decay_mm)

@@ -1,0 +1,61 @@
+"""How far the lengths that a person states may be off, and what that does to all results.
+
+No image shows such an error. The board on the top surface is seen in air: its squares give the
+surface's distance. Under the elastomer the surface then appears nearer, by what thickness and index
+say, and lengths across follow the distance at which it appears. Slopes follow the ball radii.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gelpolight_core.optics.refraction import LayerStack
+
+SQUARE_SD = 0.003
+"""Relative standard deviation of the squares of the board on the top surface: a printed board, or
+0.05 mm of a caliper over eight squares of 2 mm."""
+RADIUS_SD = 0.002
+"""The same of the ball radii; bearing balls are better."""
+THICKNESS_SD = 0.01
+"""The same of each layer's thickness."""
+INDEX_SD = 0.01
+"""The same of each layer's refractive index: 0.014 of a silicone's."""
+HEIGHT_BY_RADIUS = 0.66
+"""Relative change of a height by that of all ball radii (docs/stability.md)."""
+
+
+class StatedSd(NamedTuple):
+    """Relative standard deviations from stated lengths, common to all results of a calibration.
+
+    Attributes
+    ----------
+    depth : float
+        Of depths, on slopes that balls show.
+    lateral : float
+        Of lengths across.
+    """
+
+    depth: float
+    lateral: float
+
+
+def stated_sd(stack: LayerStack) -> StatedSd:
+    """Return what the tolerances of the stated lengths do.
+
+    Parameters
+    ----------
+    stack : LayerStack
+        Layers between camera and top surface, with air where there is no other.
+    """
+    thickness = np.asarray(stack.thicknesses_mm, np.float64)
+    index = np.asarray(stack.indices, np.float64)
+    apparent_mm = float((thickness / index).sum())
+    made = index > 1.0
+    by_square = SQUARE_SD * float(thickness.sum())
+    # A thicker layer leaves less air below the same surface.
+    by_thickness = THICKNESS_SD * (thickness * (1.0 - 1.0 / index))[made]
+    by_index = INDEX_SD * (thickness / index)[made]
+    lateral = float(np.linalg.norm([by_square, *by_thickness, *by_index])) / apparent_mm
+    return StatedSd(float(np.hypot(lateral, HEIGHT_BY_RADIUS * RADIUS_SD)), lateral)

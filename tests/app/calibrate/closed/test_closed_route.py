@@ -1,0 +1,182 @@
+"""The route of a closed sensor, from the first question to a validated calibration."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+from technician import Technician
+
+from app.calibrate.closed_balls.learning import Progress
+from app.calibrate.closed_setup.form import ClosedForm, new_closed_session
+from app.calibrate.validation.trial import KnownObject
+from gelpolight_core.calibration.closed_project import ClosedProject
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.in_place_session import SETTLED
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.in_place.preset import preset_named
+from gelpolight_core.session.closed import ClosedSession, read_any_session
+from gelpolight_core.session.description import create_session
+from gelpolight_core.session.session import read_session
+
+MM_PER_PX = 0.0989
+"""Apparent distance of the design's membrane over its focal length, at a quarter of its size."""
+
+
+def test_from_the_first_question_to_a_validated_calibration(
+    technician: Technician, small_session: Path, tmp_path: Path, qtbot: QtBot
+) -> None:
+    page, opened = technician.page, read_session(small_session)
+    page.begin()
+    technician.click("question.closed")
+    form = page.closed_form
+    qtbot.keyClicks(form.serial, "closed-1")
+    form.scale.setValue(MM_PER_PX)
+    technician.click("setup.accept")
+    wizard = technician.wizard
+    assert [one.step.key for one in wizard.presenters] == [
+        "setup", "background", "balls", "validation",
+    ]  # fmt: skip
+    assert wizard.open.step.key == "background"
+    wizard.open.import_files([*opened.files("background")])
+    technician.rest()
+    assert technician.state("background") in ("pass", "warn")
+    technician.click("calibrate.next")
+
+    files = opened.files("balls")[:7]
+    nothing = tmp_path / "nothing.png"
+    nothing.write_bytes(opened.files("background")[0].read_bytes() + b"\0")
+    by_radius: dict[float, list[Path]] = {}
+    for path in files[:-1]:
+        by_radius.setdefault(opened.ball_radius_mm(path.name), []).append(path)
+    for number, (radius_mm, paths) in enumerate(by_radius.items()):
+        technician.wizard.at("balls").radius.box.setValue(2.0 * radius_mm)
+        wizard.open.import_files([*paths, *([nothing] if number == 0 else [])])
+        technician.until(lambda: not wizard.model.busy_with_images)
+    technician.rest()
+    assert technician.state("balls") in ("pass", "warn")
+    progress = wizard.open.progress
+    assert progress.error_deg < 4.0
+    assert f"{progress.error_deg:.1f} degrees" in wizard.panel.sentence.text()
+    captures = wizard.open.captures()
+    (refused,) = [capture for capture in captures if capture.state == "fail"]
+    assert refused.sentence, "an image that shows no ball keeps its reason"
+    assert sum(capture.note.endswith("deg") for capture in captures) == len(files) - 1
+    assert wizard.panel.finished is progress.settled
+
+    wizard.go_to("validation")
+    technician.click("result.save")
+    technician.rest()
+    (path,) = (tmp_path / "workspace" / "sensors").rglob("*.gplcal")
+    assert read_calibration(path).model == "in-place"
+    step = wizard.at("validation")
+    assert wizard.centre.currentWidget() is wizard.area
+    step.form.show_known(KnownObject("ball", 2.0 * opened.ball_radius_mm(files[-1].name), None))
+    step.validating.import_press(files[-1])
+    technician.until(step.form.keep.isEnabled)
+    technician.click("validation.keep")
+    assert technician.state("validation") == "pass"
+
+
+def test_too_few_presses_are_not_a_failure(
+    technician: Technician, small_session: Path, tmp_path: Path
+) -> None:
+    technician.begin(closed_project(small_session, tmp_path, balls=2), "balls")
+    assert technician.state("balls") == "begun"
+
+
+def closed_project(opened: Path, tmp_path: Path, *, balls: int) -> ClosedProject:
+    """Return a session with the background and some presses of the small sensor."""
+    source = read_session(opened)
+    session = replace(
+        new_closed_session(), folder=tmp_path / "session", serial="c", mm_per_px=MM_PER_PX
+    )
+    create_session(session)
+    project = ClosedProject(session.folder)
+    project.import_files(Stage.BACKGROUND, source.files("background"))
+    for path in source.files("balls")[:balls]:
+        radius_mm = source.ball_radius_mm(path.name)
+        project.import_files(Stage.BALLS, [path], radius_mm=radius_mm)
+    return project
+
+
+def test_a_change_makes_the_calibration_outdated_and_undo_restores_it(
+    small_session: Path, tmp_path: Path
+) -> None:
+    project = closed_project(small_session, tmp_path, balls=4)
+    for stage in project.stale():
+        project.compute(stage)
+    assert project.stale() == ()
+    made = project.finish().calibration
+    assert made.provenance.inputs == project.all_inputs
+    name = project.session.found("balls")[0].name
+    project.exclude(Stage.BALLS, name)
+    assert project.stale() == (Stage.BALLS,)
+    project.exclude(Stage.BALLS, name, False)
+    assert project.stale() == ()
+    session = project.session
+    project.describe(replace(session, mm_per_px=2.0 * MM_PER_PX))
+    assert project.stale() == (Stage.BALLS,)
+    kept = read_any_session(session.folder)
+    assert isinstance(kept, ClosedSession)
+    assert kept.mm_per_px == 2.0 * MM_PER_PX
+    assert kept.ball_radii_mm == session.ball_radii_mm
+
+
+def test_a_preset_fills_in_the_scale_and_its_uncertainty(qtbot: QtBot) -> None:
+    form = ClosedForm()
+    qtbot.addWidget(form)
+    digit = preset_named("digit")
+    form.kind.setCurrentIndex(form.kind.findData("digit"))
+    form.kind.activated.emit(form.kind.currentIndex())
+    stated = form.stated()
+    assert stated.mm_per_px == pytest.approx(digit.mm_per_px)
+    assert stated.mm_per_px_sd == pytest.approx(digit.mm_per_px_sd, rel=0.02)
+    assert str(digit.image_px[0]) in form.facts.text()
+    form.show_session(stated, new=False)
+    assert form.kind.currentData() == "digit"
+    assert not form.edited
+
+
+@pytest.mark.parametrize(("gain", "asks"), [(None, True), (2.0 * SETTLED, True), (0.0, False)])
+def test_it_stops_asking_when_more_presses_do_not_help(gain: float | None, asks: bool) -> None:
+    progress = Progress(2.0, gain, (), None)
+    assert progress.settled is not asks
+    assert ("ring" in progress.sentence()) is asks
+
+
+def test_back_from_the_question_leads_to_the_start(technician: Technician, qtbot: QtBot) -> None:
+    technician.page.begin()
+    qtbot.mouseClick(technician.see("question.back"), Qt.MouseButton.LeftButton)
+    technician.see("start.new")
+
+
+def test_a_folder_without_the_open_stages_is_offered_the_closed_route(
+    technician: Technician, small_session: Path, tmp_path: Path
+) -> None:
+    """One message lists everything that is missing; the images are used, not changed."""
+    folder, opened = tmp_path / "owner", read_session(small_session)
+    shutil.copytree(small_session / "background", folder / "background")
+    (folder / "balls").mkdir()
+    for path in opened.files("balls")[:2]:
+        shutil.copy(path, folder / "balls")
+    (folder / "session.toml").write_text(
+        'format = "gelpolight-session"\nversion = 1\n[sensor]\nserial = "B-7"\n'
+        "[balls]\ndefault = 2.5\n"
+    )
+    before = sorted(folder.rglob("*"))
+    technician.page.open_path(folder)
+    problem = technician.see("start.problem").text()
+    assert all(stage in problem for stage in ("checkerboard", "top_pose", "mirror", "whiteboard"))
+    technician.click("start.closed")
+    assert technician.page.closed_form.serial.text() == "B-7"
+    technician.click("setup.accept")
+    technician.rest()
+    session = technician.wizard.project.session
+    assert [len(session.found(stage)) for stage in ("background", "balls")] == [1, 2]
+    assert set(session.ball_radii_mm.values()) == {2.5}
+    assert sorted(folder.rglob("*")) == before

@@ -1,0 +1,107 @@
+"""A trial belongs only to the calibration with which it was made."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from technician import Technician
+
+from app.calibrate.validation import validating
+from app.workspace.validation import Comparison, Validation, validation_path, write_validation
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.manifest import read_summary
+from gelpolight_core.calibration.project import CalibrationProject
+
+Made = Callable[[], CalibrationProject]
+PRESS = "presses/cylinder_s5_d100.png"
+
+
+class Held:
+    """A function that waits from its first call until it is released."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self.begun, self.go = threading.Event(), threading.Event()
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        """Wait, then call the function."""
+        self.begun.set()
+        self.go.wait(60.0)
+        return self._function(*given, **named)
+
+
+def save(technician: Technician, project: CalibrationProject, workspace: Path) -> Path:
+    """Save the calibration and open the validation; return the saved path."""
+    technician.begin(project, "result")
+    technician.click("result.save")
+    technician.rest()
+    technician.click("calibrate.next")
+    (path,) = workspace.rglob("*.gplcal")
+    return path
+
+
+def test_a_trial_of_an_earlier_calibration_is_dropped(
+    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    path = save(technician, computed_project(), tmp_path / "workspace")
+    step, panel = (
+        technician.wizard.at("validation").validating,
+        technician.wizard.at("validation").form,
+    )
+    held = Held(validating.read_calibration)
+    monkeypatch.setattr(validating, "read_calibration", held)
+    step.import_press(small_session / PRESS)
+    technician.until(held.begun.is_set)
+    step.use_calibration(str(shutil.copy(path, path.with_name("newer.gplcal"))))
+    held.go.set()
+    technician.until(lambda: not step.jobs.busy)
+    assert step._reconstructor is None
+    assert not panel.keep.isEnabled()
+    assert not panel.result.text()
+
+
+def test_an_old_trial_cannot_be_recorded_during_the_next_measurement(
+    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    path = save(technician, computed_project(), tmp_path / "workspace")
+    step, panel = (
+        technician.wizard.at("validation").validating,
+        technician.wizard.at("validation").form,
+    )
+    step.import_press(small_session / PRESS)
+    technician.until(panel.keep.isEnabled)
+    held = Held(validating.run_trial)
+    monkeypatch.setattr(validating, "run_trial", held)
+    step.import_press(small_session / PRESS)
+    assert not panel.keep.isEnabled()
+    step.keep()
+    assert not validation_path(path).exists()
+    held.go.set()
+    technician.until(panel.keep.isEnabled)
+    technician.click("validation.keep")
+    assert technician.state("validation") == "pass"
+
+
+def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
+    technician: Technician, computed_project: Made, tmp_path: Path
+) -> None:
+    path = save(technician, computed_project(), tmp_path / "workspace")
+    controller, passed = technician.wizard.model, Comparison("height", 1.0, 1.0, 8.0)
+    for identity, state in (("another", "empty"), (read_summary(path).identity, "pass")):
+        trial = Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (passed,))
+        write_validation(trial, path)
+        controller.changed.emit()
+        assert technician.state("validation") == state
+    controller.exclude(Stage.BALLS, "ball_01.png", True)
+    assert technician.state("validation") == "stale"
+    controller.undo.undo()
+    assert technician.state("validation") == "pass"
+    controller.jobs.cancel()
+    technician.rest()

@@ -1,0 +1,116 @@
+"""The choice between accuracy and speed, as a technician makes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QObject
+from pytestqt.qtbot import QtBot
+
+from app.context.context import AppContext
+from app.inspect.modes import ModeChoice, mode_text
+from app.live.frame_results import Shown
+from app.services.jobs import Jobs
+from app.sources.source import Frame
+from gelpolight_core.reconstruction.efforts import FOUND, WAYS, Way
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
+
+FRAME = np.zeros((4, 4, 3), np.uint8)
+
+
+@pytest.fixture
+def choice(context: AppContext) -> Iterator[ModeChoice]:
+    owner = QObject()
+    jobs = Jobs("ways", owner)
+    made = ModeChoice(jobs, owner, context=context)
+    yield made
+    jobs.close()
+    made.close()
+    made.box.deleteLater()
+
+
+@pytest.fixture
+def full(small_calibration: Calibration) -> Reconstructor:
+    return Reconstructor(small_calibration, effort="balanced")
+
+
+def _pick(choice: ModeChoice, mode: Way) -> None:
+    choice.box.setCurrentIndex(WAYS.index(mode))
+    choice.box.activated.emit(choice.box.currentIndex())
+
+
+def test_every_mode_is_offered_with_its_measured_errors(
+    choice: ModeChoice, full: Reconstructor
+) -> None:
+    assert not choice.box.isEnabled()
+    choice.offer(full, full)
+    texts = [choice.box.itemText(k) for k in range(choice.box.count())]
+    assert len(texts) == len(WAYS) == 4
+    assert "fast   0.70 / 0.41 %" in choice.box.currentText()
+    assert "2.0 / 2.6 %" in texts[-1]
+    errors = [FOUND[mode] for mode in WAYS[:3]]
+    # More effort is more accurate in both together. The height errors of balanced and best differ
+    # only by chance.
+    assert errors == sorted(errors, key=lambda e: e.height_percent + e.size_percent, reverse=True)
+
+
+def test_another_effort_is_used_at_once_and_saved(
+    choice: ModeChoice, full: Reconstructor, context: AppContext, qtbot: QtBot
+) -> None:
+    choice.offer(full, full)
+    with qtbot.waitSignal(choice.chosen) as signal:
+        _pick(choice, Way("full", "fast"))
+    live, best = signal.args
+    assert live.effort == "fast" and best is full
+    assert full.effort == "balanced"
+    assert live.calibration is full.calibration
+    with qtbot.waitSignal(choice.chosen) as signal:
+        choice.offer(full, full)
+    assert signal.args[0].effort == "fast"
+    assert context.settings.reconstruction == ("full", "fast")
+
+
+def test_the_papers_model_is_prepared_in_the_background(
+    choice: ModeChoice, full: Reconstructor, qtbot: QtBot
+) -> None:
+    choice.offer(full, full)
+    used: list[Reconstructor] = []
+    choice.chosen.connect(lambda live, _best: used.append(live))
+    _pick(choice, Way("paper", "best"))
+    assert used[-1].model == "full"
+    qtbot.waitUntil(lambda: used[-1].model == "paper", timeout=30_000)
+
+
+def test_a_calibration_of_the_papers_model_offers_one_mode(
+    choice: ModeChoice, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    paper = Reconstructor(small_calibration, model="paper")
+    with qtbot.waitSignal(choice.chosen) as signal:
+        choice.offer(paper, paper)
+    assert signal.args[0] is paper
+    assert choice.box.count() == 1 and not choice.box.isEnabled()
+
+
+def test_a_mode_shows_its_measured_time(
+    choice: ModeChoice, small_calibration: Calibration, full: Reconstructor
+) -> None:
+    choice.offer(full, full)
+    paper = Reconstructor(small_calibration, model="paper")
+    camera = small_calibration.camera
+    heightmap = paper.depth(np.zeros((camera.height, camera.width, 3), np.uint8))
+    for number, taken in enumerate((30.0, 10.0, 20.0)):
+        choice.follow(Shown(Frame(FRAME, number, float(number)), heightmap, depth_ms=taken))
+    texts = [choice.box.itemText(k) for k in range(choice.box.count())]
+    assert texts[-1].endswith("20 ms")
+    assert not texts[0].endswith("ms")
+
+
+def test_settings_without_a_valid_mode_give_the_default(
+    choice: ModeChoice, context: AppContext
+) -> None:
+    context.settings.reconstruction = ("full", "heroic")
+    assert choice.mode == Way("full", "fast")
+    assert "2 ms" in mode_text(choice.mode, 2.0)

@@ -1,0 +1,139 @@
+"""Find controls of a window that cannot be reached or read: hidden, cut or covered by nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractScrollArea,
+    QAbstractSpinBox,
+    QComboBox,
+    QDockWidget,
+    QLabel,
+    QLineEdit,
+    QTableView,
+    QToolBar,
+    QToolButton,
+    QWidget,
+    QWidgetAction,
+)
+
+from app.widgets.qt_tree import below
+
+CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QAbstractSpinBox, QLabel)
+EXTENSION = "qt_toolbar_ext_button"
+SLACK_PX = 2
+
+
+def faults(window: QWidget) -> list[str]:
+    """Return a line for each control of a window that is cut or cannot be reached."""
+    found = []
+    for widget in below(window, QWidget):
+        if not widget.isVisible() or widget.window() is not window or _behind_a_tab(widget):
+            continue
+        if isinstance(widget, QToolBar):
+            found += _lost_actions(widget)
+        elif isinstance(widget, QTableView):
+            found += _cut_columns(widget)
+        elif isinstance(widget, CONTROLS):
+            found += _cut(widget)
+    return list(dict.fromkeys(found))
+
+
+def _behind_a_tab(widget: QWidget) -> bool:
+    """Whether a widget is in a dock that another one covers. Its tab brings it to the front."""
+    ancestor = widget.parentWidget()
+    while ancestor is not None and not isinstance(ancestor, QDockWidget):
+        ancestor = ancestor.parentWidget()
+    return ancestor is not None and ancestor.visibleRegion().isEmpty()
+
+
+def name_of(widget: QWidget) -> str:
+    """Return the names of a widget and of its nearest named ancestor."""
+    ancestor = widget
+    while ancestor is not None and not ancestor.objectName():
+        ancestor = ancestor.parentWidget()
+    inner = "" if ancestor is widget else f" > {type(widget).__name__}"
+    text = getattr(widget, "text", lambda: "")()
+    return f"{ancestor.objectName() if ancestor else '?'}{inner} {text[:40]!r}"
+
+
+def _cut(widget: QWidget) -> Iterator[str]:
+    needed = widget.minimumSizeHint()
+    if isinstance(widget, QLabel) and widget.wordWrap():
+        wanted = widget.heightForWidth(widget.width())
+        if widget.text() and wanted > widget.height() + SLACK_PX:
+            yield f"{name_of(widget)}: {widget.height()} px high, needs {wanted}"
+    elif isinstance(widget, (QLabel, QAbstractButton, QComboBox)) and needed.isValid():
+        short = needed.width() - widget.width(), needed.height() - widget.height()
+        if max(short) > SLACK_PX and not _may_shrink(widget):
+            has = QWidget.size(widget).toTuple()
+            yield f"{name_of(widget)}: {has} px, needs {needed.toTuple()}"
+    outside = _outside(widget)
+    if outside > SLACK_PX:
+        yield f"{name_of(widget)}: {outside} px outside"
+
+
+def _may_shrink(widget: QWidget) -> bool:
+    """Whether a widget is meant to be narrower than its text, as in the header of a table."""
+    return isinstance(widget.parent(), QAbstractScrollArea)
+
+
+def _outside(widget: QWidget) -> int:
+    """Return how far a widget is cut by its ancestors. Inside a scroll area it can be scrolled."""
+    rect = QRect(widget.mapTo(widget.window(), QPoint()), QWidget.size(widget))
+    ancestor = widget.parentWidget()
+    most = 0
+    while ancestor is not None:
+        if isinstance(ancestor.parentWidget(), QAbstractScrollArea):
+            area = ancestor.parentWidget()
+            off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+            across = area.horizontalScrollBarPolicy() == off
+            along = area.verticalScrollBarPolicy() == off
+            if not isinstance(area, QTableView):
+                around = QRect(ancestor.mapTo(widget.window(), QPoint()), QWidget.size(ancestor))
+                if across:
+                    most = max(most, around.left() - rect.left(), rect.right() - around.right())
+                if along:
+                    most = max(most, around.top() - rect.top(), rect.bottom() - around.bottom())
+            return most
+        around = QRect(ancestor.mapTo(widget.window(), QPoint()), QWidget.size(ancestor))
+        most = max(
+            most,
+            around.left() - rect.left(),
+            rect.right() - around.right(),
+            around.top() - rect.top(),
+            rect.bottom() - around.bottom(),
+        )
+        if ancestor.isWindow():
+            break
+        ancestor = ancestor.parentWidget()
+    return most
+
+
+def _lost_actions(bar: QToolBar) -> Iterator[str]:
+    """Find actions that do not fit and are not behind the arrow at the end of the bar either."""
+    arrow = next((b for b in bar.findChildren(QToolButton, EXTENSION) if b.isVisible()), None)
+    for action in bar.actions():
+        widget = bar.widgetForAction(action)
+        if not action.isVisible() or action.isSeparator() or widget is None:
+            continue
+        if widget.isVisible():
+            continue
+        if arrow is None:
+            yield f"{bar.objectName()}: {action.objectName() or widget.objectName()} is lost"
+        elif isinstance(action, QWidgetAction) and not action.objectName():
+            pass  # Qt shows it in the menu of the arrow
+
+
+def _cut_columns(table: QTableView) -> Iterator[str]:
+    header = table.horizontalHeader()
+    if table.model() is None or not table.model().rowCount():
+        return
+    if (
+        table.horizontalScrollBarPolicy() == Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        and header.length() > table.viewport().width() + SLACK_PX
+    ):
+        yield f"{table.objectName()}: columns of {header.length()} px in {table.viewport().width()}"

@@ -1,0 +1,63 @@
+"""The advice on the Inspect page."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.live.advice import Advice, Known, LiveState, advise
+from gelpolight_core.health.finding import Finding
+from gelpolight_core.quality import Verdict
+
+MINE = Known("A", (1280, 960))
+DIM = Finding("exposure", "the light is darker", "Restore it", Verdict.WARN)
+OFF = Finding("led_off", "the red LED is off", "Check it", Verdict.FAIL, meaningless=True)
+
+
+@pytest.mark.parametrize(
+    ("now", "act", "usable"),
+    [
+        (LiveState(), "virtual", False),
+        (LiveState("virtual", "virtual-1"), "calibrate", False),
+        (LiveState("folder"), "sensors", False),
+        (LiveState("folder", calibrations=(MINE,)), "fitting", False),
+        (LiveState("recording", "B", used=MINE), "sensors", False),
+        (
+            LiveState("recording", "B", used=MINE, calibrations=(Known("B", (9, 9)),)),
+            "fitting",
+            False,
+        ),
+        (LiveState("folder", size=(640, 480), used=MINE), "sensors", False),
+        (LiveState("folder", size=MINE.size, used=MINE, trouble="it broke"), "reopen", True),
+        (LiveState("folder", size=MINE.size, used=MINE, fault=DIM), "zero", True),
+    ],
+)
+def test_advice_names_what_is_missing_and_offers_an_action(
+    now: LiveState, act: str, usable: bool
+) -> None:
+    advice = advise(now)
+    assert advice.text and advice.button
+    assert (advice.act, advice.usable) == (act, usable)
+
+
+def test_a_fault_of_the_image_is_shown_in_one_line_and_zero_is_offered_where_it_helps() -> None:
+    dim = advise(LiveState("camera", size=MINE.size, used=MINE, fault=DIM))
+    off = advise(LiveState("camera", size=MINE.size, used=MINE, fault=OFF))
+    assert (dim.text, dim.act, dim.role) == (DIM.line, "zero", "warn")
+    assert (off.text, off.act, off.role) == (OFF.line, "", "fail")
+
+
+def test_there_is_no_advice_while_all_is_well() -> None:
+    assert advise(LiveState("recording", "A", MINE.size, MINE)) == Advice()
+
+
+def test_a_calibration_of_another_sensor_or_size_is_named() -> None:
+    other = advise(LiveState("recording", "B", used=MINE)).text
+    assert "A" in other and "B" in other
+    size = advise(LiveState("folder", size=(640, 480), used=MINE)).text
+    assert "640x480" in size and "1280x960" in size
+
+
+def test_a_calibration_being_read_is_not_reported_missing() -> None:
+    for now in (LiveState("camera", reading=True), LiveState("virtual", "V", reading=True)):
+        advice = advise(now)
+        assert "calibration" in advice.text and not advice.usable and not advice.act

@@ -1,0 +1,123 @@
+"""Selecting and reading the calibration of the page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.context.context import AppContext
+from app.live.calibration_choice import CalibrationBox, CalibrationChoice
+from app.services.jobs import Job
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.sensor_calibration import Calibration
+
+
+class Waiting:
+    """Replaces Jobs; no job starts."""
+
+    def submit(self, job: Job) -> None:
+        self.job = job
+
+
+def _library_of_one(
+    context: AppContext, calibration: Calibration, qtbot: QtBot
+) -> tuple[Path, CalibrationChoice, Waiting, CalibrationBox]:
+    """Return the path of the only calibration, its CalibrationChoice, and the objects it uses."""
+    path = context.workspace.calibration_path("virtual-1", "small")
+    write_calibration(calibration, path)
+    box, jobs = CalibrationBox(), Waiting()
+    qtbot.addWidget(box)
+    return path, CalibrationChoice(jobs, box, context=context), jobs, box  # type: ignore[arg-type]
+
+
+def test_a_stopped_reading_has_ended(context: AppContext, qtbot: QtBot) -> None:
+    """Otherwise the page would ask the user to wait for ever."""
+    box, jobs = CalibrationBox(), Waiting()
+    qtbot.addWidget(box)
+    choice = CalibrationChoice(jobs, box, context=context)  # type: ignore[arg-type]
+    assert not choice.is_reading
+    choice._read(Path("a.gplcal"))
+    assert choice.is_reading
+    jobs.job.over = True
+    assert not choice.is_reading
+
+
+def test_a_calibration_is_read_again_after_a_stopped_reading(
+    context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    """Otherwise only another calibration would help."""
+    path, choice, jobs, box = _library_of_one(context, small_calibration, qtbot)
+    choice.refresh()
+    choice.use_what_fits("", None)
+    first = jobs.job
+    choice.use_what_fits("", None)
+    assert jobs.job is first
+    first.over = True
+    choice.refresh()
+    assert jobs.job is first  # nothing restarts by itself
+    choice.use_what_fits("", None)
+    assert jobs.job is not first
+    second = jobs.job
+    second.over = True
+    second.done((path, None, None))
+    box.activated.emit(box.currentIndex())
+    assert jobs.job is second
+
+
+def test_the_previous_calibration_is_released_when_another_is_selected(
+    context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    """Otherwise it would measure on under the new name if that one is not read completely."""
+    path, choice, jobs, _ = _library_of_one(context, small_calibration, qtbot)
+    reported: list[tuple[object, object, bool]] = []
+    choice.loaded.connect(lambda live, best: reported.append((live, best, choice.is_reading)))
+    choice.refresh()
+    assert reported == []
+    choice.use_what_fits("", None)
+    choice.refresh()
+    assert reported == [(None, None, True)]
+    jobs.job.done((path, "live", "best"))
+    choice.refresh()
+    assert reported[1:] == [("live", "best", False)]
+
+
+def test_a_replaced_file_is_read_again(
+    context: AppContext, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    """For example by a second zero while the first file is still being read."""
+    path, choice, jobs, _ = _library_of_one(context, small_calibration, qtbot)
+    choice.refresh()
+    choice.use_what_fits("", None)
+    choice.refresh()
+    first = jobs.job
+    write_calibration(replace(small_calibration, factors=0.9 * small_calibration.factors), path)
+    choice.refresh()
+    second = jobs.job
+    assert second is not first
+    reported: list[tuple[object, object]] = []
+    choice.loaded.connect(lambda live, best: reported.append((live, best)))
+    first.done((path, "live 1", "best 1"))
+    assert reported == []
+    second.done((path, "live 2", "best 2"))
+    assert reported == [("live 2", "best 2")]
+
+
+def test_a_calibration_is_listed_by_its_name_with_its_sensor_in_the_tooltip(qtbot: QtBot) -> None:
+    class Entry:
+        path, name, serial = Path("/lab/x.gplcal"), "x", "<b>A"
+        in_use = True
+
+        class summary:
+            identity, picture_size = "A-12ab", (8, 6)
+
+    entry: Any = Entry()
+    box = CalibrationBox()
+    qtbot.addWidget(box)
+    box.show_entries((entry,))
+    assert box.currentText() == "x"
+    tip = box.itemData(1, Qt.ItemDataRole.ToolTipRole)
+    assert "&lt;b&gt;A" in tip and "A-12ab" in tip and "8x6" in tip

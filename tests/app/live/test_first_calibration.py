@@ -1,0 +1,40 @@
+"""One click calibrates the virtual sensor, so that new users see depth at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.live.first_calibration import IMAGES_SHARE, calibrate_virtual_sensor
+from app.workspace.workspace import Workspace
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+
+SMALL = SensorDesign().scaled(0.25)
+
+
+class Stopped(Exception):
+    """The user cancels the work."""
+
+
+def test_session_and_calibration_are_saved_and_linked(tmp_path: Path) -> None:
+    workspace, shares = Workspace(tmp_path), list[float]()
+    path = calibrate_virtual_sensor(SMALL, workspace, shares.append)
+    (session,) = workspace.sessions_folder(SMALL.serial).iterdir()
+    assert read_calibration(path).provenance.session == session.name
+    assert not session.name.startswith(".")
+    assert shares == sorted(shares) and shares[-1] <= 1.0
+
+
+@pytest.mark.parametrize("at", [0.5 * IMAGES_SHARE, IMAGES_SHARE + 0.1])
+def test_nothing_is_saved_when_it_is_stopped(at: float, tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+
+    def tell(share: float) -> None:
+        if share > at:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        calibrate_virtual_sensor(SMALL, workspace, tell)
+    assert not list(workspace.sessions_folder(SMALL.serial).iterdir())

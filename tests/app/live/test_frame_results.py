@@ -1,0 +1,242 @@
+"""What is computed from a frame: only what is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.live.frame_results import Maker, Wanted
+from app.sources.source import Frame
+from app.view2d import shading
+from app.view2d.cuts import Section
+from app.view2d.display import QUANTITIES, SURROUND, Display, Light, colour_table
+from app.view2d.quantities import FLAG_COLOURS, Reference, difference_to
+from app.view3d.surface import LIVE_NODES
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.misfit import Misfit
+
+
+@dataclass
+class Reconstruction:
+    """Replaces a Reconstructor and records its calls."""
+
+    heightmap: HeightMap
+    asked: list[dict[str, Any]] = field(default_factory=list)
+
+    def depth(self, frame: Any, **wanted: Any) -> HeightMap:
+        self.asked.append(wanted)
+        return self.heightmap
+
+
+@pytest.fixture
+def frame() -> Frame:
+    return Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)
+
+
+def _made(dome: HeightMap, frame: Frame, **wanted: Any) -> tuple[Any, Reconstruction]:
+    reconstruction = Reconstruction(dome)
+    maker = Maker(reconstruction)  # type: ignore[arg-type]
+    maker.wanted = Wanted(**wanted)
+    return maker(frame), reconstruction
+
+
+@pytest.mark.parametrize("view", ["height", "normals", "quality", "surface"])
+def test_only_the_view_that_is_shown_is_computed(dome: HeightMap, frame: Frame, view: str) -> None:
+    wanted = {"quality": "flags", "normals": "normals"}.get(view, True)
+    shown, _ = _made(dome, frame, **{view: wanted})
+    made = {f.name for f in fields(shown) if f.name in ("height", "normals", "quality", "surface")}
+    assert {name for name in made if getattr(shown, name) is not None} == {view}
+    assert shown.cut is None
+
+
+def test_with_only_the_camera_shown_nothing_is_reconstructed(dome: HeightMap, frame: Frame) -> None:
+    shown, reconstruction = _made(dome, frame, camera=True)
+    assert shown.heightmap is None
+    assert reconstruction.asked == []
+
+
+def test_hidden_normals_are_not_computed(dome: HeightMap, frame: Frame) -> None:
+    _, reconstruction = _made(dome, frame, height=True)
+    assert reconstruction.asked == [{"normals": False, "uncertainty": False}]
+
+
+@pytest.mark.parametrize(("still", "expected"), [(False, False), (True, True)])
+def test_uncertainty_is_computed_for_frozen_images_only(
+    dome: HeightMap, frame: Frame, still: bool, expected: bool
+) -> None:
+    _, reconstruction = _made(dome, frame, quality="uncertainty", still=still)
+    assert reconstruction.asked[0]["uncertainty"] is expected
+
+
+def test_new_display_settings_do_not_reconstruct_a_frozen_image(
+    dome: HeightMap, frame: Frame
+) -> None:
+    reconstruction = Reconstruction(dome)
+    maker = Maker(reconstruction)  # type: ignore[arg-type]
+    maker.wanted = Wanted(height=True, still=True)
+    before = maker(frame)
+    maker.wanted = Wanted(height=True, still=True, display=Display(colours="inferno"))
+    after = maker(frame)
+    assert len(reconstruction.asked) == 1
+    assert not np.array_equal(before.height, after.height)
+
+
+def test_the_profile_on_screen_equals_that_of_the_core(dome: HeightMap, frame: Frame) -> None:
+    from gelpolight_core.measurement.profile import take_profile, width_at
+
+    section = Section((-4.0, -1.0), (7.0, -1.0), 0.2)
+    shown, _ = _made(dome, frame, section=section, region=Rectangle((0.0, 4.0), (2.0, 2.0)))
+    expected = take_profile(dome, section.start_mm, section.end_mm, width_mm=0.2)
+    np.testing.assert_array_equal(shown.cut.profile.depth_mm, expected.depth_mm)
+    figures = {figure.name: figure.value for figure in shown.cut.figures}
+    assert figures["width"] == width_at(expected).value
+    assert {"step_height", "slope", "angle", "sa", "sq", "sz"} <= set(figures)
+
+
+def test_the_width_is_measured_at_the_level_that_is_chosen(dome: HeightMap, frame: Frame) -> None:
+    line = (-4.0, -1.0), (7.0, -1.0)
+    half, _ = _made(dome, frame, section=Section(*line))
+    low, _ = _made(dome, frame, section=Section(*line, level_mm=0.1))
+    assert half.cut.width_ends is not None and low.cut.width_ends is not None
+    assert half.cut.width_ends[2] == pytest.approx(0.4, abs=0.01)
+    assert low.cut.width_ends[2] == 0.1
+    left, right, _level = low.cut.width_ends
+    width = next(f.value for f in low.cut.figures if f.name == "width")
+    assert width == pytest.approx(right - left)
+    # The dome is 0.8 - (r / 3)^2 deep.
+    assert width == pytest.approx(2.0 * 3.0 * np.sqrt(0.7), abs=0.05)
+
+
+def test_a_line_off_the_sensor_measures_nothing_and_is_reported(
+    dome: HeightMap, frame: Frame
+) -> None:
+    shown, _ = _made(dome, frame, section=Section((40.0, 40.0), (44.0, 40.0)))
+    assert shown.cut.profile is None
+    assert "outside" in shown.cut.sentences[0]
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("still", [False, True])
+def test_the_surface_shows_each_quantity_with_its_own_scale(
+    dome: HeightMap, frame: Frame, quantity: str, still: bool
+) -> None:
+    sd = np.full_like(dome.depth_mm, 0.003)
+    before = replace(dome, depth_mm=dome.depth_mm - np.float32(0.05))
+    shown, _ = _made(
+        replace(dome, depth_sd_mm=sd), frame, surface=True, still=still,
+        display=Display(colour_by=quantity), reference=Reference(before),
+    )  # fmt: skip
+    scale = shown.surface.scale
+    expected = {
+        "depth": shown.range_mm, "slope": (0.0, 60.0), "uncertainty": (0.0, 5.0),
+        "difference": (-0.05, 0.05), "flags": (0.0, 1.0),
+    }  # fmt: skip
+    assert (scale.low, scale.high) == pytest.approx(expected[quantity])
+    assert bool(scale.names) == (quantity == "flags")
+    assert (shown.surface.light is not None) == still
+    largest = max(shown.surface.depth_mm.shape)
+    assert largest == max(dome.depth_mm.shape) if still else largest <= LIVE_NODES
+
+
+def test_a_difference_is_depth_less_reference_where_both_are_known(dome: HeightMap) -> None:
+    step = 3  # the reference has another grid
+    coarse = replace(
+        dome, depth_mm=dome.depth_mm[::step, ::step] - np.float32(0.1), x_mm=dome.x_mm[::step],
+        y_mm=dome.y_mm[::step], flags=dome.flags[::step, ::step], normals=None,
+        pitch_mm=step * dome.pitch_mm,
+    )  # fmt: skip
+    difference = difference_to(dome, coarse)
+    inside = np.hypot(*np.meshgrid(dome.x_mm, dome.y_mm)) < 7.0
+    # A kink of the dome lies between nodes of the coarse grid.
+    assert difference[inside] == pytest.approx(0.1, abs=0.04)
+    assert np.median(difference[inside]) == pytest.approx(0.1, abs=1e-3)
+    assert np.isnan(difference[0, 0])
+    with pytest.raises(InputError):
+        difference_to(dome, replace(coarse, x_mm=coarse.x_mm + 100.0))
+
+
+def test_without_a_reference_or_an_uncertainty_the_surface_shows_depth(
+    dome: HeightMap, frame: Frame
+) -> None:
+    for quantity in ("difference", "uncertainty"):
+        shown, _ = _made(dome, frame, surface=True, display=Display(colour_by=quantity))
+        assert (shown.surface.scale.low, shown.surface.scale.high) == shown.range_mm
+
+
+def test_the_side_towards_the_light_is_brighter() -> None:
+    x = np.linspace(-3.0, 3.0, 121)
+    dome = np.maximum(1.0 - 0.2 * (x[:, None] ** 2 + x**2), 0.0).astype(np.float32)
+    grey = np.full((256, 3), 128, np.uint8)
+    lit = shading.shaded(dome, 0.05, grey, (0.0, 1.0), Light(azimuth_deg=270.0))
+    assert lit[60, 40].mean() > lit[60, 60].mean() > lit[60, 80].mean()
+
+
+@pytest.mark.parametrize("shade", [False, True])
+def test_contour_lines_lie_where_the_depth_is_a_multiple_of_the_step(
+    shade: bool,
+) -> None:
+    ramp = np.broadcast_to(np.linspace(0.0, 1.0, 401, dtype=np.float32), (50, 401)).copy()
+    white = np.full((50, 401, 3), 255, np.uint8)
+    lit = shading.with_contours(white, ramp, 0.25)
+    if shade:
+        lit = shading.shaded(ramp, 1.0, white[0, :256], (0.0, 1.0), Light(), contour_mm=0.25)
+    lines = lit[25, :, 0]
+    dark = np.flatnonzero(lines < 0.6 * lines.max())
+    assert {round(0.0025 * k, 2) for k in dark} == {0.25, 0.5, 0.75, 1.0}
+
+
+def test_a_locked_range_gives_equal_depths_equal_colours() -> None:
+    table = colour_table("viridis")
+    one = shading.coloured(np.full((2, 2), 0.5, np.float32), table, 0.0, 1.0)
+    np.testing.assert_array_equal(one[0, 0], table[128])
+    below = shading.coloured(np.full((2, 2), -3.0, np.float32), table, 0.0, 1.0)
+    np.testing.assert_array_equal(below[0, 0], table[0])
+
+
+def test_flags_have_their_colour_and_the_outside_is_no_flag(dome: HeightMap, frame: Frame) -> None:
+    shown, _ = _made(dome, frame, quality="flags", still=True)
+    assert tuple(shown.quality[85, 45]) == FLAG_COLOURS[Flag.DARK]
+    assert tuple(shown.quality[0, 0]) == SURROUND
+
+
+def test_the_slope_view_is_the_angle_of_the_normals() -> None:
+    tilt = np.radians([0.0, 30.0, 60.0])
+    normals = np.stack([np.sin(tilt), 0.0 * tilt, -np.cos(tilt)], axis=-1)[None]
+    found = shading.steepness_deg(normals.astype(np.float32))
+    np.testing.assert_allclose(found, [[0.0, 30.0, 60.0]], atol=0.1)
+
+
+def test_colours_keep_their_depth_when_the_press_becomes_lighter(
+    dome: HeightMap, frame: Frame
+) -> None:
+    reconstruction = Reconstruction(dome)
+    maker = Maker(reconstruction)  # type: ignore[arg-type]
+    maker.wanted = Wanted(height=True)
+    deep = maker(frame).range_mm
+    reconstruction.heightmap = replace(dome, depth_mm=0.2 * dome.depth_mm)
+    assert maker(replace(frame, number=1, time_s=0.03)).range_mm == deep == (0.0, 1.0)
+
+
+def test_a_locked_range_is_the_one_that_is_shown(dome: HeightMap, frame: Frame) -> None:
+    shown, _ = _made(dome, frame, height=True, display=Display(range_mm=(0.1, 0.4)))
+    assert shown.range_mm == (0.1, 0.4)
+
+
+def test_the_colours_of_the_misfit_do_not_jump_between_frames(
+    dome: HeightMap, frame: Frame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    misfits = iter([0.08, 0.083, 0.077, 0.04])
+
+    def solved(*_: object, **__: object) -> Misfit:
+        return Misfit("paper", np.full((16, 16), next(misfits), np.float32))
+
+    monkeypatch.setattr("app.live.frame_results.solve_misfit", solved)
+    maker = Maker(Reconstruction(dome))  # type: ignore[arg-type]
+    maker.wanted = Wanted(quality="misfit")
+    tops = {maker(replace(frame, number=k, time_s=0.03 * k)).quality_top for k in range(4)}
+    assert tops == {0.1}

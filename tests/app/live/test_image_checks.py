@@ -1,0 +1,148 @@
+"""The focus and exposure checks and the stripes agree with a technician's judgement."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.live.image_checks import (
+    BEST_HALF_LIFE_S,
+    BestFocus,
+    channel_histograms,
+    measure_exposure,
+    measure_focus,
+    saturated,
+)
+from app.live.zebra import STRIPE_RGB, eight_bits, with_zebra
+from gelpolight_core.quality import Verdict
+
+DEPTHS = [np.uint8, np.uint16]
+
+
+def image(level: float, dtype: type = np.uint8) -> np.ndarray:
+    """Return a uniform image (120, 160, 3) at a share of the scale."""
+    return np.full((120, 160, 3), round(level * np.iinfo(dtype).max), dtype)
+
+
+def scene(dtype: type = np.uint8) -> np.ndarray:
+    """Return an image with detail, half as bright as the scale."""
+    rng = np.random.default_rng(4)
+    coarse = rng.uniform(0.1, 0.5, (30, 40, 3)).astype(np.float32)
+    fine = cv2.resize(coarse, (160, 120), interpolation=cv2.INTER_NEAREST)
+    return (fine * np.iinfo(dtype).max).astype(dtype)
+
+
+@pytest.mark.parametrize("dtype", DEPTHS)
+def test_three_percent_of_saturation_are_reported_with_advice(dtype: type) -> None:
+    rgb = image(0.5, dtype)
+    count = round(0.03 * 120 * 160)
+    rgb.reshape(-1, 3)[:count, 1] = np.iinfo(dtype).max
+    exposure = measure_exposure(rgb)
+    assert exposure.saturated_share == pytest.approx(0.03, abs=1e-4)
+    assert exposure.verdict is Verdict.FAIL
+    assert exposure.advice == ("Too bright: 3 % of the pixels are saturated. Shorten the exposure.")
+
+
+@pytest.mark.parametrize("dtype", DEPTHS)
+def test_a_dark_image_needs_a_longer_exposure(dtype: type) -> None:
+    exposure = measure_exposure(image(0.1, dtype))
+    assert exposure.verdict is Verdict.WARN
+    assert "Lengthen the exposure" in exposure.advice
+
+
+def test_a_black_image_with_three_bright_spots_is_well_exposed() -> None:
+    rgb = image(0.0)
+    for k, (row, column) in enumerate(((20, 30), (60, 80), (100, 140))):
+        rgb[row : row + 4, column : column + 4, k] = 200
+    assert measure_exposure(rgb).verdict is Verdict.PASS
+
+
+def test_saturated_spots_are_mentioned_in_the_advice() -> None:
+    """In a mirror image they are the only content, and other advice asks for less exposure."""
+    rgb = np.zeros((480, 640, 3), np.uint8)
+    rgb[100:104, 200:204, 0] = rgb[300:304, 100:104, 1] = rgb[400:404, 500:504, 2] = 255
+    exposure = measure_exposure(rgb)
+    assert exposure.verdict is Verdict.PASS
+    assert "saturated" in exposure.advice
+
+
+def test_a_few_hot_pixels_do_not_hide_a_dark_image() -> None:
+    rgb = image(0.05)
+    rgb[::40, ::60] = 180
+    assert "Too dark" in measure_exposure(rgb).advice
+
+
+@given(st.sampled_from(DEPTHS), st.floats(0.3, 0.95))
+def test_a_well_exposed_image_passes(dtype: type, level: float) -> None:
+    assert measure_exposure(image(level, dtype)).verdict is Verdict.PASS
+
+
+@pytest.mark.parametrize("dtype", DEPTHS)
+def test_focus_falls_with_every_bit_of_blur(dtype: type) -> None:
+    sharp = scene(dtype)
+    blurred = [cv2.GaussianBlur(sharp, (0, 0), sigma) for sigma in (0.7, 1.0, 1.5, 2.5)]
+    figures = [measure_focus(rgb) for rgb in (sharp, *blurred)]
+    assert figures == sorted(figures, reverse=True)
+    assert figures[0] > 2.0 * figures[-1]
+
+
+def test_focus_does_not_depend_on_the_exposure() -> None:
+    sharp = scene(np.uint16)
+    assert measure_focus(sharp // 2) == pytest.approx(measure_focus(sharp), rel=0.01)
+
+
+def test_a_black_image_has_no_focus() -> None:
+    assert measure_focus(image(0.0)) == 0.0
+
+
+def test_the_best_focus_is_remembered_while_the_lens_turns_further() -> None:
+    best = BestFocus()
+    shares = [best.update(figure, 0.1 * i) for i, figure in enumerate((1.0, 2.0, 4.0, 2.0))]
+    assert shares[:3] == [1.0, 1.0, 1.0]
+    assert shares[3] == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_best_focus_of_another_scene_is_forgotten_in_time() -> None:
+    best = BestFocus()
+    best.update(4.0, 0.0)
+    best.update(1.0, BEST_HALF_LIFE_S)
+    assert best.best == pytest.approx(2.5)
+    assert best.update(1.0, 20.0 * BEST_HALF_LIFE_S) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("dtype", DEPTHS)
+def test_the_histogram_counts_every_pixel_once_and_the_end_of_scale_last(dtype: type) -> None:
+    rgb = image(0.25, dtype)
+    rgb[:10, :, 2] = np.iinfo(dtype).max
+    counts = channel_histograms(rgb)
+    assert counts.shape == (3, 64)
+    assert (counts.sum(axis=1) == 120 * 160).all()
+    assert counts[2, -1] == 10 * 160
+    assert counts[0, -1] == 0
+
+
+@pytest.mark.parametrize("dtype", DEPTHS)
+def test_stripes_lie_on_saturated_pixels_only(dtype: type) -> None:
+    rgb = image(0.5, dtype)
+    rgb[30:60, 40:90, 0] = np.iinfo(dtype).max
+    before = rgb.copy()
+    shown = with_zebra(rgb)
+    striped = (shown == STRIPE_RGB).all(axis=2)
+    full = saturated(rgb) > 0
+    assert not (striped & ~full).any()
+    assert 0.4 < striped[full].mean() < 0.6
+    assert (shown[~full] == eight_bits(rgb)[~full]).all()
+    np.testing.assert_array_equal(rgb, before)
+
+
+def test_stripes_move_with_the_frames() -> None:
+    rgb = image(1.0)
+    assert (with_zebra(rgb, 0) != with_zebra(rgb, 3)).any()
+
+
+def test_sixteen_bits_are_shown_by_their_high_byte() -> None:
+    rgb = np.full((4, 4, 3), 0x12FF, np.uint16)
+    assert (eight_bits(rgb) == 0x12).all()

@@ -1,0 +1,92 @@
+"""Live depth shows a fault once it lasts, and uses a calibration only for its own sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.context.context import AppContext
+from app.live.calibration_choice import CalibrationBox
+from app.live.depth import LiveDepth
+from app.live.session import LiveSession
+from app.services.jobs import Jobs
+from app.sources.processor import Failure, Outcome
+from app.sources.source import Frame
+from gelpolight_core.health.finding import Finding, Health
+from gelpolight_core.quality import Verdict
+
+DIM = Finding("exposure", "the light is darker", "Restore it", Verdict.WARN)
+
+
+@pytest.fixture
+def depth(context: AppContext, qtbot: QtBot) -> Iterator[LiveDepth]:
+    live, box = LiveSession(context=context, name="test"), CalibrationBox()
+    qtbot.addWidget(box)
+    made = LiveDepth(live, Jobs("test", live), box, context=context)
+    yield made
+    made.finish()
+
+
+def outcome(health: Health, time_s: float, *, settled: bool = True) -> Any:
+    """Return the result of a frame, as far as its health goes."""
+    frame = SimpleNamespace(time_s=time_s, settled=settled, rgb=np.zeros((4, 6, 3), np.uint8))
+    return Outcome(
+        0, frame, SimpleNamespace(frame=frame, heightmap=SimpleNamespace(health=health, trace=None))
+    )  # type: ignore[arg-type]
+
+
+def test_a_fault_that_lasts_is_shown_and_forgotten_with_the_camera(depth: LiveDepth) -> None:
+    faults = list[str]()
+    depth.changed.connect(lambda: faults.append(getattr(depth.state.fault, "key", "")))
+    for n in range(20):
+        depth.live.processed.emit(outcome(Health((DIM,)), 0.1 * n))
+    assert faults[-1] == "exposure"
+    assert faults.count("exposure") == 1, "its figure changes with every frame, the advice does not"
+    depth.live.open()
+    assert faults[-1] == ""
+
+
+def test_frames_of_a_camera_that_is_still_settling_show_no_fault(depth: LiveDepth) -> None:
+    for n in range(20):
+        depth.live.processed.emit(outcome(Health((DIM,)), 0.1 * n, settled=False))
+    assert depth.state.fault is None
+
+
+def test_a_lost_camera_comes_before_a_frame_that_failed(depth: LiveDepth) -> None:
+    frame = Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)
+    shown = list[object]()
+    depth.shown.connect(shown.append)
+    depth.live.processed.emit(Failure(0, frame, "Cannot be used."))
+    assert depth.state.trouble == "Cannot be used."
+    assert len(shown) == 1, "the camera image is still shown"
+    depth.live.lost.emit("Unplugged.")
+    assert depth.state.trouble == "Unplugged."
+    depth.live.lost.emit("")
+    assert depth.state.trouble == "Cannot be used."
+    depth.live.processed.emit(outcome(Health(()), 0.0))
+    assert (depth.state.trouble, depth.state.size) == ("", (6, 4))
+
+
+def test_a_calibration_is_used_only_for_images_of_its_sensor_and_size(depth: LiveDepth) -> None:
+    camera = SimpleNamespace(width=6, height=4)
+    calibration = SimpleNamespace(camera=camera, sensor=SimpleNamespace(serial="A"))
+    calibration.provenance = SimpleNamespace(camera_settings={})
+    reconstructor: Any = SimpleNamespace(calibration=calibration)
+    loaded, switched = list[object](), list[object]()
+    depth.calibration_loaded.connect(lambda live, _best: loaded.append(live))
+    depth.calibration_switched.connect(lambda: switched.append(depth.live_reconstructor))
+    depth.calibrations.loaded.emit(reconstructor, reconstructor)
+    assert loaded == [reconstructor]
+    assert depth.live_reconstructor is None, "no camera is selected"
+    depth._context.source.choose(SimpleNamespace(kind="camera", name="A"))  # type: ignore[arg-type]
+    depth.choose(reconstructor, reconstructor)
+    assert depth.live_reconstructor is reconstructor
+    large = Frame(np.zeros((8, 6, 3), np.uint8), 0, 0.0)
+    depth.live.processed.emit(Failure(0, large, "Another size."))
+    assert depth.live_reconstructor is None
+    assert switched == [reconstructor, None]

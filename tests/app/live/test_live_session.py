@@ -1,0 +1,166 @@
+"""The live session: captures, stale results, and what the status bar says about the source."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.context.context import AppContext
+from app.live.session import LiveSession
+from app.sources.processor import Outcome
+from app.sources.source import Frame, Setting, SourceInfo, SourceLost
+
+WAIT_MS = 5000
+
+
+class Camera:
+    """Delivers frames while it is let; can be lost."""
+
+    name, kind, size = "Camera A", "camera", (6, 4)
+
+    def __init__(self) -> None:
+        self.going, self.lost = threading.Event(), threading.Event()
+        self.going.set()
+        self._number = 0
+
+    def open(self) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+    def settings(self) -> tuple[Setting, ...]:
+        return ()
+
+    def set(self, key: str, value: float) -> float:
+        raise NotImplementedError
+
+    def frame(self, timeout_s: float) -> Frame | None:
+        if self.lost.is_set():
+            raise SourceLost("it was unplugged", where=self.name, advice="Plug it in")
+        if not self.going.wait(timeout_s):
+            return None
+        threading.Event().wait(0.005)
+        self._number += 1
+        image = np.full((4, 6, 3), self._number % 256, np.uint8)
+        return Frame(image, self._number, threading.TIMEOUT_MAX)
+
+    @property
+    def info(self) -> SourceInfo:
+        return SourceInfo("camera", self.name, "", lambda: self)
+
+
+@pytest.fixture
+def camera() -> Camera:
+    return Camera()
+
+
+@pytest.fixture
+def live(context: AppContext, camera: Camera) -> Iterator[LiveSession]:
+    session = LiveSession(context=context, name="test")
+    context.source.choose(camera.info)
+    yield session
+    session.finish()
+
+
+def test_results_of_a_replaced_function_are_dropped(live: LiveSession) -> None:
+    reported = list[object]()
+    live.processed.connect(reported.append)
+    frame = Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0)
+    before = Outcome(live._processor.generation, frame, "before")
+    live._outbox.put(before)
+    live.process(lambda _frame: "now")
+    live._poll()
+    assert reported == []
+    now = Outcome(live._processor.generation, frame, "now")
+    live._outbox.put(now)
+    live._poll()
+    assert reported == [now]
+
+
+def test_a_frozen_frame_is_not_replaced_by_one_that_was_in_progress(
+    live: LiveSession, qtbot: QtBot
+) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+
+    def slow(frame: Frame) -> int:
+        begun.set()
+        go_on.wait(WAIT_MS / 1e3)
+        return frame.number
+
+    live.enter(True)
+    live.process(slow)
+    assert begun.wait(WAIT_MS / 1e3)
+    numbers = list[int]()
+    live.processed.connect(lambda item: numbers.append(item.value))
+    live.pause(True)
+    live.process_again(Frame(np.zeros((4, 6, 3), np.uint8), -7, 0.0))
+    go_on.set()
+    qtbot.waitUntil(lambda: bool(numbers), timeout=WAIT_MS)
+    assert numbers == [-7]
+
+
+def test_the_source_is_open_only_while_the_page_is_visible_and_needs_images(
+    live: LiveSession, qtbot: QtBot
+) -> None:
+    assert live.stream is None
+    live.enter(True)
+    live.process(lambda frame: frame.number)
+    with qtbot.waitSignal(live.processed, timeout=WAIT_MS):
+        pass
+    live.use(False)
+    assert live.stream is None
+    live.use(True)
+    assert live.stream is not None
+    live.enter(False)
+    assert live.stream is None
+
+
+def test_a_capture_delivers_images_and_one_that_is_cut_short_is_reported(
+    live: LiveSession, camera: Camera, qtbot: QtBot
+) -> None:
+    images, failed, aborted = list[object](), list[str](), list[str]()
+    live.capture(2, images.extend, failed.append, aborted=aborted.append)
+    assert len(failed) == 1, "there is no camera yet"
+    live.enter(True)
+    live.capture(2, images.extend, failed.append, aborted=aborted.append)
+    qtbot.waitUntil(lambda: len(images) == 2, timeout=WAIT_MS)
+    camera.going.clear()
+    live.capture(50, images.extend, failed.append, aborted=aborted.append)
+    assert live.capturing
+    live.enter(False)
+    assert not live.capturing
+    assert (len(images), len(failed), len(aborted)) == (2, 1, 1)
+
+
+def test_a_lost_camera_is_reported_until_it_is_opened_again(
+    live: LiveSession, camera: Camera, qtbot: QtBot
+) -> None:
+    reasons = list[str]()
+    live.lost.connect(reasons.append)
+    live.enter(True)
+    camera.lost.set()
+    qtbot.waitUntil(lambda: bool(reasons), timeout=WAIT_MS)
+    assert "unplugged" in reasons[-1]
+    camera.lost.clear()
+    live.open()
+    assert reasons[-1] == ""
+
+
+def test_the_status_names_the_chosen_camera_whoever_closes_a_session(
+    live: LiveSession, camera: Camera, context: AppContext
+) -> None:
+    """A hidden page that hears of another source must not take its name off the status bar."""
+    live.enter(True)
+    hidden = LiveSession(context=context, name="hidden")
+    context.source.choose(camera.info)
+    assert context.status.value.camera == camera.name
+    hidden.finish()
+    assert context.status.value.camera == camera.name
+    live.enter(False)
+    assert context.status.value.camera == f"{camera.name}, idle"
+    assert context.status.value.rate_hz is None

@@ -1,0 +1,82 @@
+"""Stillness detection reacts to movement, not to camera noise."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.live.stillness import MOVING_SHARE, StillnessDetector, moving_share
+
+ROWS, COLUMNS = 240, 320
+DEPTHS = [np.uint8, np.uint16]
+
+
+def scene(shift_px: float = 0.0) -> np.ndarray:
+    """Return the light (rows, columns, 3) of a membrane with a dent, shifted sideways."""
+    y, x = np.mgrid[:ROWS, :COLUMNS].astype(np.float64)
+    glow = np.stack([0.15 + 0.5 * x / COLUMNS, 0.4 - 0.2 * y / ROWS, 0.1 + 0.3 * y / ROWS], -1)
+    away = np.hypot(x - 150.0 - shift_px, y - 120.0) / 30.0
+    return np.asarray(glow * (1.0 - 0.4 * np.clip(1.0 - away**2, 0.0, None))[..., None])
+
+
+def shot(light: np.ndarray, seed: int, *, noise: float, dtype: type = np.uint8) -> np.ndarray:
+    """Return the image of a camera with shot noise, `noise` at full light."""
+    sd = noise * np.sqrt(0.02 + light)
+    seen = light + sd * np.random.default_rng(seed).normal(size=light.shape)
+    top = np.iinfo(dtype).max
+    return np.round(np.clip(seen, 0.0, 1.0) * top).astype(dtype)
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.sampled_from([0.002, 0.01, 0.04]), st.sampled_from(DEPTHS), st.integers(0, 1000))
+def test_noise_is_not_movement(noise: float, dtype: type, seed: int) -> None:
+    frames = [shot(scene(), seed + i, noise=noise, dtype=dtype) for i in (0, 1)]
+    assert moving_share(*frames) <= MOVING_SHARE
+
+
+@pytest.mark.parametrize("dtype", DEPTHS)
+@pytest.mark.parametrize("noise", [0.002, 0.01])
+def test_a_dent_shifted_by_three_pixels_is_movement(noise: float, dtype: type) -> None:
+    frames = [shot(scene(3.0 * i), i, noise=noise, dtype=dtype) for i in (0, 1)]
+    assert moving_share(*frames) > MOVING_SHARE
+
+
+def test_one_percent_of_lamp_flicker_is_not_movement() -> None:
+    frames = [shot(scene() * gain, i, noise=0.005) for i, gain in enumerate((1.0, 1.01))]
+    assert moving_share(*frames) <= MOVING_SHARE
+
+
+def test_a_black_image_is_still() -> None:
+    black = np.zeros((ROWS, COLUMNS, 3), np.uint8)
+    assert moving_share(black, black) == 0.0
+
+
+@pytest.mark.parametrize(("rate_hz", "frames"), [(2.0, 4), (10.0, 6), (30.0, 16)])
+def test_stillness_must_last_half_a_second_at_any_frame_rate(rate_hz: float, frames: int) -> None:
+    watch = StillnessDetector()
+    for position in (0.0, 20.0):  # the time starts again after a movement
+        reported = [
+            watch.update(shot(scene(position), i, noise=0.005), position + i / rate_hz)
+            for i in range(frames)
+        ]
+        assert reported == [False] * (frames - 1) + [True]
+
+
+def test_movement_is_reported_while_it_lasts() -> None:
+    watch = StillnessDetector()
+    reported = []
+    for number, position in enumerate((0.0, 0.0, 20.0, 20.0)):
+        watch.update(shot(scene(position), number, noise=0.005), 0.1 * number)
+        reported.append(watch.moves)
+    assert reported == [False, False, True, False]
+
+
+def test_another_image_size_restarts_the_detection() -> None:
+    watch = StillnessDetector()
+    reported = [watch.update(shot(scene(), i, noise=0.005), float(i)) for i in range(4)]
+    assert reported[-1]
+    small = cv2.resize(shot(scene(), 4, noise=0.005), (160, 120))
+    assert not watch.update(small, 4.0)

@@ -1,0 +1,192 @@
+"""Jobs run in order, can be stopped, and never keep a page from closing."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import weakref
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.services.jobs import Job, Jobs
+from app.sources.stopping import join_left_behind
+from gelpolight_core.errors import InputError
+
+Tell = Callable[[float], None]
+
+
+def test_jobs_run_one_after_the_other(qtbot: QtBot) -> None:
+    jobs, done = Jobs("jobs"), list[Any]()
+    for number in range(3):
+        jobs.submit(Job("count", lambda _tell, n=number: n, done.append))
+    qtbot.waitUntil(lambda: not jobs.busy)
+    assert done == [0, 1, 2]
+    assert jobs.close()
+
+
+class Heavy:
+    """Replaces a calibration: memory that must not wait for the garbage collector."""
+
+
+@pytest.fixture
+def no_collection() -> Iterator[None]:
+    """Without garbage collection, only the last reference releases an object."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("no_collection")
+def test_only_the_caller_keeps_the_result_of_a_job(qtbot: QtBot) -> None:
+    jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
+
+    def done(heavy: Heavy) -> None:
+        assert job.over
+        found.append(weakref.ref(heavy))
+
+    job = Job("read", lambda _tell: Heavy(), done)  # it and `done` refer to each other
+    jobs.submit(job)
+    qtbot.waitUntil(lambda: bool(found))
+    qtbot.waitUntil(lambda: found[0]() is None)
+    assert jobs.close()
+
+
+@pytest.mark.usefixtures("no_collection")
+def test_the_error_of_a_job_is_released_after_it_is_reported(qtbot: QtBot) -> None:
+    jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
+
+    def fail(_tell: Tell) -> None:
+        heavy = Heavy()
+        found.append(weakref.ref(heavy))
+        raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+
+    with qtbot.waitSignal(jobs.refused):
+        jobs.submit(Job("look", fail))
+    qtbot.waitUntil(lambda: found[0]() is None)
+    assert jobs.close()
+
+
+def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:
+    jobs, done = Jobs("jobs"), list[Any]()
+
+    def refuse(_tell: Tell) -> None:
+        raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+
+    with qtbot.waitSignal(jobs.refused) as told:
+        jobs.submit(Job("look", refuse))
+        jobs.submit(Job("count", lambda _tell: 1, done.append))
+    assert "the picture is grey" in told.args[0]
+    qtbot.waitUntil(lambda: done == [1])
+    assert jobs.close()
+
+
+def test_required_jobs_run_when_all_others_are_cancelled() -> None:
+    jobs, go, written = Jobs("jobs"), threading.Event(), list[str]()
+    jobs.submit(Job("wait", lambda _tell: go.wait(10.0)))
+    jobs.submit(Job("compute", lambda _tell: written.append("computed")))
+    jobs.submit(Job("save", lambda _tell: written.append("saved"), must=True))
+    jobs.cancel()
+    go.set()
+    assert jobs.close()
+    assert written == ["saved"]
+
+
+def test_a_hanging_job_does_not_block_closing(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    jobs, begun, go = Jobs("hanging"), threading.Event(), threading.Event()
+
+    def hang(_tell: Tell) -> bool:
+        begun.set()
+        return go.wait(30.0)
+
+    jobs.submit(Job("hang", hang))
+    assert begun.wait(10.0)
+    assert not jobs.close(timeout_s=0.05)
+    assert "hanging did not stop" in caplog.text
+    go.set()
+    assert join_left_behind(10.0)
+
+
+def test_a_failed_required_job_is_reported_after_its_page_closed() -> None:
+    jobs, told = Jobs("jobs"), list[str]()
+    jobs.refused.connect(told.append)
+    go = threading.Event()
+
+    def refuse(_tell: Tell) -> None:
+        go.wait(10.0)
+        raise InputError("the disk is full", where="a.png", advice="Free some space")
+
+    jobs.submit(Job("save", refuse, must=True))
+    jobs.submit(Job("compute", refuse))
+    go.set()
+    assert jobs.close()
+    (sentence,) = told
+    assert "the disk is full" in sentence
+
+
+def test_a_hanging_required_job_is_reported_and_still_completed(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    jobs, told, written, go = Jobs("jobs"), list[str](), list[str](), threading.Event()
+    jobs.refused.connect(told.append)
+    jobs.submit(Job("wait", lambda _tell: go.wait(30.0), must=True))
+    jobs.submit(Job("save", lambda _tell: written.append("saved"), must=True))
+    jobs.submit(Job("keep", lambda _tell: written.remove("nothing"), must=True))
+    assert not jobs.close(timeout_s=0.05)
+    assert [sentence.partition(":")[0] for sentence in told] == ["wait", "save", "keep"]
+    assert "save had not finished when the page closed" in caplog.text
+    go.set()
+    assert join_left_behind(10.0)
+    assert written == ["saved"]
+    assert "keep failed after it was closed" in caplog.text
+
+
+@pytest.mark.parametrize("end", ["done", "refused", "faulty", "stopped", "dropped"])
+def test_the_caller_is_notified_however_a_job_ends(end: str, qtbot: QtBot) -> None:
+    jobs, ended, go = Jobs("jobs"), list[str](), threading.Event()
+
+    def work(tell: Tell) -> None:
+        if end == "refused":
+            raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+        if end == "faulty":
+            raise ValueError("nobody thought of this")
+        assert go.wait(10.0)
+        tell(0.5)
+
+    if end == "dropped":
+        jobs.submit(Job("first", lambda _tell: go.wait(10.0)))
+    jobs.submit(Job("export", work, ended=lambda: ended.append(end)))
+    if end in ("stopped", "dropped"):
+        jobs.cancel()
+    go.set()
+    qtbot.waitUntil(lambda: not jobs.busy)
+    assert ended == [end]
+    assert jobs.close()
+
+
+@pytest.mark.parametrize("runs", [True, False])
+def test_the_caller_is_notified_that_a_job_was_stopped(runs: bool, qtbot: QtBot) -> None:
+    jobs, told, refused = Jobs("jobs"), list[str](), list[str]()
+    begun, go = threading.Event(), threading.Event()
+    jobs.refused.connect(refused.append)
+
+    def work(tell: Tell) -> None:
+        begun.set()
+        assert go.wait(10.0)
+        tell(0.5)
+
+    if not runs:
+        jobs.submit(Job("first", lambda _tell: go.wait(10.0)))
+    jobs.submit(Job("export", work, stopped=told.append))
+    if runs:
+        assert begun.wait(10.0)
+    jobs.cancel()
+    go.set()
+    qtbot.waitUntil(lambda: not jobs.busy)
+    assert told == ["export: stopped"]
+    assert not refused
+    assert jobs.close()

@@ -1,0 +1,142 @@
+"""Messages: shown, stacked, counted, closed. Errors stay until they are closed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import QPushButton, QStackedWidget, QToolButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.context.context import AppContext
+from app.services.toasts import MOST, Toasts
+from app.shell.notifications import NotificationsButton
+from app.widgets.native import give_own_window
+
+
+@pytest.fixture
+def host(context: AppContext, qtbot: QtBot) -> Iterator[QWidget]:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    widget.resize(800, 600)
+    context.toasts.attach(widget, lambda: None)
+    widget.show()
+    yield widget
+
+
+def texts(toasts: Toasts) -> list[str]:
+    return [toast.text for toast in toasts.shown()]
+
+
+def test_messages_stack_without_covering_one_another(context: AppContext, host: QWidget) -> None:
+    for text in ("first", "second, which is so long that it needs several lines. " * 4, "third"):
+        context.toasts.show(text)
+    areas = [toast.geometry() for toast in context.toasts.shown()]
+    for i, one in enumerate(areas):
+        assert host.rect().contains(one)
+        assert not any(one.intersects(other) for other in areas[i + 1 :])
+
+
+def test_the_same_message_is_counted_instead_of_filling_the_window(
+    context: AppContext, host: QWidget
+) -> None:
+    for _ in range(50):
+        context.toasts.show("The camera is gone.", "fail")
+    assert len(context.toasts.shown()) == 1
+    assert context.toasts.shown()[0].times == 50
+
+
+def test_only_the_newest_messages_are_shown(context: AppContext, host: QWidget) -> None:
+    for number in range(3 * MOST):
+        context.toasts.show(f"message {number}", "fail")
+    assert texts(context.toasts) == [f"message {n}" for n in range(2 * MOST, 3 * MOST)]
+
+
+def test_a_note_disappears_and_an_error_stays(context: AppContext, host: QWidget) -> None:
+    context.toasts.show("saved")
+    context.toasts.show("not saved", "fail")
+    note, problem = context.toasts.shown()
+    assert note.findChild(QTimer).isActive()
+    assert not problem.findChild(QTimer).isActive()
+    note.findChild(QTimer).timeout.emit()
+    assert texts(context.toasts) == ["not saved"]
+
+
+def test_its_button_acts_once_and_closes_it(
+    context: AppContext, host: QWidget, qtbot: QtBot
+) -> None:
+    undone = []
+    context.toasts.show("removed", actions=(("Undo", lambda: undone.append(1)),))
+    button = context.toasts.shown()[0].findChild(QPushButton)
+    assert button.accessibleName() == "Undo"
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert undone == [1]
+    assert not context.toasts.shown()
+
+
+def test_every_message_is_in_the_log(context: AppContext, host: QWidget) -> None:
+    context.toasts.show("the disk is full", "fail")
+    assert any("the disk is full" in r.text for r in context.log.recent.since(0))
+
+
+def test_messages_stay_in_the_window_when_it_shrinks(
+    context: AppContext, host: QWidget, qtbot: QtBot
+) -> None:
+    context.toasts.show("a message")
+    host.resize(300, 200)
+    qtbot.waitUntil(lambda: host.rect().contains(context.toasts.shown()[0].geometry()))
+
+
+def test_messages_stay_above_a_page_that_is_shown_later(context: AppContext, qtbot: QtBot) -> None:
+    """A click on the button that closes a message arrives there, whatever lies below it."""
+    window, stack = QWidget(), QStackedWidget()
+    qtbot.addWidget(window)
+    window.resize(800, 600)
+    stack.setParent(window)
+    stack.resize(800, 560)
+    pages = QWidget(), QWidget()
+    for page in pages:
+        stack.addWidget(page)
+    context.toasts.attach(window, lambda: None, over=stack)
+    with qtbot.waitExposed(window):
+        window.show()
+    context.toasts.show("not saved", "fail")
+    (toast,) = context.toasts.shown()
+    stack.setCurrentWidget(pages[1])
+    scene = QWidget(pages[1])
+    give_own_window(scene)
+    scene.resize(800, 560)
+    scene.show()
+    close = toast.findChild(QToolButton, "toast.close")
+    place = close.mapTo(window, close.rect().center())
+    assert window.childAt(place) is close
+    assert stack.geometry().contains(toast.geometry())
+    # What is really on the screen, with the native windows in their order.
+    qtbot.waitUntil(lambda: _same_colour(window, toast, scene), timeout=3000)
+    qtbot.mouseClick(close, Qt.MouseButton.LeftButton)
+    assert not context.toasts.shown()
+
+
+def _same_colour(window: QWidget, toast: QWidget, scene: QWidget) -> bool:
+    """Whether the screen shows the left edge of a message, which is red, above a scene."""
+    image = window.screen().grabWindow(window.winId()).toImage()
+    point = toast.geometry().center()
+    colour = image.pixelColor(toast.geometry().left() + 2, point.y())
+    return colour.red() > colour.green() + 50
+
+
+def test_the_history_keeps_what_was_closed(
+    context: AppContext, host: QWidget, qtbot: QtBot
+) -> None:
+    button = NotificationsButton(context.toasts, lambda: None, host)
+    context.toasts.show("saved", "pass")
+    for _ in range(3):
+        context.toasts.show("not saved", "fail")
+    context.toasts.clear()
+    assert button.text() == "4"
+    panel = button.show_list()
+    shown = [panel.list.item(row).text() for row in range(panel.list.count())]
+    assert "not saved  (3x)" in shown[0] and "saved" in shown[1]
+    assert button.text() == ""
+    panel.close()

@@ -1,0 +1,108 @@
+"""The Start page: what can go on, and what can begin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scene
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QLabel
+from pytestqt.qtbot import QtBot
+
+from app.context.context import AppContext
+from app.start.card import Card
+from app.start.page import StartPage
+from app.workspace.sessions import STAGES, read_session_entry
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.inputs import FOLDERS
+
+
+@pytest.fixture
+def page(context: AppContext, qtbot: QtBot) -> StartPage:
+    made = StartPage(context=context)
+    qtbot.addWidget(made)
+    made.resize(900, 640)
+    made.show()
+    return made
+
+
+def words(card: Card) -> str:
+    return "\n".join(label.text() for label in card.findChildren(QLabel))
+
+
+def session_of(context: AppContext, serial: str, name: str, *folders: str) -> Path:
+    folder = context.workspace.sessions_folder(serial) / name
+    folder.mkdir(parents=True)
+    (folder / "session.toml").write_text(f'[sensor]\nserial = "{serial}"\n')
+    for stage in folders:
+        (folder / stage).mkdir()
+        grey = np.full((12, 16), 90, np.uint8)
+        image = QImage(grey.data, 16, 12, QImage.Format.Format_Grayscale8)
+        assert image.save(str(folder / stage / "a.png"))
+    return folder
+
+
+def test_a_first_start_offers_only_what_can_begin(page: StartPage) -> None:
+    shown = [card.objectName() for card in page.findChildren(Card) if card.isVisible()]
+    assert shown == ["home.new", "home.open", "home.demo"]
+
+
+def test_the_session_that_is_not_finished_is_continued_at_its_step(
+    page: StartPage, context: AppContext, qtbot: QtBot
+) -> None:
+    folder = session_of(context, "S-1", "today", "checkerboard", "top_pose")
+    page.enter()
+    assert page.go_on.isVisible()
+    assert "S-1" in words(page.go_on) and "next: Lights" in words(page.go_on)
+    assert page.go_on._picture.pixmap().width() > 40  # the newest image, not the sign
+    with qtbot.waitSignal(context.requests.session) as asked:
+        page.go_on.click()
+    assert asked.args == [str(folder)]
+
+
+def test_a_session_with_a_saved_calibration_is_finished(
+    page: StartPage, context: AppContext
+) -> None:
+    calibration = scene.calibration()
+    session_of(context, calibration.sensor.serial, calibration.provenance.session, "balls")
+    page.enter()
+    assert page.go_on.isVisible()
+    context.workspace.keep_calibration(calibration, "made")
+    page.enter()
+    assert not page.go_on.isVisible()
+
+
+def test_the_last_calibration_leads_straight_to_inspect(
+    page: StartPage, context: AppContext, qtbot: QtBot, tmp_path: Path
+) -> None:
+    write_calibration(scene.calibration(), tmp_path / "made.gplcal")
+    path = context.workspace.import_calibration(tmp_path / "made.gplcal")
+    page.enter()
+    assert "not validated" in words(page.use) and "made" in words(page.use)
+    with qtbot.waitSignal(context.requests.page) as asked:
+        page.use.click()
+    assert asked.args == ["inspect"]
+    assert context.workspace.in_use == path
+
+
+def test_the_stages_of_a_session_are_those_of_the_calibration() -> None:
+    assert STAGES == {folder: stage.value for stage, folder in FOLDERS.items()}
+
+
+def test_a_closed_sensor_goes_on_with_its_own_stages(context: AppContext) -> None:
+    folder = session_of(context, "S-1", "today", "background")
+    (folder / "session.toml").write_text('[sensor]\nserial = "S-1"\n[in_place]\nmm_per_px = 0.06\n')
+    assert read_session_entry(folder).next_stage == "balls"
+    (folder / "session.toml").write_text('[sensor]\nserial = "S-1"\n')
+    assert read_session_entry(folder).next_stage == "lens"
+
+
+def test_a_damaged_image_leaves_the_sign(page: StartPage, context: AppContext) -> None:
+    folder = session_of(context, "S-1", "today", "checkerboard")
+    (folder / "checkerboard" / "a.png").write_bytes(b"no image")
+    assert read_session_entry(folder).newest is not None
+    page.enter()
+    assert page.go_on.isVisible()
+    assert page.go_on._picture.pixmap().width() < 40

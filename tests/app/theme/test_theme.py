@@ -1,0 +1,174 @@
+"""Texts are readable in both themes, and icons follow the theme."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from itertools import product
+from pathlib import Path
+
+import pytest
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
+
+from app.theme import theme
+from app.theme.icons import FOLDER, icon
+
+ROOT = Path(__file__).resolve().parents[3]
+READABLE = 4.5  # WCAG 2, level AA, for normal text
+MARK = 3.0  # the same for other parts: focus frames, icons
+THEMES = pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+TEXTS = ("text", "muted", "accent", "pass", "warn", "fail", "stale")
+GROUNDS = ("window", "base", "alternate")
+
+
+def pair(one: str, other: str, dark: bool) -> float:
+    return theme.contrast(QColor(theme.COLOURS[one][dark]), QColor(theme.COLOURS[other][dark]))
+
+
+@THEMES
+@pytest.mark.parametrize(("text", "ground"), list(product(TEXTS, GROUNDS)))
+def test_every_text_is_readable_on_every_background(text: str, ground: str, dark: bool) -> None:
+    assert pair(text, ground, dark) >= READABLE
+
+
+@THEMES
+def test_buttons_selections_and_tips_can_be_read(dark: bool) -> None:
+    assert pair("text", "button", dark) >= READABLE
+    assert pair("highlighted", "highlight", dark) >= READABLE
+    assert pair("text", "tip", dark) >= READABLE
+
+
+@THEMES
+@pytest.mark.parametrize("ground", [*GROUNDS, "button"])
+def test_the_focus_frame_stands_out(ground: str, dark: bool) -> None:
+    assert pair("accent", ground, dark) >= MARK
+
+
+def test_contrast_is_that_of_the_guideline() -> None:
+    """Black on white is 21:1; mid grey #777777 on white is the known near miss, 4.48:1."""
+    assert theme.contrast(QColor("black"), QColor("white")) == pytest.approx(21.0)
+    assert theme.contrast(QColor("#777777"), QColor("white")) == pytest.approx(4.48, abs=0.005)
+
+
+@pytest.fixture
+def light_again(qapp: QApplication):
+    yield
+    theme.apply(qapp, "light")
+
+
+def test_colours_with_a_meaning_follow_the_theme(qapp: QApplication, light_again: None) -> None:
+    theme.apply(qapp, "dark")
+    assert theme.is_dark()
+    assert theme.colour("pass") == QColor(theme.COLOURS["pass"][True])
+    theme.apply(qapp, "light")
+    assert not theme.is_dark()
+    assert theme.colour("pass") == QColor(theme.COLOURS["pass"][False])
+
+
+def test_an_icon_made_before_follows_the_theme(qapp: QApplication, light_again: None) -> None:
+    drawn = icon("pass", "pass")
+
+    def darkest() -> int:
+        image = drawn.pixmap(32, 32).toImage()
+        inked = [image.pixelColor(x, y) for x in range(32) for y in range(32)]
+        return min(c.lightness() for c in inked if c.alpha() > 200)
+
+    light = darkest()
+    theme.apply(qapp, "dark")
+    assert darkest() > light + 50
+
+
+CHANGING = """
+import gc
+from PySide6.QtGui import QIcon, QPixmap
+from app.desktop import make_application
+from app.theme.icons import icon
+
+application = make_application()
+kept = []
+for number in range(200):
+    first = icon("info", "warn")
+    second = QIcon(first)
+    second.addPixmap(QPixmap(4, 4))
+    del first
+    gc.collect(0)
+    assert not second.pixmap(16, 16).isNull()
+    if number % 2:
+        kept.append(second)
+"""
+
+
+def test_icons_that_qt_copies_live_as_long_as_it_needs_them() -> None:
+    """Also at program exit."""
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    done = subprocess.run(
+        [sys.executable, "-c", CHANGING], cwd=ROOT, capture_output=True, text=True, timeout=60,
+        env=environment,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@THEMES
+def test_no_line_between_parts_glares(dark: bool) -> None:
+    """Fusion draws the line below tabs in the palette's light colour."""
+    palette = theme.palette_for(dark)
+    line, ground = palette.color(QPalette.ColorRole.Light), palette.color(QPalette.ColorRole.Window)
+    assert theme.contrast(line, ground) < 2.0
+
+
+@pytest.mark.parametrize("name", sorted(p.stem for p in FOLDER.glob("*.svg")))
+def test_every_icon_draws_something(name: str, qapp: QApplication) -> None:
+    image = icon(name).pixmap(24, 24).toImage()
+    assert any(image.pixelColor(x, y).alpha() for x in range(24) for y in range(24))
+
+
+def test_a_missing_icon_is_reported_at_once(qapp: QApplication) -> None:
+    with pytest.raises(FileNotFoundError):
+        icon("no-such-icon")
+
+
+def test_disabled_text_differs_from_enabled(qapp: QApplication) -> None:
+    for dark in (False, True):
+        palette = theme.palette_for(dark)
+        assert palette.color(QPalette.ColorGroup.Disabled, QPalette.ColorRole.Text) != (
+            palette.color(QPalette.ColorGroup.Active, QPalette.ColorRole.Text)
+        )
+
+
+SWITCHING = """
+import gc
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QMenu, QWidget
+from app.desktop import make_application
+from app.theme import theme
+
+class Busy(QWidget):
+    def changeEvent(self, event):
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.StyleChange:
+            self.made = [[{}] for _ in range(2000)]  # enough for a collection
+
+application = make_application()
+shown = [Busy() for _ in range(20)]
+for widget in shown:
+    widget.show()
+for number in range(50):
+    gc.disable()
+    for _ in range(20):
+        menu = QMenu()
+        menu.itself = menu
+    del menu
+    gc.enable()
+    gc.set_threshold(700, 1, 1)
+    theme.apply(application, ("dark", "light")[number % 2])
+assert gc.isenabled()
+"""
+
+
+def test_switching_survives_widgets_that_are_garbage() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SWITCHING], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,85 @@
+"""The colour bar: meaning of its colours and its histogram."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtGui import QPainter, QPicture
+from pytestqt.qtbot import QtBot
+
+from app.view2d.colour_bar import BINS, depth_counts
+from app.view2d.display import colour_table
+from app.view2d.map_view import MapView
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+
+@pytest.fixture
+def view(qtbot: QtBot) -> MapView:
+    made = MapView("map", "Map")
+    qtbot.addWidget(made)
+    made.resize(400, 300)
+    made.set_image(np.zeros((20, 30, 3), np.uint8), (-3.0, -2.0, 3.0, 2.0))
+    made.show()
+    qtbot.waitExposed(made)
+    return made
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 0.0), (-0.2, -0.2), (0.0, 1e-9), (0.0, 2.5)])
+def test_a_map_of_one_value_has_a_scale_like_any_other(
+    view: MapView, low: float, high: float
+) -> None:
+    """The untouched sensor may have no uncertainty anywhere. This must not raise an error."""
+    view.show_colours("inferno", low, high, "um")
+    shown_low, shown_high = view.bar.levels()
+    assert shown_low == low and shown_high > shown_low
+    assert not view.grab().isNull()
+
+
+@pytest.mark.parametrize("colours", ["viridis", "magma"])
+def test_the_bar_shows_the_colours_of_the_map_from_low_to_high(view: MapView, colours: str) -> None:
+    view.show_colours(colours, 0.0, 1.0, "mm")
+    shown = view.grab().toImage()
+    box = view.bar.getViewBox().sceneBoundingRect()
+    for share in (0.1, 0.5, 0.9):
+        x, y = box.center().x(), box.bottom() - share * box.height()
+        pixel = shown.pixelColor(round(x), round(y)).getRgb()[:3]
+        expected = colour_table(colours)[round(255 * share)]
+        np.testing.assert_allclose(pixel, expected, atol=8)
+
+
+def test_the_histogram_counts_each_measured_depth_once(dome: HeightMap) -> None:
+    thinned = (dome.flags[::8, ::8] & Flag.OUTSIDE.value) == 0
+    counts = depth_counts(dome, (0.0, 1.0))
+    assert counts.size == BINS
+    assert counts.sum() == thinned.sum()
+    assert counts[0] == (dome.depth_mm[::8, ::8][thinned] < 1.0 / BINS).sum()
+    # The dome is 0.8 mm deep.
+    assert counts[int(0.82 * BINS) :].sum() == 0
+
+
+def test_depths_beyond_the_range_are_counted_at_its_ends(dome: HeightMap) -> None:
+    depth = dome.depth_mm.copy()
+    depth[80, 88] = np.nan
+    counts = depth_counts(replace(dome, depth_mm=depth), (0.3, 0.5))
+    thinned = depth[::8, ::8][(dome.flags[::8, ::8] & Flag.OUTSIDE.value) == 0]
+    assert counts[-1] >= (thinned > 0.5).sum() > 0
+    assert counts.sum() == np.isfinite(thinned).sum() == thinned.size - 1
+
+
+@pytest.mark.parametrize("high", [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
+@pytest.mark.parametrize("height", [300, 800])
+def test_every_automatic_range_is_labelled_up_to_its_end(
+    view: MapView, qtbot: QtBot, high: float, height: int
+) -> None:
+    view.resize(400, height)
+    view.show_colours("viridis", 0.0, high, "mm")
+    qtbot.wait(20)
+    recorded = QPicture()
+    painter = QPainter(recorded)
+    _line, _ticks, texts = view.bar.axis.generateDrawSpecs(painter)
+    painter.end()
+    labels = [float(text) for _box, _flags, text in texts]
+    assert 3 <= len(labels) <= 12
+    assert min(labels) == 0.0 and max(labels) == pytest.approx(high)

@@ -1,0 +1,28 @@
+"""The roughness of the section line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.view2d.cuts import Section, cut
+from gelpolight_core.reconstruction.height_map import HeightMap
+
+
+def wavy() -> HeightMap:
+    x_mm, y_mm = np.arange(-6.0, 6.0, 0.05), np.arange(-1.0, 1.0, 0.05)
+    depth = np.broadcast_to(0.01 * np.sin(2.0 * np.pi * x_mm / 0.5), (y_mm.size, x_mm.size))
+    flags = np.zeros(depth.shape, np.uint8)
+    return HeightMap(depth.astype(np.float32), x_mm, y_mm, 0.05, None, flags, "T", "full", "wave")
+
+
+def test_it_is_measured_only_with_a_cutoff_and_refused_if_the_line_is_too_short() -> None:
+    line = Section((-5.0, 0.0), (5.0, 0.0))
+    names = {figure.name for figure in cut(wavy(), line, None).figures}
+    assert not names & {"ra", "rq", "rz"}
+    rough = Section((-5.0, 0.0), (5.0, 0.0), cutoff_mm=0.8)
+    figures = {figure.name: figure.value for figure in cut(wavy(), rough, None).figures}
+    assert figures["ra"] < figures["rq"] < figures["rz"]
+    short = Section((-1.0, 0.0), (1.0, 0.0), cutoff_mm=2.5)
+    found = cut(wavy(), short, None)
+    assert "rz" not in {figure.name for figure in found.figures}
+    assert any("too short" in sentence for sentence in found.sentences)

@@ -1,0 +1,259 @@
+"""A map in mm: its axes, its image, the pointer, and the handles of the colour bar."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.live.frame_results import Maker, Shown, Wanted
+from app.live.height_panel import HeightPanel
+from app.sources.source import Frame
+from app.theme import theme
+from app.view2d.map_view import MapView
+from gelpolight_core.reconstruction.height_map import HeightMap
+
+RED, BLUE = (250, 10, 10), (10, 10, 250)
+EXTENT = (-8.0, -5.0, 8.0, 5.0)
+
+
+def _marked() -> np.ndarray:
+    """Return an image that is red with a blue block at x 4 to 8, y -5 to -2.5 mm."""
+    rgb = np.full((40, 64, 3), RED, np.uint8)
+    rgb[:10, 48:] = BLUE
+    return rgb
+
+
+@pytest.fixture
+def view(qtbot: QtBot) -> MapView:
+    made = MapView("map", "Map")
+    qtbot.addWidget(made)
+    made.resize(500, 400)
+    made.show()
+    qtbot.waitExposed(made)
+    return made
+
+
+def _seen(view: MapView, x_mm: float, y_mm: float) -> tuple[int, ...]:
+    at = view.box.mapViewToScene(QPointF(x_mm, y_mm))
+    return view.grab().toImage().pixelColor(round(at.x()), round(at.y())).getRgb()[:3]
+
+
+def _labels(view: MapView, side: str) -> dict[str, float]:
+    """Return the labels of an axis, each with its value in mm."""
+    axis = view._plot.getAxis(side)
+    low, high = axis.range
+    length = axis.width() if side == "bottom" else axis.height()
+    spacing, values = axis.tickValues(low, high, length)[0]
+    return dict(zip(axis.tickStrings(values, 1.0, spacing), map(float, values), strict=True))
+
+
+def _mouse(view: MapView, kind: QEvent.Type, at: QPointF, held: Qt.MouseButton) -> None:
+    button = Qt.MouseButton.NoButton if kind == QEvent.Type.MouseMove else Qt.MouseButton.LeftButton
+    place = view.viewport().mapToGlobal(at)
+    none = Qt.KeyboardModifier.NoModifier
+    QApplication.sendEvent(view.viewport(), QMouseEvent(kind, at, place, button, held, none))
+
+
+def _drag(view: MapView, start: QPointF, to: QPointF, *, drop: bool = True) -> None:
+    left, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
+    view.scene()._moveEventIsAllowed = lambda: True  # it skips moves that follow too quickly
+    _mouse(view, QEvent.Type.MouseMove, start, none)
+    _mouse(view, QEvent.Type.MouseButtonPress, start, left)
+    for share in (0.25, 0.5, 0.75, 1.0):
+        _mouse(view, QEvent.Type.MouseMove, start + share * (to - start), left)
+    if drop:
+        _mouse(view, QEvent.Type.MouseButtonRelease, to, none)
+
+
+def test_x_is_right_and_y_is_down_as_the_axes_say(view: MapView, qtbot: QtBot) -> None:
+    view.set_image(_marked(), EXTENT)
+    qtbot.wait(50)  # lays out
+    assert _seen(view, 6.0, -4.0) == BLUE
+    assert {_seen(view, x, y) for x, y in ((-6.0, -4.0), (6.0, 4.0), (3.5, -4.0), (6.0, -2.0))} == {
+        RED
+    }
+    box = view.box.sceneBoundingRect()
+    for side, low, high in (
+        ("bottom", QPointF(box.left(), 0.0), QPointF(box.right(), 0.0)),
+        ("left", QPointF(0.0, box.top()), QPointF(0.0, box.bottom())),
+    ):
+        ends = [view.box.mapSceneToView(p) for p in (low, high)]
+        found = [p.x() if side == "bottom" else p.y() for p in ends]
+        assert sorted(view._plot.getAxis(side).range) == pytest.approx(found, abs=0.05)
+        labels = _labels(view, side)
+        assert len(labels) >= 2
+        assert all(float(text) == pytest.approx(value) for text, value in labels.items())
+
+
+def test_a_millimetre_has_one_length_whatever_the_window(view: MapView, qtbot: QtBot) -> None:
+    view.set_image(_marked(), EXTENT)
+    for size in ((500, 400), (900, 300), (300, 700)):
+        view.resize(*size)
+        qtbot.wait(20)
+        width, height = view.box.viewPixelSize()
+        assert width == pytest.approx(height, rel=0.01)
+        assert view.box.viewRect().contains(QRectF(-8.0, -5.0, 16.0, 10.0))
+
+
+def test_a_zoomed_map_stays_where_it_is_with_the_next_frame(view: MapView) -> None:
+    view.set_image(_marked(), EXTENT)
+    view.box.scaleBy((0.2, 0.2), center=QPointF(2.0, 1.0))
+    view.box.sigRangeChangedManually.emit([True, True])
+    before = view.box.viewRect()
+    view.set_image(_marked(), EXTENT)
+    assert view.box.viewRect() == before
+    view.fit()
+    assert view.box.viewRect().width() > 16.0
+
+
+def test_the_scale_bar_is_as_long_as_it_says(view: MapView) -> None:
+    view.set_image(_marked(), EXTENT)
+    for zoom in (1.0, 0.3, 0.1):
+        view.box.scaleBy((zoom, zoom))
+        scale = view._scale
+        px_per_mm = 1.0 / view.box.viewPixelSize()[0]
+        assert scale.bar.rect().width() == pytest.approx(scale.size * px_per_mm, rel=0.01)
+        text, unit = scale.text.toPlainText().split()
+        assert float(text) * {"mm": 1.0, "um": 1e-3}[unit] == pytest.approx(scale.size)
+
+
+def test_a_text_replaces_image_axes_and_colour_bar(view: MapView) -> None:
+    view.set_image(_marked(), EXTENT)
+    view.show_colours("viridis", 0.0, 1.0, "mm")
+    assert view.has_image and view._plot.getAxis("left").isVisible() and view.bar.isVisible()
+    view.say("Nothing here.")
+    assert not view.has_image and view._words.isVisible()
+    assert not view._plot.getAxis("left").isVisible() and not view.bar.isVisible()
+    view.set_image(_marked(), EXTENT)
+    assert view._plot.getAxis("left").isVisible() and not view._words.isVisible()
+
+
+def test_a_small_map_keeps_its_space_for_the_image(view: MapView, qtbot: QtBot) -> None:
+    view.set_image(_marked(), EXTENT)
+    view.resize(300, 120)
+    assert not view._plot.getAxis("bottom").isVisible()
+    qtbot.waitUntil(lambda: view.box.height() > 115)
+    view.resize(500, 400)
+    assert view._plot.getAxis("bottom").isVisible()
+
+
+def test_the_pointer_has_a_position_on_the_image_only(view: MapView, qtbot: QtBot) -> None:
+    view.set_image(_marked(), EXTENT)
+    view.box.setRange(QRectF(-4.0, -4.0, 8.0, 8.0), padding=0)
+    qtbot.wait(50)  # lays out
+    pointed: list[tuple[float, float]] = []
+    view.pointed.connect(lambda x, y: pointed.append((x, y)))
+    view._on_pointer(view.box.mapViewToScene(QPointF(1.5, -2.0)))
+    assert pointed[-1] == pytest.approx((1.5, -2.0))
+    # The image continues below the axes, hidden.
+    axis = view._plot.getAxis("left").sceneBoundingRect()
+    view._on_pointer(axis.center())
+    assert all(map(math.isnan, pointed[-1]))
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_numbers_can_be_read_in_both_themes(
+    view: MapView, qapp: QApplication, dark: bool
+) -> None:
+    view.set_image(_marked(), EXTENT)
+    try:
+        theme.apply(qapp, "dark" if dark else "light")
+        ground = view.backgroundBrush().color()
+        axes = view._plot.getAxis("left"), view._plot.getAxis("bottom"), view.bar.axis
+        for axis in axes:
+            assert theme.contrast(axis.textPen().color(), ground) > 7.0
+    finally:
+        theme.apply(qapp, "light")
+
+
+# The colour range
+
+
+@pytest.fixture
+def shown(dome: HeightMap) -> Shown:
+    class Reconstruction:
+        def depth(self, _rgb: object, **_wanted: object) -> HeightMap:
+            return dome
+
+    maker = Maker(Reconstruction())  # type: ignore[arg-type]
+    maker.wanted = Wanted(height=True)
+    return maker(Frame(np.zeros((4, 6, 3), np.uint8), 0, 0.0))
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, shown: Shown) -> HeightPanel:
+    made = HeightPanel(adjustable=True)
+    qtbot.addWidget(made)
+    made.resize(420, 420)
+    made.show()
+    qtbot.waitExposed(made)
+    made.show_frame(shown, "viridis", still=False)
+    qtbot.wait(50)
+    return made
+
+
+def _ends(panel: HeightPanel) -> tuple[QPointF, QPointF, float]:
+    """Return the positions of the lower and the upper end of the colours, and their distance."""
+    box = panel.map.bar.getViewBox().sceneBoundingRect()
+    x = box.center().x()
+    return QPointF(x, box.bottom() - 2.0), QPointF(x, box.top() + 2.0), box.height()
+
+
+def test_the_upper_end_is_dragged_to_a_larger_depth(panel: HeightPanel) -> None:
+    ranges: list[tuple[float, float]] = []
+    panel.range_dragged.connect(lambda low, high: ranges.append((low, high)))
+    _low, high, length = _ends(panel)
+    _drag(panel.map, high, high - QPointF(0.0, 0.5 * length))
+    assert ranges[-1] == panel.map.bar.levels()
+    assert ranges[-1][0] == 0.0 and 1.5 < ranges[-1][1] < 2.5
+
+
+def test_the_lower_end_is_dragged_and_the_upper_one_stays(panel: HeightPanel) -> None:
+    low, _high, length = _ends(panel)
+    _drag(panel.map, low, low - QPointF(0.0, 0.25 * length))
+    shown_low, shown_high = panel.map.bar.levels()
+    assert 0.1 < shown_low < 0.5 and shown_high == 1.0
+
+
+def test_frames_do_not_move_an_end_that_is_being_dragged(panel: HeightPanel, shown: Shown) -> None:
+    _low, high, length = _ends(panel)
+    _drag(panel.map, high, high - QPointF(0.0, 0.5 * length), drop=False)
+    dragged = panel.map.bar.levels()
+    assert dragged[1] > 1.5
+    panel.show_frame(shown, "viridis", still=False)
+    assert panel.map.bar.levels() == dragged
+    _mouse(
+        panel.map, QEvent.Type.MouseButtonRelease, high - QPointF(0.0, 0.5 * length),
+        Qt.MouseButton.NoButton,
+    )  # fmt: skip
+    panel.show_frame(shown, "viridis", still=False)
+    assert panel.map.bar.levels() == shown.range_mm
+
+
+def test_a_double_click_on_the_bar_asks_for_the_automatic_range(
+    panel: HeightPanel, qtbot: QtBot
+) -> None:
+    low, _high, length = _ends(panel)
+    at = low - QPointF(0.0, 0.5 * length)
+    with qtbot.waitSignal(panel.range_released, timeout=1000):
+        for kind in (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick):
+            _mouse(panel.map, kind, at, Qt.MouseButton.LeftButton)
+            _mouse(panel.map, QEvent.Type.MouseButtonRelease, at, Qt.MouseButton.NoButton)
+
+
+def test_without_a_display_panel_the_ends_are_fixed(qtbot: QtBot, shown: Shown) -> None:
+    panel = HeightPanel()
+    qtbot.addWidget(panel)
+    panel.resize(420, 420)
+    panel.show()
+    qtbot.waitExposed(panel)
+    panel.show_frame(shown, "viridis", still=True)
+    _low, high, length = _ends(panel)
+    _drag(panel.map, high, high + QPointF(0.0, 0.3 * length))
+    assert panel.map.bar.levels() == shown.range_mm

@@ -1,0 +1,147 @@
+"""Images and movies of the 3D view: correct size and content, complete or not created."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.services.settings import Settings
+from app.view3d.image_dialog import ImageChoice, MovieChoice
+from app.view3d.images import MovieWriter, image_of
+from app.view3d.movie import ProgressDialog
+from app.view3d.panel import SurfacePanel
+from app.view3d.saving import ViewSaving
+from gelpolight_core.errors import InputError
+from tests.app.view3d.conftest import WAIT_MS, Made, pixels
+
+
+@pytest.fixture
+def saving(panel: SurfacePanel, settings: Settings) -> ViewSaving:
+    return ViewSaving(panel, panel, settings=settings)
+
+
+def _told(saving: ViewSaving) -> list[tuple[str, str]]:
+    found: list[tuple[str, str]] = []
+    saving.reported.connect(lambda text, kind: found.append((text, kind)))
+    return found
+
+
+@pytest.mark.parametrize("size", [(320, 240), (1501, 1003)])
+def test_an_image_has_any_size_and_the_screen_s_content(
+    panel: SurfacePanel, size: tuple[int, int]
+) -> None:
+    assert panel.view is not None
+    image = image_of(panel.view.scene, size)
+    assert image.shape == (size[1], size[0], 3)
+    # The same scene: the bump's yellow and the membrane's violet are in both.
+    shown = pixels(panel.image())
+    for colour in ((253, 231, 37), (68, 1, 84)):
+        assert (
+            min(np.abs(part.astype(int) - colour).max(axis=2).min() for part in (image, shown)) < 15
+        )
+
+
+def test_a_scale_bar_goes_with_an_image_though_the_screen_shows_none(panel: SurfacePanel) -> None:
+    assert panel.view is not None
+    assert not panel.style.scale_bar
+    image_of(panel.view.scene, (320, 240))
+    assert "scale-bar" not in panel.view.actors
+
+
+def test_a_transparent_image_has_no_background(
+    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path
+) -> None:
+    path = tmp_path / "surface.png"
+    reported = _told(saving)
+    saving.save_image(path, ImageChoice("surface", (400, 300), transparent=True))
+    alpha = np.asarray(Image.open(path))[..., 3]
+    assert alpha.shape == (300, 400)
+    assert alpha[2, 2] == 0 and (alpha == 255).sum() > 4_000
+    assert [kind for _, kind in reported] == ["pass"]
+
+
+def test_a_failed_image_is_reported(saving: ViewSaving, tmp_path: Path) -> None:
+    reported = _told(saving)
+    saving.save_image(tmp_path / "none" / "a.png", ImageChoice("surface", (320, 240)))
+    assert [kind for _, kind in reported] == ["fail"]
+
+
+def test_the_image_is_copied(panel: SurfacePanel, saving: ViewSaving) -> None:
+    saving.copy()
+    copied = QGuiApplication.clipboard().image()
+    assert copied.size() == panel.image().size() and not copied.isNull()
+
+
+@pytest.mark.parametrize("ending", ["mp4", "gif"])
+def test_a_turntable_turns_once(
+    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, ending: str, qtbot: QtBot
+) -> None:
+    path = tmp_path / f"turn.{ending}"
+    with qtbot.waitSignal(saving.reported, timeout=WAIT_MS):
+        saving.save_movie(path, MovieChoice("turntable", (240, 180), 5.0, 1.2))
+    frames = _frames(path)
+    assert len(frames) == 6 and frames[0].shape == (180, 240, 3)
+    assert np.abs(frames[0].astype(int) - frames[3]).mean() > 2.0  # half way round
+    assert sorted(p.name for p in tmp_path.iterdir() if "turn" in p.name) == [path.name]
+
+
+def _frames(path: Path) -> list[np.ndarray]:
+    if path.suffix == ".gif":
+        with Image.open(path) as image:
+            return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(image)]
+    video, frames = cv2.VideoCapture(str(path)), []
+    while True:
+        there, bgr = video.read()
+        if not there:
+            return frames
+        frames.append(bgr[..., ::-1])
+
+
+def test_a_cancelled_movie_leaves_no_file(
+    panel: SurfacePanel, saving: ViewSaving, tmp_path: Path, qtbot: QtBot
+) -> None:
+    reported = _told(saving)
+    saving.save_movie(tmp_path / "turn.mp4", MovieChoice("turntable", (240, 180), 30.0, 10.0))
+    progress = panel.findChild(ProgressDialog, "view3d.movie.progress")
+    assert progress is not None
+    qtbot.waitUntil(lambda: progress.bar.value() > 1, timeout=WAIT_MS)
+    progress.findChild(QPushButton).click()
+    assert [kind for _, kind in reported] == ["warn"]
+    assert [p.name for p in tmp_path.iterdir() if "turn" in p.name] == []
+
+
+def test_a_recording_is_saved_surface_by_surface(
+    panel: SurfacePanel, settings: Settings, made: Made, tmp_path: Path, qtbot: QtBot
+) -> None:
+    surfaces = [made(factor=factor, largest=128) for factor in (0.1, 0.5, 1.0)]
+
+    def player(put):  # type: ignore[no-untyped-def]
+        import threading
+
+        def feed() -> None:
+            for surface in (*surfaces, None):
+                put(surface)
+
+        threading.Thread(target=feed).start()
+        return len(surfaces)
+
+    saving = ViewSaving(panel, QWidget(panel), settings=settings, player=lambda: player)
+    with qtbot.waitSignal(saving.reported, timeout=WAIT_MS):
+        saving.save_movie(tmp_path / "film.mp4", MovieChoice("recording", (240, 180), 5.0, 1.0))
+    frames = _frames(tmp_path / "film.mp4")
+    assert len(frames) == 3
+    yellow = [int((np.abs(f.astype(int) - (253, 231, 37)).max(axis=2) < 60).sum()) for f in frames]
+    assert yellow[2] > yellow[0]
+
+
+def test_a_movie_without_frames_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        MovieWriter(tmp_path / "none.mp4", 5.0).finish()
+    assert not list(tmp_path.glob("*none*"))

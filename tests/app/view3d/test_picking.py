@@ -1,0 +1,99 @@
+"""From rays to points, and the measurements between two points."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.view3d.picking import along, between, hit
+from app.view3d.pins import pins_text, with_pin
+from tests.app.view3d.conftest import BUMP, SMALL, Made
+
+NODE_MM = 0.15
+
+
+@pytest.mark.parametrize("target", [BUMP[:2], SMALL[:2], (1.0, 5.0)])
+@pytest.mark.parametrize("towards", [(0.0, 0.0, 1.0), (0.6, -0.5, 1.0), (-0.4, 1.0, 0.8)])
+def test_a_ray_to_a_point_of_the_surface_finds_it(
+    made: Made, target: tuple[float, float], towards: tuple[float, float, float]
+) -> None:
+    surface = made(largest=128)
+    depth = float(surface.depth_at(np.array([target[0]]), np.array([target[1]]))[0])
+    point = np.array([*target, depth])
+    start, end = point + 40.0 * np.array(towards), point - 40.0 * np.array(towards)
+    found = hit(surface, start, end)
+    assert found is not None
+    assert math.dist(found, target) < NODE_MM
+
+
+def test_nearer_parts_hide_parts_behind_them(made: Made) -> None:
+    surface = made()
+    # A low ray along +x at the bump's y, at half height: it hits the bump's near side.
+    found = hit(surface, np.array([-20.0, BUMP[1], 0.5]), np.array([20.0, BUMP[1], 0.5]))
+    assert found == pytest.approx((BUMP[0] - 1.5, BUMP[1]), abs=0.05)
+
+
+def test_a_ray_next_to_the_surface_finds_nothing(made: Made) -> None:
+    surface = made()
+    assert hit(surface, np.array([20.0, 0.0, 5.0]), np.array([20.0, 0.0, -5.0])) is None
+    # Inside its bounds, but off the round working area.
+    assert hit(surface, np.array([7.5, 7.5, 5.0]), np.array([7.5, 7.5, -5.0])) is None
+
+
+@settings(max_examples=60)
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+def test_any_ray_from_above_ends_on_the_surface(
+    x: float, y: float, lean_x: float, lean_y: float
+) -> None:
+    surface = _ramp()
+    start, end = np.array([x + lean_x, y + lean_y, 3.0]), np.array([x - lean_x, y - lean_y, -3.0])
+    found = hit(surface, start, end)
+    assert found is not None
+    # The ramp's depth is 0.1 x: solved for the ray by hand.
+    share = (start[2] - 0.1 * start[0]) / (start[2] - end[2] - 0.1 * (start[0] - end[0]))
+    assert found == pytest.approx(tuple((start + share * (end - start))[:2]), abs=0.01)
+
+
+def _ramp():  # type: ignore[no-untyped-def]
+    from app.view3d.surface import ColourScale, Surface
+
+    x, y = np.meshgrid(np.linspace(-9, 9, 91), np.linspace(-9, 9, 91))
+    table = np.zeros((256, 3), np.uint8)
+    return Surface(
+        x.astype(np.float32), y[:, 0].astype(np.float32), (0.1 * x).astype(np.float32),
+        (-9.0, -9.0, 9.0, 9.0), np.zeros((4, 4, 3), np.uint8), ColourScale("", table, 0.0, 1.0),
+        (-0.9, 0.9),
+    )  # fmt: skip
+
+
+def test_two_points_give_distance_height_and_angle(made: Made) -> None:
+    surface = made()
+    found = between(surface, SMALL[:2], BUMP[:2])
+    assert found is not None
+    across = math.dist(SMALL[:2], BUMP[:2])
+    assert found.across_mm == pytest.approx(across)
+    assert found.rise_mm == pytest.approx(0.6, abs=0.01)
+    assert found.distance_mm == pytest.approx(math.hypot(across, 0.6), abs=0.01)
+    assert found.angle_deg == pytest.approx(math.degrees(math.atan2(0.6, across)), abs=0.1)
+    assert between(surface, (0.0, 0.0), (30.0, 0.0)) is None
+
+
+def test_a_third_pin_replaces_the_first(made: Made) -> None:
+    pins = with_pin(with_pin(with_pin((), (0.0, 0.0)), (1.0, 0.0)), (2.0, 0.0))
+    assert pins == ((1.0, 0.0), (2.0, 0.0))
+    one = pins_text(made(), ((-6.0, 0.0),))
+    two = pins_text(made(), ((-6.0, 0.0), (-5.0, 0.0)))
+    assert one.count("\n") == 0 and two.startswith(one)
+    assert "1.000" in two and "+0.000" in two
+
+
+def test_a_line_keeps_its_corners() -> None:
+    corners = ((0.0, 0.0), (3.0, 0.0), (3.0, 1.0))
+    places = along(corners)
+    for corner in corners:
+        assert np.hypot(*(places - corner).T).min() < 1e-9
+    assert np.hypot(*np.diff(places, axis=0).T).max() < 0.2

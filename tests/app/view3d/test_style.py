@@ -1,0 +1,69 @@
+"""Styles, viewpoints and round numbers."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyvista.plotting.cube_axes_actor import _axis_label_values
+
+from app.view3d.legend import TICKS
+from app.view3d.style import (
+    Style,
+    Viewpoint,
+    style_as_text,
+    style_from_text,
+    ticks,
+    viewpoints_as_text,
+    viewpoints_from_text,
+)
+
+
+@given(st.floats(-100.0, 100.0), st.floats(1e-3, 100.0), st.integers(3, 11))
+def test_ticks_are_even_few_and_hold_the_range(low: float, width: float, most: int) -> None:
+    values = ticks(low, low + width, most)
+    assert 2 <= len(values) <= most
+    assert values[0] <= low + 1e-6 * width and values[-1] >= low + width * (1.0 - 1e-6)
+    steps = [b - a for a, b in itertools.pairwise(values)]
+    assert max(steps) == pytest.approx(min(steps))
+
+
+def test_ticks_reach_little_beyond_the_range() -> None:
+    assert ticks(-11.2, 11.2, TICKS) == (-12.0, -8.0, -4.0, 0.0, 4.0, 8.0, 12.0)
+    assert ticks(0.0, 1.0, 2) == (0.0, 1.0)
+    assert ticks(0.0, 0.5, 3) == (0.0, 0.25, 0.5)
+
+
+@pytest.mark.parametrize("intervals", range(1, TICKS))
+def test_vtk_places_so_many_labels_one_at_each_tick(intervals: int) -> None:
+    # pyvista follows VTK's own choice of ticks: counted in intervals, there is one for each label.
+    placed = _axis_label_values(0.0, float(intervals), intervals + 1)
+    np.testing.assert_allclose(placed, np.arange(intervals + 1))
+
+
+def test_a_style_is_saved_without_the_exaggeration() -> None:
+    style = Style(exaggeration=3.0, axes=False, wireframe=True, parallel=True)
+    assert style_from_text(style_as_text(style)) == replace(style, exaggeration=1.0)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"axes": 3, "colour": 1}', "null", "7"])
+def test_a_damaged_style_gives_the_default(text: str) -> None:
+    assert style_from_text(text) == Style()
+
+
+def test_viewpoints_are_kept_by_name() -> None:
+    kept = {"coin": Viewpoint((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), True, 4.0)}
+    assert viewpoints_from_text(viewpoints_as_text(kept)) == kept
+
+
+@pytest.mark.parametrize("text", [
+    "", "[]", '{"a": 1}', '{"a": {"position": [1, 2], "focus": [0, 0, 0], "up": [0, 1, 0]}}',
+    '{"a": {"position": [1, NaN, 2], "focus": [0, 0, 0], "up": [0, 1, 0], "parallel": true, '
+    '"parallel_scale": 1}}',
+])  # fmt: skip
+def test_damaged_viewpoints_are_none(text: str) -> None:
+    assert viewpoints_from_text(text) == {}

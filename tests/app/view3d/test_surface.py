@@ -1,0 +1,55 @@
+"""The nodes that the 3D view draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.view3d.surface import LIVE_NODES, ColourScale, surface_of
+from gelpolight_core.reconstruction.height_map import HeightMap
+from tests.app.view3d.conftest import BUMP, SMALL, Made
+
+
+def test_the_live_mesh_is_coarse_and_the_frozen_one_has_every_node(
+    made: Made, heightmap: HeightMap
+) -> None:
+    live, whole = made(largest=60), made()
+    assert max(live.depth_mm.shape) <= 61 < LIVE_NODES
+    assert whole.depth_mm.shape[1] == heightmap.depth_mm.shape[1]
+
+
+def test_the_mesh_ends_at_the_rim_of_the_working_area(made: Made) -> None:
+    surface = made()
+    rim = np.hypot(surface.x_mm[:, [0, -1]], surface.y_mm[:, None])
+    assert np.abs(rim[5:-5] - 8.0).max() < 0.15
+
+
+@pytest.mark.parametrize("largest", [60, 128, None])
+def test_the_depth_at_a_point_equals_that_of_the_map(made: Made, largest: int | None) -> None:
+    surface = made(largest=largest)
+    places = np.array([BUMP[:2], SMALL[:2], (0.0, 0.0), (30.0, 0.0)])
+    found = surface.depth_at(places[:, 0], places[:, 1])
+    assert found == pytest.approx([BUMP[2], SMALL[2], 0.0, -np.inf], abs=0.02)
+
+
+def test_between_nodes_the_depth_is_linear(made: Made) -> None:
+    surface = made()
+    slope = np.linspace(BUMP[0] + 1.1, BUMP[0] + 1.9, 50)
+    found = surface.depth_at(slope, np.full(50, BUMP[1]))
+    assert found == pytest.approx(2.0 - (slope - BUMP[0]), abs=0.01)
+
+
+def test_a_thinned_surface_has_the_same_positions(made: Made) -> None:
+    whole = made()
+    thin = whole.thinned(100)
+    x, y = np.array([BUMP[0], SMALL[0]]), np.array([BUMP[1], SMALL[1]])
+    assert thin.depth_at(x, y) == pytest.approx(whole.depth_at(x, y), abs=0.05)
+    assert max(thin.depth_mm.shape) <= 100
+    assert thin.texture is whole.texture
+
+
+def test_an_empty_working_area_has_no_surface(heightmap: HeightMap) -> None:
+    heightmap.flags[:] = 1
+    scale = ColourScale("depth [mm]", np.zeros((256, 3), np.uint8), 0.0, 1.0)
+    texture = np.zeros((8, 8, 3), np.uint8)
+    assert surface_of(heightmap, texture, scale, range_mm=(0.0, 1.0)) is None

@@ -1,0 +1,360 @@
+"""The 3D view on a screen: content, positions, mouse and keys."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtWidgets import QMainWindow
+from pytestqt.qtbot import QtBot
+
+from app.services.jobs import Jobs
+from app.services.settings import Settings
+from app.view2d.display import colour_table
+from app.view3d.panel import SurfacePanel
+from app.view3d.style import VIEWS, Style
+from app.view3d.surface import SurfaceLine
+from tests.app.view3d.conftest import BUMP, SMALL, WAIT_MS, Made, flat_map, pixels
+
+PLAIN = Style(axes=False, colour_bar=False, orientation=False)
+
+
+def _screen_px(panel: SurfacePanel, x: float, y: float, depth: float) -> QPointF:
+    """Return the position where VTK projects a point of the sensor, in the view's pixels."""
+    view = panel.view
+    assert view is not None
+    view.renderer.SetWorldPoint(x, -y, view.scene.style.exaggeration * depth, 1.0)
+    view.renderer.WorldToDisplay()
+    across, up, _ = view.renderer.GetDisplayPoint()
+    ratio = view.devicePixelRatioF()
+    return QPointF(across / ratio, view.height() - 1 - up / ratio)
+
+
+def _drawn(panel: SurfacePanel, qtbot: QtBot) -> np.ndarray:
+    view = panel.view
+    assert view is not None
+    before = view.drawings
+    view.update()
+    qtbot.waitUntil(lambda: view.drawings > before, timeout=WAIT_MS)
+    return pixels(panel.image())
+
+
+def _colour_at(image: np.ndarray, at: QPointF) -> np.ndarray:
+    row, column = round(at.y()), round(at.x())
+    return np.median(image[row - 1 : row + 2, column - 1 : column + 2].reshape(-1, 3), axis=0)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_each_point_has_the_colour_of_its_depth(
+    panel: SurfacePanel, view: str, qtbot: QtBot
+) -> None:
+    panel.set_style(PLAIN)
+    panel.view_from(view)
+    image = _drawn(panel, qtbot)
+    # From the front and the side the tops are seen edge-on: their walls instead.
+    for x, y, depth in (BUMP, SMALL) if view in ("top", "isometric") else ():
+        expected = colour_table("viridis")[round(255 * depth)]
+        found = _colour_at(image, _screen_px(panel, x, y, depth))
+        assert np.abs(found - expected).max() < 12
+    low = colour_table("viridis")[0].astype(float)
+    high = colour_table("viridis")[255].astype(float)
+    assert (np.abs(image - low).max(axis=2) < 14).sum() > 300
+    assert (np.abs(image - high).max(axis=2) < 30).sum() > 20
+
+
+def test_from_the_top_the_surface_lies_as_in_the_camera_s_image(panel: SurfacePanel) -> None:
+    panel.view_from("top")
+    centre, right, down = (_screen_px(panel, *at, 0.0) for at in ((0, 0), (2, 0), (0, 2)))
+    assert right.x() > centre.x() + 10 and right.y() == pytest.approx(centre.y(), abs=0.5)
+    assert down.y() > centre.y() + 10 and down.x() == pytest.approx(centre.x(), abs=0.5)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("view", ["isometric", "top"])
+@pytest.mark.parametrize("exaggeration", [1.0, 4.0])
+def test_pointing_finds_the_visible_point(
+    panel: SurfacePanel, view: str, parallel: bool, exaggeration: float
+) -> None:
+    panel.set_style(Style(parallel=parallel, exaggeration=exaggeration))
+    panel.view_from(view)
+    for x, y, depth in (BUMP, SMALL, (-2.0, -4.0, 0.0)):
+        found = panel.view.point_at(_screen_px(panel, x, y, depth))  # type: ignore[union-attr]
+        assert found == pytest.approx((x, y), abs=0.15)  # a node
+
+
+def test_a_click_sets_a_pin_and_a_drag_rotates(panel: SurfacePanel, qtbot: QtBot) -> None:
+    panel.view_from("top")
+    view = panel.view
+    assert view is not None
+    at = _screen_px(panel, *BUMP).toPoint()
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=at)
+    (pin,) = panel.pins
+    assert pin == pytest.approx(BUMP[:2], abs=0.15)
+    before = view.scene.viewpoint
+    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=at)
+    qtbot.mouseMove(view, at + QPoint(60, 30))
+    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=at + QPoint(60, 30))
+    assert len(panel.pins) == 1
+    assert view.scene.viewpoint != before
+
+
+def test_hovering_reports_points_and_nothing_off_the_surface(
+    panel: SurfacePanel, qtbot: QtBot
+) -> None:
+    panel.view_from("top")
+    seen: list[tuple[float, float]] = []
+    panel.pointed.connect(lambda x, y: seen.append((x, y)))
+    qtbot.mouseMove(panel.view, _screen_px(panel, *SMALL).toPoint())
+    qtbot.waitUntil(lambda: bool(seen) and seen[-1] == pytest.approx(SMALL[:2], abs=0.2))
+    qtbot.mouseMove(panel.view, QPoint(3, 3))
+    qtbot.waitUntil(lambda: bool(np.isnan(seen[-1]).all()))
+
+
+def test_a_right_click_asks_for_the_menu_and_a_right_drag_zooms(
+    panel: SurfacePanel, qtbot: QtBot
+) -> None:
+    view = panel.view
+    assert view is not None
+    asked: list[QPoint] = []
+    view.menu_wanted.disconnect()
+    view.menu_wanted.connect(asked.append)
+    qtbot.mouseClick(view, Qt.MouseButton.RightButton, pos=QPoint(100, 100))
+    assert asked == [QPoint(100, 100)]
+    before = view.scene.viewpoint
+    qtbot.mousePress(view, Qt.MouseButton.RightButton, pos=QPoint(200, 200))
+    qtbot.mouseMove(view, QPoint(200, 120))
+    qtbot.mouseRelease(view, Qt.MouseButton.RightButton, pos=QPoint(200, 120))
+    assert len(asked) == 1 and view.scene.viewpoint != before
+
+
+def test_frames_do_not_move_camera_or_axes(panel: SurfacePanel, made: Made, qtbot: QtBot) -> None:
+    view = panel.view
+    assert view is not None
+    viewpoint, axes = view.scene.viewpoint, view.renderer.cube_axes_actor
+    for factor in (0.2, 0.9, 0.5):
+        panel.show_surface(made(factor=factor, largest=128))
+        _drawn(panel, qtbot)
+    assert view.scene.viewpoint == viewpoint
+    assert view.renderer.cube_axes_actor is axes
+    # A frozen frame has more nodes and its own light, but the camera stays.
+    panel.show_surface(made(light=(-0.5, -0.5, 0.7)))
+    _drawn(panel, qtbot)
+    assert view.scene.viewpoint == viewpoint and view.renderer.cube_axes_actor is axes
+
+
+def test_the_view_is_drawn_once_for_each_frame(
+    panel: SurfacePanel, made: Made, qtbot: QtBot
+) -> None:
+    view = panel.view
+    assert view is not None
+    qtbot.wait(100)
+    before = view.drawings
+    for number in range(5):
+        panel.show_surface(made(factor=0.1 * number, largest=128))
+        qtbot.waitUntil(lambda number=number: view.drawings > before + number, timeout=WAIT_MS)
+    qtbot.wait(50)
+    assert view.drawings == before + 5
+
+
+def test_the_axes_show_true_mm_although_the_depth_is_exaggerated(
+    panel: SurfacePanel, qtbot: QtBot
+) -> None:
+    panel.set_style(Style(exaggeration=5.0))
+    axes = panel.view.renderer.cube_axes_actor  # type: ignore[union-attr]
+    labels = [
+        [
+            axes.GetAxisLabels(k).GetValue(n)
+            for n in range(axes.GetAxisLabels(k).GetNumberOfValues())
+        ]
+        for k in range(3)
+    ]
+    x, y, depth = ([float(text) for text in axis if text.strip()] for axis in labels)
+    assert x == sorted(x) and y == sorted(y, reverse=True)  # y points down in the sensor's frame
+    assert min(x) <= -8.0 and max(x) >= 8.0
+    assert depth[0] == 0.0 and depth[-1] == 1.0
+    assert axes.GetBounds()[5] == pytest.approx(5.0)
+    with_axes = _drawn(panel, qtbot)
+    panel.set_style(replace(panel.style, axes=False))
+    assert np.abs(with_axes.astype(int) - _drawn(panel, qtbot)).max() > 60
+
+
+def test_the_colour_bar_has_the_scale_s_colours_and_ends(panel: SurfacePanel, qtbot: QtBot) -> None:
+    view = panel.view
+    assert view is not None
+    (bar,) = view.scalar_bars.values()
+    assert bar.GetLookupTable().GetRange() == (0.0, 1.0)
+    image = _drawn(panel, qtbot)
+    strip = image[:, : image.shape[1] // 10].reshape(-1, 3).astype(float)
+    for colour in colour_table("viridis")[[3, 128, 252]]:
+        assert np.abs(strip - colour).max(axis=1).min() < 10
+
+
+def test_the_clip_plane_hides_one_side_and_can_be_removed(
+    panel: SurfacePanel, qtbot: QtBot
+) -> None:
+    panel.set_style(PLAIN)
+    panel.view_from("top")
+    view = panel.view
+    assert view is not None
+    whole = _drawn(panel, qtbot)
+    view.show_plane(True)
+    view.clear_plane_widgets()  # its own lines would be in the image
+    view.scene.clip_by((np.array([1.0, 0.0, 0.0]), np.zeros(3)))
+    clipped = _drawn(panel, qtbot)
+    kept, hidden = _screen_px(panel, *SMALL), _screen_px(panel, *BUMP)
+    assert np.abs(_colour_at(clipped, kept) - _colour_at(whole, kept)).max() < 12
+    assert np.abs(_colour_at(clipped, hidden) - _colour_at(whole, hidden)).max() > 40
+    view.show_plane(False)
+    assert view.scene.clip is None
+    again = _drawn(panel, qtbot)
+    assert np.abs(_colour_at(again, hidden) - _colour_at(whole, hidden)).max() < 12
+
+
+def test_a_line_on_the_surface_is_hidden_behind_the_relief(
+    panel: SurfacePanel, qtbot: QtBot
+) -> None:
+    panel.set_style(replace(PLAIN, exaggeration=4.0))
+    line = SurfaceLine(((BUMP[0] - 0.5, BUMP[1] - 3.0), (BUMP[0] + 0.5, BUMP[1] - 3.0)), "#ff0000")
+
+    def red_seen() -> int:
+        image = _drawn(panel, qtbot).astype(int)
+        return int(((image[..., 0] > 200) & (image[..., 1:].max(axis=2) < 60)).sum())
+
+    panel.view_from("top")
+    assert red_seen() == 0
+    panel.show_lines((line,))
+    assert red_seen() > 20
+    # From the front, the bump hides it.
+    panel.view_from("front")
+    assert red_seen() == 0
+
+
+def test_the_bar_has_names_where_colours_have_names(
+    panel: SurfacePanel, made: Made, qtbot: QtBot
+) -> None:
+    surface = made(largest=128)
+    scale = replace(
+        surface.scale, names=(("no flags", (90, 96, 104)), ("in shadow", (84, 125, 255)))
+    )
+    panel.show_surface(replace(surface, scale=scale))
+    view = panel.view
+    assert view is not None
+    (bar,) = view.scalar_bars.values()
+    table = bar.GetLookupTable()
+    assert [table.GetAnnotation(k) for k in range(table.GetNumberOfAnnotatedValues())] == [
+        name for name, _ in scale.names
+    ]
+    panel.show_surface(surface)
+    (bar,) = view.scalar_bars.values()
+    assert bar.GetLookupTable().GetNumberOfAnnotatedValues() == 0
+
+
+def test_keys_of_the_page_reach_the_page(panel: SurfacePanel, qtbot: QtBot) -> None:
+    view = panel.view
+    assert view is not None
+    # VTK's own keys: exit, wireframe, pick, stereo.
+    for key in (Qt.Key.Key_Q, Qt.Key.Key_E, Qt.Key.Key_W, Qt.Key.Key_P, Qt.Key.Key_3):
+        qtbot.keyClick(view, key)
+    assert view.isVisible() and view.scene._sheet.actor.prop.style.lower() == "surface"
+    before = view.scene.viewpoint
+    qtbot.keyClick(view, Qt.Key.Key_Left)
+    assert view.scene.viewpoint != before
+
+
+def test_a_click_on_the_orientation_widget_changes_the_view(
+    panel: SurfacePanel, qtbot: QtBot
+) -> None:
+    panel.view_from("isometric")
+    view = panel.view
+    assert view is not None
+    # The widget's arm towards the viewer, in the upper right corner.
+    at = QPoint(view.width() - 71, 26)
+    qtbot.mouseMove(view, at)
+    qtbot.wait(50)
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=at)
+
+    def from_the_top() -> bool:
+        x, y, z = view.scene.viewpoint.position
+        return abs(x) < 0.1 and abs(y) < 0.1 and z > 10.0
+
+    qtbot.waitUntil(from_the_top, timeout=WAIT_MS)
+    assert view.scene.viewpoint.up == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
+
+
+def test_style_and_viewpoints_are_remembered(
+    panel: SurfacePanel, settings: Settings, qtbot: QtBot
+) -> None:
+    panel.set_style(replace(panel.style, wireframe=True, orientation=False))
+    panel.view_from("side")
+    side = panel.view.scene.viewpoint  # type: ignore[union-attr]
+    panel.menu.save_viewpoint("from the side")
+    panel.view_from("top")
+    panel.menu.go_to("from the side")
+    assert panel.view.scene.viewpoint == side  # type: ignore[union-attr]
+    jobs = Jobs("again")
+    again = SurfacePanel(jobs, settings=settings, flat=flat_map)
+    qtbot.addWidget(again)
+    assert again.style.wireframe and not again.style.orientation
+    jobs.close()
+
+
+def test_the_window_is_not_built_again_for_the_first_3d_view(
+    settings: Settings, made: Made, qtbot: QtBot
+) -> None:
+    class Window(QMainWindow):
+        rebuilt = 0
+
+        def event(self, event: QEvent) -> bool:
+            self.rebuilt += event.type() == QEvent.Type.WinIdChange
+            return bool(super().event(event))
+
+    jobs, window = Jobs("test"), Window()
+    panel = SurfacePanel(jobs, settings=settings, flat=flat_map)
+    window.setCentralWidget(panel)
+    window.show()
+    qtbot.waitExposed(window)
+    before = window.rebuilt
+    panel.show_surface(made(largest=128))
+    qtbot.waitUntil(lambda: panel.view is not None and panel.view.drawings > 0, timeout=WAIT_MS)
+    assert window.rebuilt == before
+    panel.finish()
+    jobs.close()
+    window.close()
+    window.deleteLater()
+
+
+def test_a_closed_view_is_freed(settings: Settings, made: Made, qtbot: QtBot) -> None:
+    gone = []
+    for _ in range(3):
+        jobs = Jobs("test")
+        panel = SurfacePanel(jobs, settings=settings, flat=flat_map)
+        panel.show()
+        panel.show_surface(made(largest=128))
+        qtbot.waitUntil(lambda p=panel: p.view is not None and p.view.drawings > 0, timeout=WAIT_MS)
+        gone.append((weakref.ref(panel.view), weakref.ref(panel.view.scene)))
+        panel.finish()
+        jobs.close()
+        panel.close()
+        panel.deleteLater()
+        del panel
+    qtbot.wait(50)
+    gc.collect()
+    assert [alive for pair in gone for alive in pair if alive() is not None] == []
+
+
+def test_without_opengl_the_relief_is_shown_and_the_reason(
+    settings: Settings, made: Made, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.view3d.panel.opengl_problem", lambda: "OpenGL 3.2 is not available")
+    jobs = Jobs("test")
+    panel = SurfacePanel(jobs, settings=settings, flat=flat_map)
+    qtbot.addWidget(panel)
+    panel.show()
+    panel.show_surface(made(largest=128))
+    assert panel.view is None and "OpenGL 3.2" in panel.reason
+    assert panel._flat is not None and panel._flat.isVisible()
+    jobs.close()

@@ -1,0 +1,101 @@
+"""A capture that cannot be used is left out with its reason; the others are used without it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.calibrate.balls.presenter import judge_ball
+from app.calibrate.image_step import Judgement
+from app.calibrate.lens.presenter import judge_view
+from app.calibrate.top_pose.presenter import judge_top_view
+from gelpolight_core.calibration.inputs import FOLDERS, Stage
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.status import StageState
+
+SEVERAL = (Stage.LENS, Stage.TOP_POSE, Stage.BALLS)
+
+
+def write_noise(path: Path, size: tuple[int, int]) -> None:
+    """Write a colour image that shows nothing."""
+    noise = np.random.default_rng(5).normal(90.0, 4.0, (size[1], size[0], 3))
+    assert cv2.imwrite(str(path), np.clip(noise, 0, 255).astype(np.uint8))
+
+
+def spoil(folder: Path, usual: tuple[int, int]) -> dict[str, str]:
+    """Add one unreadable image, one of another size, and one that shows nothing."""
+    (folder / "zz_damaged.png").write_bytes(b"not an image")
+    write_noise(folder / "zz_small.png", (usual[0] // 2, usual[1] // 2))
+    write_noise(folder / "zz_nothing.png", usual)
+    return {"zz_damaged.png": "not a complete PNG", "zz_small.png": "pixels", "zz_nothing.png": ""}
+
+
+@pytest.mark.parametrize("stage", SEVERAL)
+def test_bad_captures_are_named_on_their_thumbnails_and_the_stage_goes_on(
+    stage: Stage, computed_project: Callable[[], CalibrationProject]
+) -> None:
+    project = computed_project()
+    folder = project.session.folder / FOLDERS[stage]
+    camera = project.results.lens.camera if project.results.lens is not None else None
+    assert camera is not None
+    reasons = spoil(folder, (camera.width, camera.height))
+    if stage is Stage.BALLS:
+        text = (project.session.folder / "session.toml").read_text()
+        rows = "".join(f'"{name}" = 3.0\n' for name in reasons)
+        (project.session.folder / "session.toml").write_text(
+            text.replace("[balls]\n", f"[balls]\n{rows}")
+        )
+        project.reload()
+    status = project.compute(stage)
+    assert status.state is StageState.WARN, status.sentence
+    (left_out,) = [f for f in status.quality.figures if f.key.endswith("left_out")]
+    assert left_out.value == len(reasons)
+    lens = project.results.lens
+    assert lens is not None
+    views = {view.name: view for view in lens.views}
+    judges: dict[Stage, Callable[[str], Judgement]] = {
+        Stage.LENS: lambda name: judge_view(views.get(name)),
+        Stage.TOP_POSE: lambda name: judge_top_view(name, project, status),
+        Stage.BALLS: lambda name: judge_ball(name, project),
+    }
+    for path in project.session.found(FOLDERS[stage]):
+        state, sentence, _note = judges[stage](path.name)
+        if path.name in reasons:
+            assert state == "fail"
+            assert reasons[path.name] in sentence
+            assert path.name in left_out.advice
+        else:
+            assert state in ("pass", "warn")
+
+
+def test_a_stage_of_nothing_but_bad_captures_fails(
+    computed_project: Callable[[], CalibrationProject],
+) -> None:
+    project = computed_project()
+    for stage in SEVERAL:
+        folder = project.session.folder / FOLDERS[stage]
+        for path in folder.iterdir():
+            path.write_bytes(b"not an image")
+        if stage is not Stage.BALLS:
+            assert project.compute(stage).state is StageState.FAIL
+
+
+def test_the_command_refuses_copies_too(small_session: Path, tmp_path: Path) -> None:
+    from app.command_line.main import main
+    from gelpolight_core.calibration.file import read_calibration
+
+    session, file = tmp_path / "session", tmp_path / "c.gplcal"
+    ignored = shutil.ignore_patterns("presses", "truth")
+    shutil.copytree(small_session, session, ignore=ignored)
+    (session / "balls" / "ball_00.png").write_bytes(b"not an image")
+    (session / "checkerboard" / "zz.png").write_bytes(b"not an image either")
+    assert main(["calibrate", str(session), "-o", str(file)]) == 0
+    quality = read_calibration(file).quality
+    assert quality["lens"]["views_left_out"].value == 1.0
+    assert quality["balls"]["balls_left_out"].value == 1.0
+    assert "ball_00.png" in quality["balls"]["balls_left_out"].advice

@@ -1,0 +1,72 @@
+"""Commands name what is wrong with an image, and refuse depth that means nothing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.command_line.main import MENDABLE, main
+
+
+def changed(path: Path, to: Path, gains: tuple[float, float, float]) -> Path:
+    """Write an image with the channels (red, green, blue) of another light; return where."""
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(to), np.rint(image * np.array(gains[::-1])).clip(0, 255).astype(np.uint8))
+    return to
+
+
+@pytest.fixture
+def off(press: Path, tmp_path: Path) -> Path:
+    """Return the press with the green LED off."""
+    return changed(press, tmp_path / "off.png", (1.0, 0.0, 1.0))
+
+
+def test_reconstruct_refuses_a_meaningless_image_and_writes_the_others(
+    calibration: Path, press: Path, off: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["reconstruct", str(calibration), str(off), str(press), "-o", str(out)]) == MENDABLE
+    assert [path.name for path in out.iterdir()] == [f"{press.stem}.npz"]
+    errors = capsys.readouterr().err
+    assert "green LED is off" in errors
+    assert "--despite-faults" in errors
+
+
+def test_reconstruct_goes_on_where_it_is_told_to(
+    calibration: Path, off: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    arguments = ["reconstruct", str(calibration), str(off), "-o", str(out), "--despite-faults"]
+    assert main(arguments) == 0
+    assert (out / "off.npz").is_file()
+    assert "green LED is off" in capsys.readouterr().err
+
+
+def test_measure_names_the_image_of_another_sensor(
+    calibration: Path, press: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "other.png"
+    cv2.imwrite(str(other), cv2.imread(str(press), cv2.IMREAD_UNCHANGED)[::-1])
+    assert main(["measure", str(calibration), str(other), "--shape", "cylinder"]) == MENDABLE
+    errors = capsys.readouterr().err
+    assert "does not look like this sensor's membrane" in errors
+    assert "is pressed" not in errors
+
+
+def test_a_measurement_on_an_image_with_a_fault_is_doubtful_and_lists_it(
+    calibration: Path, press: Path, tmp_path: Path
+) -> None:
+    dim = changed(press, tmp_path / "dim.png", (0.98, 0.98, 0.98))
+    file = tmp_path / "m.json"
+    arguments = ["measure", str(calibration), str(dim), "--shape", "cylinder", "--json", str(file)]
+    assert main(arguments) == 0
+    found = json.loads(file.read_text())
+    assert found["verdict"] == "doubtful"
+    # Rounded to whole numbers twice, the image has a little offset as well.
+    (fault,) = (fault for fault in found["faults"] if fault["key"] == "exposure")
+    assert fault["value"] == pytest.approx(-2.0, abs=0.3)
+    assert not fault["depth_is_meaningless"]

@@ -1,0 +1,63 @@
+"""A command loads only what it needs: commands that compute nothing respond at once."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.sensor_calibration import Calibration
+
+HEAVY = ("cv2", "matplotlib", "numba", "numpy", "scipy", "PySide6")
+LOADED = f"""
+import sys
+from app.command_line.main import main
+
+try:
+    main(sys.argv[1:])
+finally:
+    print("loaded:", *(name for name in {HEAVY!r} if name in sys.modules))
+"""
+
+
+def loaded_by(*arguments: str) -> set[str]:
+    """Return the slow libraries that a command has loaded."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, *arguments], capture_output=True, text=True
+    )
+    assert "Traceback" not in done.stderr
+    return set(done.stdout.splitlines()[-1].split()[1:])
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["no-such-command"]])
+def test_help_loads_no_library(arguments: list[str]) -> None:
+    assert loaded_by(*arguments) == set()
+
+
+def test_records_need_no_image_library(tmp_path: Path) -> None:
+    assert not loaded_by("records", "--workspace", str(tmp_path)) - {"numpy"}
+
+
+def test_a_board_needs_no_more_than_a_page(tmp_path: Path) -> None:
+    loaded = loaded_by("board", "-o", str(tmp_path / "board.pdf"))
+    assert not loaded - {"numpy", "matplotlib"}
+    assert (tmp_path / "board.pdf").stat().st_size > 0
+
+
+def test_cameras_are_listed_without_the_compiler() -> None:
+    assert not loaded_by("cameras") & {"numba", "scipy", "matplotlib", "PySide6"}
+
+
+def test_a_design_is_checked_without_the_drawing_library(tmp_path: Path) -> None:
+    assert not loaded_by("design", str(tmp_path / "none.toml")) & {"matplotlib", "PySide6"}
+
+
+def test_a_calibration_is_shown_without_drawing_or_a_window(
+    small_calibration: Calibration, tmp_path: Path
+) -> None:
+    write_calibration(small_calibration, tmp_path / "c.gplcal")
+    loaded = loaded_by("inspect", str(tmp_path / "c.gplcal"))
+    assert not loaded & {"matplotlib", "PySide6"}

@@ -1,0 +1,61 @@
+"""Live, a fault is shown when it lasts; a gel that has not recovered is worth a wait."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.health.finding import Finding, Health, health_of, refuse_meaningless
+from gelpolight_core.health.watch import HealthWatch
+from gelpolight_core.quality import Verdict
+
+DIM = Finding("exposure", "the light is darker", "Restore it", Verdict.WARN)
+OFF = Finding("led_off", "the red LED is off", "Check it", Verdict.FAIL, meaningless=True)
+
+
+def test_a_fault_of_a_single_frame_is_not_shown_and_one_that_lasts_is() -> None:
+    watch = HealthWatch()
+    assert not watch.update(Health((DIM,)), 0.0).findings
+    for time_s in (0.2, 0.4):
+        assert not watch.update(Health(), time_s).findings
+    watch = HealthWatch()
+    shown = [watch.update(Health((DIM,)), 0.1 * n).keys for n in range(8)]
+    assert shown[0] == ()
+    assert shown[-1] == ("exposure",)
+    assert watch.update(Health(), 1.0).keys == ("exposure",)
+    assert watch.update(Health(), 9.0).keys == ()
+
+
+def test_the_worst_comes_first_and_makes_the_line() -> None:
+    health = health_of([DIM, OFF])
+    assert health.keys == ("led_off", "exposure")
+    assert health.line == "The red LED is off. Check it."
+    with pytest.raises(InputError, match="red LED"):
+        refuse_meaningless(health, where="press.png")
+    refuse_meaningless(health_of([DIM]), where="press.png")
+
+
+def follow(left: list[float]) -> list[tuple[str, ...]]:
+    """Return what is shown of a press that leaves a share of itself, ten frames a second."""
+    rng = np.random.default_rng(1)
+    press = np.zeros((300, 3))
+    press[100:140] = rng.uniform(-0.3, 0.3, (40, 3))
+    watch = HealthWatch()
+    return [
+        watch.update(Health(cells=share * press + rng.normal(0.0, 2e-3, press.shape)), 0.1 * n).keys
+        for n, share in enumerate(left)
+    ]
+
+
+def test_a_gel_that_has_not_recovered_is_told_until_it_has() -> None:
+    slow = [1.0] * 10 + [0.08 * 0.5 ** (n / 15) for n in range(90)]
+    shown = follow(slow)
+    assert ("not_recovered",) in shown[25:40]
+    assert shown[-1] == ()
+    assert not any(shown[:10])
+
+
+@pytest.mark.parametrize("after", [0.0, 0.08])
+def test_a_gel_that_has_recovered_and_a_lighter_press_are_not(after: float) -> None:
+    assert not any(follow([1.0] * 10 + [after] * 60))

@@ -1,0 +1,64 @@
+"""A closed sensor: the virtual one, of which only background and balls are kept."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
+from gelpolight_core.session.closed import ClosedSession, read_any_session
+from gelpolight_core.session.session import read_session
+
+MM_PER_PX = 0.0989
+"""Apparent distance of the design's membrane over its focal length, at a quarter of its size."""
+
+
+def close_session(opened: Path, folder: Path, mm_per_px: float) -> Path:
+    """Copy what a closed sensor's owner has of a session, and describe it so."""
+    folder.mkdir()
+    for stage in ("background", "balls"):
+        shutil.copytree(opened / stage, folder / stage)
+    session = read_session(opened)
+    radii = [
+        f'"{path.name}" = {session.ball_radius_mm(path.name)}' for path in session.files("balls")
+    ]
+    (folder / "session.toml").write_text(
+        "\n".join(
+            [
+                'format = "gelpolight-session"',
+                "version = 1",
+                "[sensor]",
+                'serial = "closed-1"',
+                "[in_place]",
+                f"mm_per_px = {mm_per_px:.6f}",
+                "mm_per_px_sd = 0.0001",
+                "[balls]",
+                *radii,
+                "",
+            ]
+        )
+    )
+    return folder
+
+
+@pytest.fixture(scope="session")
+def closed_folder(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a closed sensor's session folder."""
+    folder = tmp_path_factory.mktemp("closed") / "session"
+    return close_session(small_session, folder, MM_PER_PX)
+
+
+@pytest.fixture(scope="session")
+def closed_session(closed_folder: Path) -> ClosedSession:
+    """Return the closed sensor's session."""
+    session = read_any_session(closed_folder)
+    assert isinstance(session, ClosedSession)
+    return session
+
+
+@pytest.fixture(scope="session")
+def closed_run(closed_session: ClosedSession) -> InPlaceRun:
+    """Return the closed sensor's calibration with its presses."""
+    return calibrate_closed_session(closed_session)

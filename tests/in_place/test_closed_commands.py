@@ -1,0 +1,121 @@
+"""The commands with a closed sensor: its session is recognised, and every command goes on."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.command_line.main import MENDABLE, main
+from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.in_place_session import InPlaceRun
+from gelpolight_core.errors import InputError
+from gelpolight_core.report.build import in_place_report
+
+
+@pytest.fixture(scope="module")
+def calibration(closed_run: InPlaceRun, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the file of a closed sensor's calibration."""
+    path = tmp_path_factory.mktemp("closed-file") / "closed.gplcal"
+    write_calibration(closed_run.calibration, path)
+    return path
+
+
+def test_a_closed_session_becomes_a_calibration_by_itself(
+    closed_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, report = tmp_path / "closed.gplcal", tmp_path / "closed.json"
+    assert main(["calibrate", str(closed_folder), "-o", str(path), "--json", str(report)]) == 0
+    said = capsys.readouterr().out
+    assert "in-place" in said and "optics" in said and "temperature" in said
+    content = json.loads(report.read_text())
+    assert content["model"] == "in-place"
+    assert len(content["balls"]) >= 8
+    assert content["error_by_balls"][-1][1] < content["error_by_balls"][0][1]
+    assert main(["inspect", str(path)]) == 0
+    assert "mm per px" in capsys.readouterr().out
+
+
+def test_images_are_reconstructed_measured_and_timed(
+    calibration: Path, closed_folder: Path, tmp_path: Path
+) -> None:
+    image = sorted((closed_folder / "balls").iterdir())[0]
+    out = tmp_path / "out"
+    assert main(["reconstruct", str(calibration), str(image), "-o", str(out), "--uncertainty"]) == 0
+    with np.load(out / f"{image.stem}.npz") as arrays:
+        assert {"depth_mm", "normals", "x_mm", "y_mm", "flags", "pitch_mm"} <= set(arrays)
+        assert arrays["depth_mm"].shape == (arrays["y_mm"].size, arrays["x_mm"].size)
+    measured = tmp_path / "ball.json"
+    command = ["measure", str(calibration), str(image), "--shape", "ball"]
+    assert main([*command, "--json", str(measured)]) == 0
+    found = json.loads(measured.read_text())
+    assert found["diameter_mm"] > 0.0 and found["sd"]["diameter_mm"] > 0.0
+    timed = tmp_path / "time.json"
+    command = ["benchmark", str(calibration), str(image), "--repeats", "2"]
+    assert main([*command, "--json", str(timed)]) == 0
+    assert json.loads(timed.read_text())["model"] == "in-place"
+
+
+def test_a_new_gel_needs_a_background_only(
+    calibration: Path, closed_folder: Path, tmp_path: Path
+) -> None:
+    background = next((closed_folder / "background").iterdir())
+    new = tmp_path / "new.gplcal"
+    command = ["refresh", str(calibration), "--background", str(background), "-o", str(new)]
+    assert main(command) == 0
+    assert new.is_file()
+
+
+def test_one_message_lists_all_that_an_open_calibration_lacks(
+    small_session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "session"
+    shutil.copytree(small_session, folder)
+    for stage in ("checkerboard", "top_pose", "mirror", "whiteboard"):
+        shutil.rmtree(folder / stage)
+    assert main(["calibrate", str(folder), "-o", str(tmp_path / "c.gplcal")]) == MENDABLE
+    said = capsys.readouterr().err
+    assert "no images of: checkerboard, top_pose, mirror, whiteboard" in said
+    assert "must be open for: checkerboard, top_pose, mirror, whiteboard" in said
+    assert "[in_place] mm_per_px" in said
+    (folder / "session.toml").write_text(
+        'format = "gelpolight-session"\nversion = 1\n[sensor]\nserial = "x"\n'
+    )
+    assert main(["calibrate", str(folder), "-o", str(tmp_path / "c.gplcal")]) == MENDABLE
+    said = capsys.readouterr().err
+    assert "[checkerboard], [balls]" in said and "in place" in said
+
+
+def test_objects_with_walls_are_doubtful_because_balls_have_none(
+    calibration: Path, small_session: Path, tmp_path: Path
+) -> None:
+    image = small_session / "presses" / "cylinder_s5_d100.png"
+    measured = tmp_path / "cylinder.json"
+    command = ["measure", str(calibration), str(image), "--shape", "cylinder"]
+    assert main([*command, "--json", str(measured)]) == 0
+    found = json.loads(measured.read_text())
+    assert found["height_mm"] == pytest.approx(1.0, rel=0.15)
+    assert found["verdict"] == "doubtful" and "walls" in found["reason"]
+
+
+def test_reports_show_presses_and_what_is_not_known(
+    calibration: Path, closed_run: InPlaceRun, tmp_path: Path
+) -> None:
+    for ending in ("html", "pdf"):
+        path = tmp_path / f"report.{ending}"
+        assert main(["report", str(calibration), "-o", str(path)]) == 0
+    text = (tmp_path / "report.html").read_text()
+    assert "optics, refraction, temperature" in text and "mm/px" in text
+    refused = {"ball_99.png": InputError("No ball", where="ball_99.png", advice="Press one")}
+    report = in_place_report(
+        replace(closed_run, result=replace(closed_run.result, refused=refused))
+    )
+    sections = {section.key: section for section in report.sections}
+    assert set(sections) == {"scale", "balls", "in_place"}
+    assert sections["balls"].listings[0].rows == (("ball_99.png", "No ball. Press one."),)
+    shown = [row[0] for row in sections["in_place"].listings[0].rows]
+    assert shown == [press.name for press in closed_run.result.presses]

@@ -1,0 +1,167 @@
+"""The parts of calibration in place, each against something independent."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
+from gelpolight_core.in_place.next_ball import next_place
+from gelpolight_core.in_place.scale import scale_from_pins
+from gelpolight_core.reconstruction.in_place.depth import depth_of, normals
+from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
+from gelpolight_core.reconstruction.in_place.model import (
+    COLOUR_CELLS,
+    ErrorCurve,
+    InPlaceModel,
+    colour_cells,
+    evaluate,
+)
+from gelpolight_core.reconstruction.in_place.terms import TERMS, design_rows, place_axes
+from gelpolight_core.reflectance.contour import Circle
+
+
+def pressed_ball(
+    shape: tuple[int, int], ball: Ball, decay: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return depth and slopes of a ball with an exponential drape, nodes."""
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(float)
+    dx, dy = x - ball.x, y - ball.y
+    rho = np.hypot(dx, dy)
+    edge = ball.contact / np.sqrt(ball.radius**2 - ball.contact**2)
+    inside = rho < ball.contact
+    away = np.exp(-np.maximum(rho - ball.contact, 0.0) / decay)
+    root = np.sqrt(np.maximum(ball.radius**2 - rho**2, 1.0))
+    rim = np.sqrt(ball.radius**2 - ball.contact**2)
+    depth = np.where(inside, root - rim + edge * decay, edge * decay * away)
+    size = np.where(inside, rho / root, edge * away)
+    turn = np.maximum(rho, 1e-9)
+    return depth, (-size * dx / turn).astype(np.float32), (-size * dy / turn).astype(np.float32)
+
+
+def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit() -> None:
+    random = np.random.default_rng(1)
+    change = random.normal(0.0, 0.4, (12, 17, 3)).astype(np.float32)
+    coefficients = random.normal(0.0, 1.0, (TERMS, 2))
+    found = np.stack(evaluate(coefficients, change), axis=-1)
+    x, y = np.meshgrid(*place_axes(12, 17))
+    wanted = design_rows(change.reshape(-1, 3), x.ravel(), y.ravel()) @ coefficients
+    assert found.reshape(-1, 2) == pytest.approx(wanted, abs=2e-4)
+
+
+def test_normals_are_those_of_the_depth_map() -> None:
+    depth, slope_x, slope_y = pressed_ball((60, 70), Ball(34.0, 30.0, 14.0, 30.0), 6.0)
+    found = normals((0.5 * depth).astype(np.float32), 0.5)
+    wanted = np.stack([-slope_x, -slope_y, -np.ones_like(slope_x)], axis=-1)
+    wanted /= np.linalg.norm(wanted, axis=-1, keepdims=True)
+    y, x = np.mgrid[:60, :70]
+    smooth = np.abs(np.hypot(x - 34.0, y - 30.0) - 14.0) > 2.0
+    smooth[[0, -1]] = smooth[:, [0, -1]] = False
+    assert np.abs(found - wanted)[smooth].max() < 0.01
+
+
+def test_colours_and_slopes_that_no_ball_has_shown_are_flagged() -> None:
+    seen = np.zeros((COLOUR_CELLS,) * 3, np.float32)
+    plain = tuple(colour_cells(np.zeros(3, np.float32)))
+    seen[plain] = 1.0
+    grid = WorkingGrid(ImageSize(40, 32), 0.1)
+    model = InPlaceModel(
+        grid,
+        np.full((32, 40, 3), 0.4, np.float32),
+        np.zeros((TERMS, 2)),
+        seen,
+        0.5,
+        ErrorCurve(np.array([0.0, 1.0]), np.array([0.1, 0.1]), 0.0, 0.0),
+    )
+    change = np.zeros((32, 40, 3), np.float32)
+    change[3, 4] = (1.5, 0.0, -0.9)
+    change[3, 5] = np.nan
+    change[3, 6] = 1e30
+    slope = np.zeros((32, 40), np.float32)
+    slope[8, 9], slope[8, 10] = 0.54, 0.56
+    found = model.extrapolated(change, slope, np.zeros_like(slope))
+    assert set(zip(*np.nonzero(found), strict=True)) == {(3, 4), (3, 5), (3, 6), (8, 10)}
+
+
+def test_a_place_is_seen_where_the_grid_says() -> None:
+    grid = WorkingGrid(ImageSize(1280, 960), 0.02)
+    table = grid.table()
+    nodes = np.array([[grid.x_mm[0], grid.y_mm[0]], [grid.x_mm[-1], grid.y_mm[-1]]])
+    seen = [[table.u_px[0, 0], table.v_px[0, 0]], [table.u_px[-1, -1], table.v_px[-1, -1]]]
+    assert grid.to_pixels(nodes) == pytest.approx(np.array(seen), abs=1e-3)
+    middle = grid.on_nodes(Circle(*grid.to_pixels(np.zeros((1, 2)))[0], 40.0))
+    assert np.interp(middle.x, np.arange(320), grid.x_mm) == pytest.approx(0.0, abs=1e-9)
+    assert np.interp(middle.y, np.arange(240), grid.y_mm) == pytest.approx(0.0, abs=1e-9)
+    assert middle.radius * grid.pitch_mm == pytest.approx(40.0 * 0.02)
+
+
+def test_the_next_ball_is_asked_for_where_the_membrane_is_seen() -> None:
+    grid = WorkingGrid(ImageSize(100, 80), 0.1)
+    lit = np.ones((80, 100), np.bool_)
+    ball = Ball(20.0, 20.0, 10.0, 30.0)
+    x_mm, y_mm = next_place([ball], grid, lit)
+    assert x_mm > 3.0 and y_mm > 2.0
+    lit[:, 60:] = False
+    x_mm, y_mm = next_place([ball], grid, lit)
+    assert x_mm < 1.1 and y_mm > 2.0
+
+
+def test_no_change_of_colour_is_no_slope() -> None:
+    coefficients = np.random.default_rng(2).normal(0.0, 1.0, (TERMS, 2))
+    slope_x, slope_y = evaluate(coefficients, np.zeros((8, 9, 3), np.float32))
+    assert not slope_x.any() and not slope_y.any()
+
+
+@pytest.mark.parametrize("centre", [(70.0, 60.0), (4.0, 60.0), (70.0, 112.0)])
+def test_depth_is_right_also_where_the_border_cuts_the_contact(
+    centre: tuple[float, float],
+) -> None:
+    ball = Ball(*centre, 20.0, 50.0)
+    depth, slope_x, slope_y = pressed_ball((120, 160), ball, 5.0)
+    found, crossed = depth_of(
+        slope_x, slope_y, pitch_mm=1.0, weight=np.ones(depth.shape, np.float32)
+    )
+    assert crossed == (centre != (70.0, 60.0))
+    assert np.abs(found - depth).max() < 0.03 * depth.max()
+
+
+def test_slopes_place_ball_and_contact() -> None:
+    true = Ball(82.3, 55.6, 24.0, 60.0)
+    _, slope_x, slope_y = pressed_ball((120, 160), true, 6.0)
+    guess = Ball(79.0, 58.0, 20.0, 60.0)
+    found = placed_by_slopes(slope_x, slope_y, guess)
+    assert (found.x, found.y) == pytest.approx((true.x, true.y), abs=0.05)
+    contact = contact_by_slopes(slope_x, slope_y, found, smoothing=0.5)
+    assert contact == pytest.approx(true.contact, abs=0.6)
+
+
+def test_the_grid_keeps_places_when_it_averages_pixels() -> None:
+    grid = WorkingGrid(ImageSize(1280, 960), 0.02)
+    assert grid.factor == 4
+    y, x = np.mgrid[:960, :1280]
+    places = np.stack([(x - 639.5) * 0.02, (y - 479.5) * 0.02, 0.0 * x], axis=-1)
+    reduced = grid.reduce(places.astype(np.float32))
+    assert reduced[0, :, 0] == pytest.approx(grid.x_mm, abs=1e-5)
+    assert reduced[:, 0, 1] == pytest.approx(grid.y_mm, abs=1e-5)
+    table = grid.table()
+    assert (table.u_px[0, 0], table.v_px[0, 0]) == (1.5, 1.5)
+
+
+def test_a_pin_grid_gives_the_scale() -> None:
+    spacing_px, turn = 23.7, 0.07
+    background = np.full((240, 320, 3), 0.4, np.float32)
+    image = background.copy()
+    y, x = np.mgrid[:240, :320]
+    for i, j in product(range(-4, 5), range(-3, 4)):
+        u = 160.0 + spacing_px * (i * np.cos(turn) - j * np.sin(turn))
+        v = 120.0 + spacing_px * (i * np.sin(turn) + j * np.cos(turn))
+        image += (0.2 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * 3.0**2)))[..., None]
+    image += np.random.default_rng(3).normal(0.0, 0.004, image.shape)
+    found = scale_from_pins([image.astype(np.float32)], background, spacing_mm=2.0)
+    assert found.mm_per_px == pytest.approx(2.0 / spacing_px, rel=2e-3)
+    assert abs(found.mm_per_px - 2.0 / spacing_px) < 4.0 * found.sd_mm_per_px
+    with pytest.raises(InputError, match="no regular grid"):
+        scale_from_pins([background], background, spacing_mm=2.0)

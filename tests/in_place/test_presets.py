@@ -1,0 +1,56 @@
+"""Presets of closed sensors are a start: what they state is checked, and told where it is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.in_place.preset import FOLDER, preset_named, presets
+
+
+def test_the_sensors_people_own_have_presets() -> None:
+    assert {p.key for p in presets()} == {"9dtact", "digit", "gelsight-mini"}
+
+
+@pytest.mark.parametrize("key", [preset.key for preset in presets()])
+def test_the_image_shows_about_the_working_area(key: str) -> None:
+    preset = preset_named(key)
+    for pixels, mm in zip(preset.image_px, preset.working_area_mm, strict=True):
+        assert pixels * preset.mm_per_px == pytest.approx(mm, rel=0.15)
+
+
+def test_larger_images_of_the_same_shape_have_smaller_pixels() -> None:
+    mini = preset_named("gelsight-mini")
+    assert mini.scale_for(640, 480) == pytest.approx(
+        (0.5 * mini.mm_per_px, 0.5 * mini.mm_per_px_sd)
+    )
+    with pytest.raises(InputError) as refused:
+        mini.scale_for(240, 320)
+    assert "240x320" in refused.value.found
+
+
+def test_a_sensor_whose_lights_show_no_slope_is_named() -> None:
+    assert preset_named("9dtact").limits and not preset_named("digit").limits
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("mm_per_px = 0.0634", "mm_per_px"),
+        ("cropped = [0.143, 0.143, 0.143, 0.143]", "cropped"),
+        ("light_colours = 3", "light_colours"),
+    ],
+)
+def test_a_preset_of_ones_own_is_checked(tmp_path: Path, line: str, said: str) -> None:
+    own = tmp_path / "own.toml"
+    text = (FOLDER / "gelsight-mini.toml").read_text()
+    own.write_text(text)
+    assert preset_named(str(own)).key == "own"
+    own.write_text(text.replace(line, f'{line.split(" = ")[0]} = ["x"]'))
+    with pytest.raises(InputError) as refused:
+        preset_named(str(own))
+    assert said in refused.value.found
+    with pytest.raises(InputError, match="no preset"):
+        preset_named("gelsite")

@@ -1,0 +1,67 @@
+"""Real closed sensors, where their images are beside the project; figures by labels of a person."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gelpolight_core.calibration.in_place_session import calibrate_closed_session
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.session.closed import ClosedSession, read_any_session
+
+
+def real_session(shared_data: Path, name: str) -> ClosedSession:
+    """Return a real sensor's session, or skip the test."""
+    folder = shared_data / "real" / "closed" / name
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not there")
+    session = read_any_session(folder)
+    assert isinstance(session, ClosedSession)
+    return session
+
+
+def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None:
+    session = real_session(shared_data, "mini-1")
+    with (session.folder / "labels.csv").open() as stream:
+        labels = [row for row in csv.DictReader(stream) if row["x_px"]]
+    kept_back = labels[::4]
+    excluded = frozenset(f"balls/{row['file']}" for row in kept_back)
+    training = replace(session, decisions=replace(session.decisions, excluded=excluded))
+    run = calibrate_closed_session(training)
+    reconstructor, scale = Reconstructor(run.calibration), session.mm_per_px
+    assert scale is not None
+    errors = []
+    for row in kept_back:
+        image = session.picture(session.folder / "balls" / row["file"])
+        found = reconstructor.depth(image.rgb)
+        height, width = image.rgb.shape[:2]
+        x = (float(row["x_px"]) - 0.5 * (width - 1)) * scale
+        y = (float(row["y_px"]) - 0.5 * (height - 1)) * scale
+        radius, contact = float(row["ball_radius_mm"]), float(row["r_px"]) * scale
+        across, down = np.meshgrid(found.x_mm - x, found.y_mm - y)
+        inside = np.hypot(across, down) < 0.9 * contact
+        root = np.sqrt(radius**2 - across[inside] ** 2 - down[inside] ** 2)
+        wanted = np.stack([across[inside], down[inside], -root], axis=-1) / radius
+        assert found.normals is not None
+        cosine = np.clip((wanted * found.normals[inside]).sum(axis=-1), -1.0, 1.0)
+        errors.append(float(np.degrees(np.arccos(cosine)).mean()))
+    # Labels of 1 to 2 px alone cost 1.5 degrees.
+    assert np.mean(errors) < 2.8
+
+
+def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data: Path) -> None:
+    session = real_session(shared_data, "wedge-1")
+    some = [path.name for path in session.files("balls")]
+    excluded = frozenset(f"balls/{name}" for name in some[1::2])
+    run = calibrate_closed_session(
+        replace(session, decisions=replace(session.decisions, excluded=excluded))
+    )
+    image = session.picture(session.folder / "balls" / some[1])
+    found = Reconstructor(run.calibration).depth(image.rgb)
+    assert np.isfinite(found.depth_mm).all()
+    assert found.depth_mm.max() > 0.2
+    assert 0.02 < (found.flags != 0).mean() < 0.5

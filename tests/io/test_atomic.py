@@ -1,0 +1,163 @@
+"""A written file is either complete, or the old file is unchanged."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.atomic import make_folder, refuse_unwritable, write_atomically
+
+
+def half_then(fault: BaseException) -> Callable[[BinaryIO], None]:
+    """Return a writer that fails midway."""
+
+    def writer(file: BinaryIO) -> None:
+        file.write(b"half a file")
+        file.flush()
+        raise fault
+
+    return writer
+
+
+def test_the_new_file_replaces_the_old_one(tmp_path: Path) -> None:
+    path = tmp_path / "press.npz"
+    write_atomically(path, lambda file: file.write(b"old"))
+    write_atomically(path, lambda file: file.write(b"new"))
+    assert path.read_bytes() == b"new"
+    assert os.listdir(tmp_path) == ["press.npz"]
+
+
+@pytest.mark.parametrize(
+    "fault", [ValueError("a fault of ours"), KeyboardInterrupt(), OSError(errno.ENOSPC, "full")]
+)
+@pytest.mark.parametrize("old", [b"old", None])
+def test_a_writer_that_fails_midway_changes_nothing(
+    tmp_path: Path, fault: BaseException, old: bytes | None
+) -> None:
+    path = tmp_path / "press.npz"
+    if old is not None:
+        path.write_bytes(old)
+    expected = InputError if isinstance(fault, OSError) else type(fault)
+    with pytest.raises(expected):
+        write_atomically(path, half_then(fault))
+    assert (path.read_bytes() if path.exists() else None) == old
+    assert os.listdir(tmp_path) == (["press.npz"] if old else [])
+
+
+def test_the_old_file_is_whole_while_the_new_one_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "press.npz"
+    path.write_bytes(b"old")
+
+    def writer(file: BinaryIO) -> None:
+        file.write(b"new, ")
+        file.flush()
+        assert path.read_bytes() == b"old"
+        file.seek(0)
+        file.write(b"New")
+
+    write_atomically(path, writer)
+    assert path.read_bytes() == b"New, "
+
+
+@pytest.mark.parametrize(
+    ("number", "found"),
+    [
+        (errno.ENOSPC, "disk is full"),
+        (errno.EACCES, "not have permission"),
+        (errno.EPERM, "not have permission"),
+        (errno.EROFS, "read-only"),
+        (errno.EIO, "cannot be written"),
+    ],
+)
+def test_a_disk_error_is_reported_in_plain_words(tmp_path: Path, number: int, found: str) -> None:
+    path = tmp_path / "press.npz"
+    with pytest.raises(InputError) as caught:
+        write_atomically(path, half_then(OSError(number, os.strerror(number))))
+    assert found in caught.value.found
+    assert caught.value.where == str(path)
+    assert caught.value.advice
+
+
+def test_a_path_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+    """Minutes of calibration are not wasted on a file that cannot be written."""
+    (tmp_path / "kept").write_text("old")
+    refuse_unwritable(tmp_path / "new")
+    refuse_unwritable(tmp_path / "kept")
+    assert [p.name for p in tmp_path.iterdir()] == ["kept"]
+    assert (tmp_path / "kept").read_text() == "old"
+    with pytest.raises(InputError, match="does not exist"):
+        refuse_unwritable(tmp_path / "no" / "new")
+    with pytest.raises(InputError, match="A folder has the name"):
+        refuse_unwritable(tmp_path)
+    with pytest.raises(InputError, match="A file has the name"):
+        refuse_unwritable(tmp_path / "kept" / "new")
+
+
+def test_a_really_full_disk_is_reported_in_plain_words(tmp_path: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("this system has no /dev/full")
+
+    def writer(file: BinaryIO) -> None:
+        with full.open("wb", buffering=0) as device:
+            device.write(b"too much")
+
+    with pytest.raises(InputError, match="disk is full"):
+        write_atomically(tmp_path / "press.npz", writer)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_missing_folder_and_a_file_with_its_name_are_reported(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(InputError, match="does not exist"):
+        write_atomically(tmp_path / "nowhere" / "a.npz", lambda file: None)
+    with pytest.raises(InputError, match="of a required folder"):
+        write_atomically(tmp_path / "file" / "a.npz", lambda file: None)
+    with pytest.raises(InputError, match="of the file"):
+        write_atomically(tmp_path / "folder", lambda file: None)
+    with pytest.raises(InputError, match="of a required folder"):
+        make_folder(tmp_path / "file")
+    with pytest.raises(InputError, match="name is too long"):
+        make_folder(tmp_path / ("x" * 300))
+    assert sorted(os.listdir(tmp_path)) == ["file", "folder"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_colleagues_can_read_the_file_as_any_other(tmp_path: Path) -> None:
+    ordinary, ours = tmp_path / "ordinary", tmp_path / "ours"
+    ordinary.write_bytes(b"")
+    write_atomically(ours, lambda file: None)
+    assert stat.S_IMODE(ours.stat().st_mode) == stat.S_IMODE(ordinary.stat().st_mode)
+    ours.chmod(0o640)
+    write_atomically(ours, lambda file: None)
+    assert stat.S_IMODE(ours.stat().st_mode) == 0o640
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").write_bytes(b"old")
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    write_atomically(tmp_path / "link", lambda file: file.write(b"new"))
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real").read_bytes() == b"new"
+
+
+def test_folders_are_made_with_those_above_them(tmp_path: Path) -> None:
+    make_folder(tmp_path / "a" / "b")
+    make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def test_a_device_is_never_replaced_by_a_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="device"):
+        write_atomically(tmp_path / "pipe", lambda file: file.write(b"x"))
+    assert (tmp_path / "pipe").is_fifo()

@@ -1,0 +1,43 @@
+"""Two programs on one run of the protocol."""
+
+from __future__ import annotations
+
+import getpass
+from pathlib import Path
+
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.io.lock import RunLock
+
+
+def test_a_second_program_gets_the_name_of_the_first(tmp_path: Path) -> None:
+    with RunLock(tmp_path), pytest.raises(InputError) as refusal:
+        RunLock(tmp_path)
+    assert getpass.getuser() in str(refusal.value)
+    assert str(tmp_path) in str(refusal.value)
+
+
+def test_a_run_that_was_left_can_be_written_by_another(tmp_path: Path) -> None:
+    first = RunLock(tmp_path)
+    first.release()
+    first.release()
+    RunLock(tmp_path).release()
+
+
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        RunLock(tmp_path / "nowhere")
+
+
+def test_a_system_that_knows_no_users_has_runs_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a container that is run under a bare number."""
+
+    def nobody() -> str:
+        raise KeyError("getpwuid(): uid not found: 1234")
+
+    monkeypatch.setattr(getpass, "getuser", nobody)
+    with RunLock(tmp_path), pytest.raises(InputError, match="process"):
+        RunLock(tmp_path)

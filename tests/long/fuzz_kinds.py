@@ -1,0 +1,297 @@
+"""The kinds of files that strangers bring: small good ones, and what the program does with them."""
+
+from __future__ import annotations
+
+import io
+import json
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import cv2
+import fuzz_mutations as spoil
+import numpy as np
+
+from app.command_line.tool_arguments import _read as read_tools
+from app.services.settings import Settings
+from app.workspace.indenters import first_indenters, read_indenters, write_indenters
+from app.workspace.sessions import read_session_entry
+from app.workspace.validation import Comparison, Validation, read_validation, write_validation
+from app.workspace.workspace import Workspace
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.calibration.manifest import read_summary, refuse_damaged_arrays
+from gelpolight_core.design.sensor_design import SensorDesign, read_design
+from gelpolight_core.image.response import gamma_response
+from gelpolight_core.measurement.ledger import Ledger
+from gelpolight_core.measurement.protocol import Protocol
+from gelpolight_core.measurement.protocol_file import (
+    ProtocolFile,
+    read_protocol_file,
+    write_protocol_file,
+)
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.score import read_true_depth
+from gelpolight_core.measurement.tools import tools_from_json
+from gelpolight_core.measurement.truth import read_truth
+from gelpolight_core.optics.camera import Camera
+from gelpolight_core.optics.frame import TopPlane
+from gelpolight_core.optics.resampling import build_resampling_table
+from gelpolight_core.quality import QualityTable, judge
+from gelpolight_core.recording.reader import Recording, is_recording
+from gelpolight_core.recording.recording import RecordingHeader
+from gelpolight_core.recording.writer import RecordingWriter
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import Records
+from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.table import cosine_table
+from gelpolight_core.sensor_calibration import (
+    Calibration,
+    FullModel,
+    HandEdit,
+    Provenance,
+    sensor_stack,
+)
+from gelpolight_core.session.decisions import (
+    Decisions,
+    PlacedCircle,
+    read_decisions,
+    write_decisions,
+)
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.session import SensorData, read_session
+from gelpolight_core.simulation.session import session_toml
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    file : str
+        Name of the file in a folder of its own.
+    seeds : tuple of bytes
+        Good files.
+    use : callable
+        Reads the file of this place as the program does.
+    spoilt : tuple of callables
+        Ways to spoil a good file.
+    """
+
+    name: str
+    file: str
+    seeds: tuple[bytes, ...]
+    use: Callable[[Path], object]
+    spoilt: tuple[spoil.Mutation, ...]
+
+
+BYTES = (spoil.flipped, spoil.cut, spoil.numbered)
+TEXT = (*BYTES, *(spoil.retold,) * 6)
+
+
+def all_kinds(folder: Path) -> tuple[Kind, ...]:
+    """Return every kind; the good files are made in `folder`."""
+    texts = _texts(folder)
+    return (
+        Kind("calibration", "c.gplcal", _calibrations(folder), _use_calibration,
+             (*BYTES, *(spoil.forged_archive,) * 6)),
+        Kind("recording", "r.gplrec", _recordings(folder), _use_recording,
+             (*BYTES, *(spoil.forged_recording,) * 4)),
+        Kind("PNG picture", "p.png", _pngs(), read_picture, (*BYTES, *(spoil.forged_png,) * 4)),
+        Kind("TIFF picture", "p.tif", _tiffs(), read_picture, (*BYTES, *(spoil.numbered,) * 3)),
+        Kind("records", "records.sqlite", _records(folder), _use_records,
+             (*BYTES, *(partial(_forged_records, folder / "forge.sqlite"),) * 4)),
+        Kind("true depth", "t.npz", (_true_depth(),), read_true_depth,
+             (*BYTES, *(spoil.forged_archive,) * 3)),
+        *(Kind(name, file, (data,), use, TEXT) for name, file, data, use in texts),
+    )  # fmt: skip
+
+
+def _forged_records(place: Path, rng: object, data: bytes) -> bytes:
+    return spoil.forged_records(rng, data, place)  # type: ignore[arg-type]
+
+
+def _calibrations(folder: Path) -> tuple[bytes, ...]:
+    camera = Camera(48, 40, 52.0, 52.0, 24.3, 19.2, (-0.05, 0.01, 0.0005, -0.0003, 0.0))
+    plane, sensor = (
+        TopPlane((0.0, 0.0, 1.0), 39.0),
+        SensorData("T", 13.7, 14.0, 1.41, 0, 1.49, 40.0),
+    )
+    grid = build_resampling_table(
+        camera, plane, sensor_stack(sensor, plane), working_diameter_mm=40.0
+    ).grid
+    light = np.full((*grid.shape, 3), 0.5, np.float32)
+    leds = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]])
+    full = FullModel(
+        leds, np.full((3, 3), 0.1), Membrane(), light, 1.0, 0.01, (0.1, 0.1), "refined"
+    )
+    edit = HandEdit("reflectance", ("red",), "2026-01-02T03:04:05+00:00", "someone")
+    quality = {"lens": QualityTable((judge("rms", "Error", 0.05, "px", warn=0.3),))}
+    origin = Provenance("2026-01-02T03:04:05+00:00", "me", "0.1", "s", {"a": "b"}, {"fps": "30"},
+                        (edit,))  # fmt: skip
+    files = []
+    for model, more in (("paper", None), ("full", full)):
+        calibration = Calibration(
+            sensor, model, camera, plane, leds, np.tile(0.01 * np.eye(3), (3, 1, 1)), np.eye(3),
+            light, light, cosine_table(), np.full(3, 0.002), quality, origin, more,
+            None if more is None else gamma_response(2.2),
+        )  # fmt: skip
+        write_calibration(calibration, folder / "seed.gplcal")
+        files.append((folder / "seed.gplcal").read_bytes())
+    return tuple(files)
+
+
+def _use_calibration(path: Path) -> None:
+    try:
+        read_summary(path)
+        refuse_damaged_arrays(path)
+    finally:
+        _ = read_calibration(path).identity
+
+
+def _recordings(folder: Path) -> tuple[bytes, ...]:
+    files = []
+    for kind in (np.uint8, np.uint16):
+        path = folder / f"seed-{kind.__name__}.gplrec"
+        header = RecordingHeader("A", "c", "camera", "virtual", {"exposure_ms": 2.0, "mode": "x"})
+        with RecordingWriter(path, header) as writer:
+            for number in range(3):
+                light = np.random.default_rng(number).integers(0, 255, (8, 10, 3)).astype(kind)
+                writer.append(light, number, number / 30.0)
+        files.append(path.read_bytes())
+    return tuple(files)
+
+
+def _use_recording(path: Path) -> None:
+    is_recording(path)
+    with Recording.open(path) as recording:
+        _ = recording.duration_s, recording.lost, str(recording.header).encode()
+        for index in range(len(recording)):
+            recording.frame(index)
+
+
+def _pngs() -> tuple[bytes, ...]:
+    light = np.random.default_rng(0).integers(0, 255, (10, 12, 4))
+    pictures = (light[..., :3], light[..., :3] * 257, light, light[..., 0])
+    kinds = (np.uint8, np.uint16, np.uint8, np.uint16)
+    return tuple(
+        cv2.imencode(".png", p.astype(k))[1].tobytes() for p, k in zip(pictures, kinds, strict=True)
+    )
+
+
+def _tiffs() -> tuple[bytes, ...]:
+    light = np.random.default_rng(0).integers(0, 255, (10, 12, 3))
+    return tuple(
+        cv2.imencode(".tif", light.astype(kind), [cv2.IMWRITE_TIFF_COMPRESSION, way])[1].tobytes()
+        for kind in (np.uint8, np.uint16, np.float32)
+        for way in (1, 5, 8)
+    )
+
+
+def _records(folder: Path) -> tuple[bytes, ...]:
+    path = folder / "seed.sqlite"
+    with Records.open(path) as records:
+        for k in range(3):
+            value = Quantity("diameter_mm", 3.0 + k / 100, 0.01, 3.0, 5.0)
+            records.add(MeasurementRecord("A", "c", "ball", (value,), settings={"model": "full"}))
+        records.remove(2)
+    return (path.read_bytes(),)
+
+
+def _use_records(path: Path) -> None:
+    with Records.open(path, busy_s=0.1) as records:
+        for serial in records.sensors():
+            records.drift(serial)
+            for group in records.groups(serial):
+                records.statistics(group)
+        records.measurements(removed=True)
+        records.export_csv(path.with_name("out.csv"))
+        records.update_note(1, "seen")
+
+
+def _true_depth() -> bytes:
+    stream = io.BytesIO()
+    np.savez_compressed(
+        stream, depth_mm=np.ones((4, 5), np.float32), x0_mm=-1.0, y0_mm=-1.0, pitch_mm=0.5
+    )
+    return stream.getvalue()
+
+
+_SIZES = (
+    "[camera]\nwidth_px = 640\nheight_px = 480\ndistortion = [-0.08, 0.03, 0.0008, -0.0006]\n"
+    'bit_depth = 16\nresponse = "srgb"\n[layers]\ntilt_deg = 1.5\n'
+    "[[leds]]\nx_mm = 5.3\n[[leds]]\nx_mm = -12.0\n[[leds]]\ny_mm = -10.2\n"
+    '[[presses]]\nshape = "coin"\nsize_mm = 8.0\n'
+)
+_TRUTH = (
+    "file,shape,diameter_mm,side_mm,height_mm,region,repeat\na.png,cylinder,5.0,,1.0,1,1\n"
+    'b.png,cuboid,,4.0,0.5,2,1\n"c.png",coin,,,1,3,2\n'
+)
+_TOOLS = (
+    '[{"tool": "distance", "a_mm": [1, 2], "b_mm": [3, 4]}, {"tool": "ball", "at_mm": [0, 0.5]},'
+    ' {"tool": "circle", "points_mm": [[1, 1], [2, 2], [3, 1]], "edge": "plain"}]'
+)
+
+
+def _texts(folder: Path) -> list[tuple[str, str, bytes, Callable[[Path], object]]]:
+    circles, curves = {"a.png": PlacedCircle(1.0, 2.0, 3.0)}, {1: ((0.0, 0.0), (1.0, 1.0))}
+    decided = Decisions(frozenset({"balls/a.png"}), {0: (3.0, 4.0)}, circles, curves)
+    write_decisions(decided, folder)
+    write_protocol_file(ProtocolFile(Protocol(repeats=1, regions=2), "A", "c"), folder)
+    write_indenters(first_indenters()[:3], folder)
+    trial = Validation("c", "2026-01-02", "me", "ball", (Comparison("height", 1.0, 1.0, 8.0),))
+    write_validation(trial, folder / "c.gplcal")
+    good = Measurement("ball", 3.0, None, 1.0, (0.0, 1.0), None, 0.5, {"height_mm": 0.1}, None, 0.1,
+                       0.0, 0.01, 9.0, np.zeros((4, 2)), "ok", "")  # fmt: skip
+    Ledger(folder / "ledger.jsonl", "c").keep("k", good)
+
+    def held(name: str) -> bytes:
+        return (folder / name).read_bytes()
+
+    session = session_toml(SensorDesign()) + '\n[camera]\nresponse = "srgb"\n'
+    settings = (
+        "[General]\ntheme=dark\nworkspace=/tmp/x\n[limits]\nage_days=90\n"
+        "[layout]\na=@ByteArray(x)\n"
+    )
+    return [
+        ("session", "session.toml", session.encode(), _use_session),
+        ("decisions", "decisions.toml", held("decisions.toml"), lambda p: read_decisions(p.parent)),
+        ("design", "d.toml", _SIZES.encode(), read_design),
+        ("protocol", "protocol.toml", held("protocol.toml"), _use_protocol),
+        ("truth", "truth.csv", _TRUTH.encode(), read_truth),
+        ("ledger", "ledger.jsonl", held("ledger.jsonl"), lambda p: Ledger(p, "c")),
+        ("tools", "tools.json", _TOOLS.encode(), lambda p: tools_from_json(read_tools(p))),
+        ("indenters", "indenters.json", held("indenters.json"), lambda p: read_indenters(p.parent)),
+        ("validation", "c.validation.json", held("c.validation.json"),
+         lambda p: read_validation(p.with_name("c.gplcal"))),
+        ("workspace", "workspace.json", json.dumps({"in_use": "sensors/A/c.gplcal"}).encode(),
+         lambda p: Workspace(p.parent).in_use),
+        ("settings", "desktop.ini", settings.encode(), _use_settings),
+    ]  # fmt: skip
+
+
+def _use_session(path: Path) -> None:
+    read_session_entry(path.parent)
+    session = read_session(path.parent)
+    for stage in ("balls", "mirror"):
+        session.found(stage)
+    session.ball_radius_mm("ball_00.png")
+
+
+def _use_protocol(path: Path) -> None:
+    content = read_protocol_file(path.parent)
+    for press in content.protocol.presses():
+        assert Path(press.file).name == press.file, f"{press.file} leaves its folder"
+
+
+def _use_settings(path: Path) -> None:
+    # Qt keeps what it has read of a place: a new name each time.
+    other = Path(tempfile.mkdtemp(dir=path.parent)) / path.name
+    path.rename(other)
+    settings = Settings(other)
+    _ = settings.theme, settings.workspace_folder, settings.folder("session"), settings.limits
+    _ = settings.recent_sessions, settings.window_state(), settings.layout("a")

@@ -1,0 +1,129 @@
+"""Stated standard deviations of sizes, against presses of known size that are not ours to fit.
+
+The surfaces are the virtual sensor's: a numerical solution of the obstacle problem, with edges and
+corners of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from gelpolight_core.experiments.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.measurement.result import Measurement
+from gelpolight_core.measurement.spread import BALL_SLOPE, calibration_sd
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.simulation.indenters import Cuboid, Cylinder, press
+from gelpolight_core.simulation.virtual_sensor import PressedMembrane
+
+DECAY_MM = 0.7
+
+
+def measured(indenter: Cylinder | Cuboid, shape: str, *, blur_mm: float) -> Measurement:
+    """Measure the true surface, blurred and with noise of 0.2 um."""
+    surface = press(indenter, yaw_deg=20.0, decay_mm=DECAY_MM)
+    depth = gaussian_filter(surface.depth_mm.astype(float), blur_mm / surface.pitch_mm)
+    depth += 2e-4 * np.random.default_rng(0).standard_normal(depth.shape)
+    # A reconstruction's errors hang together over the drape.
+    return measure_object(depth, surface.x_mm, surface.y_mm, shape=shape, reach_mm=DECAY_MM)
+
+
+def sizes(measurement: Measurement) -> list[tuple[float, float]]:
+    """Return sizes with their standard deviations."""
+    if measurement.side_mm is None:
+        assert measurement.diameter_mm is not None
+        return [(measurement.diameter_mm, measurement.sd["diameter_mm"])]
+    return list(zip(measurement.side_mm, measurement.sd["side_mm"], strict=True))
+
+
+@pytest.mark.parametrize("edge_mm", [0.05, 0.1])
+@pytest.mark.parametrize("depth_mm", [0.3, 0.5, 1.0])
+def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide(
+    depth_mm: float, edge_mm: float
+) -> None:
+    """The corners hold the membrane further out: a fit without that found a rounder edge."""
+    found = measured(Cuboid(5.0, depth_mm, edge_mm), "cuboid", blur_mm=0.03)
+    for size, sd in sizes(found):
+        assert abs(size - 5.0) < 0.065
+        assert abs(size - 5.0) < 2.0 * sd
+        assert sd < 0.1
+    assert found.height_mm == pytest.approx(depth_mm, abs=0.001)
+
+
+@pytest.mark.parametrize("blur_mm", [0.02, 0.07, 0.11])
+def test_a_blurred_map_does_not_make_a_cylinder_wider(blur_mm: float) -> None:
+    """What the grid alone does not explain of a blur was taken for a rounder edge."""
+    found = measured(Cylinder(5.0, 0.5, 0.08), "cylinder", blur_mm=blur_mm)
+    assert found.diameter_mm == pytest.approx(5.0, abs=0.04)
+    assert abs(found.size_mm - 5.0) < 2.0 * found.size_sd_mm
+    assert found.blur_mm == pytest.approx(blur_mm, abs=0.01)
+
+
+@pytest.fixture(scope="module")
+def sensor() -> KnownSensor:
+    """Return a matt virtual sensor of 320x240 pixels with its exact calibration."""
+    return known_sensor(matt_design(0.25))
+
+
+MODES = ("best", "balanced", "fast", "paper")
+
+
+@pytest.fixture(scope="module")
+def departures(sensor: KnownSensor) -> dict[str, np.ndarray]:
+    """Departures from the truth in standard deviations, and these in mm: (measured, 2)."""
+    found: dict[str, list[tuple[float, float]]] = {mode: [] for mode in MODES}
+    full = Reconstructor(sensor.calibration)
+    of = {mode: full.at_effort(mode) for mode in MODES if mode != "paper"}
+    of["paper"] = Reconstructor(sensor.calibration, model="paper")
+    for n, (shape, size, depth) in enumerate(
+        [("cylinder", 3.0, 0.5), ("cuboid", 5.0, 0.5), ("cylinder", 6.0, 1.0), ("cuboid", 4.0, 1.0),
+         ("cuboid", 5.0, 0.3), ("cylinder", 5.0, 1.5)]
+    ):  # fmt: skip
+        indenter = Cylinder(size, depth) if shape == "cylinder" else Cuboid(size, depth, 0.1)
+        place = {"x_mm": 1.5 - n, "y_mm": 0.5 * n - 1.0, "yaw_deg": 13.0 * n}
+        surface = press(indenter, **place, decay_mm=DECAY_MM)
+        frame = sensor.sensor.frame(PressedMembrane(surface), stream=f"press {n}")
+        for mode, reconstructor in of.items():
+            heightmap = reconstructor.depth(frame, normals=False, uncertainty=mode == "best")
+            result = measure_heightmap(heightmap, shape=shape)
+            pairs = [(result.height_mm - depth, result.sd["height_mm"])]
+            pairs += [(value - size, sd) for value, sd in sizes(result)]
+            found[mode] += pairs
+    return {mode: np.array(pairs) for mode, pairs in found.items()}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_sizes_are_right_within_what_they_state(
+    departures: dict[str, np.ndarray], mode: str
+) -> None:
+    error, sd = departures[mode].T
+    share = np.abs(error) / sd
+    assert np.mean(share <= 3.0) >= 0.95, share
+    assert share.max() < 5.0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_stated_sd_is_no_empty_promise(departures: dict[str, np.ndarray], mode: str) -> None:
+    error, sd = departures[mode].T
+    assert np.sqrt(np.mean((error / sd) ** 2)) > 1.0 / 3.0
+
+
+def test_a_calibration_says_less_of_walls_steeper_than_its_balls() -> None:
+    values = {
+        "x_mm": 0.0,
+        "y_mm": 0.0,
+        "height_mm": 1.0,
+        "drape_decay_mm": 0.5,
+        "diameter_mm": 5.0,
+    }
+    shallow = calibration_sd("cylinder", {**values, "height_mm": 0.4}, 0.01, 0.0)
+    assert shallow["height_mm"] == pytest.approx(0.01 * 0.4)
+    steep = calibration_sd("cylinder", values, 0.01, 0.0)
+    share = 0.01 * 2.0 / BALL_SLOPE
+    assert steep["height_mm"] == pytest.approx(share)
+    # h exp(-x / decay) has come down by this share after share * decay, on either side.
+    x = -0.5 * np.log(1.0 - share)
+    assert steep["diameter_mm"] == pytest.approx(2.0 * x, rel=0.02)

@@ -1,0 +1,96 @@
+"""Levelling, smoothing and comparing of height maps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from maps import made
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.measurement.map_processing import (
+    difference,
+    histogram,
+    level_by_plane,
+    level_by_points,
+    smooth_gaussian,
+    smooth_median,
+    usable,
+)
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+
+
+def tilted_press() -> HeightMap:
+    """Return a round press of 0.5 mm on a tilted surface."""
+    return made(lambda x, y: 0.02 * x - 0.01 * y + 0.1 + 0.5 * (np.hypot(x, y) < 1.0))
+
+
+def test_levelling_leaves_out_the_pressed_object() -> None:
+    level = level_by_plane(tilted_press())
+    middle = level.depth_mm[level.depth_mm.shape[0] // 2, level.depth_mm.shape[1] // 2]
+    assert middle == pytest.approx(0.5, abs=2e-4)
+    assert np.median(level.depth_mm) == pytest.approx(0.0, abs=2e-4)
+    assert "plane" in level.notes[-1]
+    assert level.normals is None
+
+
+def test_a_plane_can_be_fitted_to_a_chosen_area() -> None:
+    press = tilted_press()
+    mask = np.zeros(press.depth_mm.shape, bool)
+    mask[:, :20] = True
+    assert np.abs(level_by_plane(press, mask=mask).depth_mm[mask]).max() < 1e-5
+    with pytest.raises(InputError, match="fewer than three"):
+        level_by_plane(press, mask=np.zeros_like(mask))
+
+
+def test_three_points_read_zero_afterwards() -> None:
+    level = level_by_points(tilted_press(), ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0)))
+    middle = level.depth_mm[level.depth_mm.shape[0] // 2, level.depth_mm.shape[1] // 2]
+    assert middle == pytest.approx(0.5, abs=1e-4)
+    for points in (((0, 0), (1, 1), (2, 2)), ((0, 0), (1, 1), (500, 0))):
+        with pytest.raises(InputError, match="line"):
+            level_by_points(tilted_press(), points)
+
+
+def test_a_gaussian_damps_a_wave_as_its_formula_says_and_fills_nothing_in() -> None:
+    wave = made(lambda x, y: 0.1 * np.sin(2.0 * np.pi * x / 1.0))
+    flags = wave.flags.copy()
+    flags[:3, :3] = int(Flag.OUTSIDE)
+    smooth = smooth_gaussian(replace(wave, flags=flags), sigma_mm=0.2)
+    inner = smooth.depth_mm[smooth.depth_mm.shape[0] // 2]
+    third = inner.size // 3
+    share = np.exp(-2.0 * (np.pi * 0.2 / 1.0) ** 2)
+    assert np.ptp(inner[third:-third]) / 0.2 == pytest.approx(share, rel=0.02)
+    np.testing.assert_array_equal(smooth.depth_mm[:3, :3], wave.depth_mm[:3, :3])
+    assert smooth.depth_sd_mm is None
+
+
+def test_a_median_removes_a_single_wrong_point_and_keeps_an_edge() -> None:
+    step = made(lambda x, y: 0.2 * (x > 0.0))
+    depth = step.depth_mm.copy()
+    depth[10, 10] = 5.0
+    smooth = smooth_median(replace(step, depth_mm=depth), nodes=3)
+    np.testing.assert_allclose(smooth.depth_mm, step.depth_mm)
+    for nodes in (2, 4, 17):
+        with pytest.raises(InputError, match="odd number"):
+            smooth_median(step, nodes=nodes)
+
+
+def test_a_difference_is_of_the_same_grid_and_valid_where_both_are() -> None:
+    press = tilted_press()
+    bare = made(lambda x, y: 0.02 * x - 0.01 * y + 0.1)
+    flags = bare.flags.copy()
+    flags[0, 0] = int(Flag.OUTSIDE)
+    left = difference(press, replace(bare, flags=flags))
+    assert float(left.depth_mm.max()) == pytest.approx(0.5, abs=1e-6)
+    assert not usable(left)[0, 0]
+    with pytest.raises(InputError, match="different grids"):
+        difference(press, replace(bare, x_mm=bare.x_mm + 1.0))
+
+
+def test_a_histogram_counts_every_point_once() -> None:
+    press = tilted_press()
+    counts, edges = histogram(press, bins=20)
+    assert counts.sum() == usable(press).sum()
+    assert edges[0] == pytest.approx(float(press.depth_mm[usable(press)].min()))

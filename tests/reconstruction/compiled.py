@@ -1,0 +1,106 @@
+"""The compiled near-light solve on the fields that the scalar oracle takes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from reference.near_light import RaySlopes, ShadedField
+
+from gelpolight_core.reconstruction.buffers import Buffers
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.near_light.denoise import quieted
+from gelpolight_core.reconstruction.near_light.kernel import solve_rows
+from gelpolight_core.reconstruction.near_light.maps import kinds, membrane_numbers, sensor_scale
+from gelpolight_core.reconstruction.near_light.placement import place_rows
+from gelpolight_core.reconstruction.near_light.structures import (
+    NOT_FINITE,
+    Picture,
+    Steps,
+    slopes_like,
+)
+from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.sensor_calibration import FullModel
+
+Map = NDArray[np.float32]
+BEST = Steps(8, 5e-4**2, True, False)
+QUICK = Steps(4, 3e-3**2, True, False)
+
+
+def full_model(membrane: Membrane, leds_mm: NDArray[np.float64]) -> FullModel:
+    """Return lights and membrane as a calibration holds them."""
+    nothing = np.zeros((1, 1, 3), np.float32)
+    return FullModel(leds_mm, 0.0 * leds_mm, membrane, nothing, 0.7, 0.01, (0.0, 0.0), "mirror")
+
+
+def picture_of(field: ShadedField) -> Picture:
+    """Return a field's image as the compiled solve takes it."""
+    bad = ~np.isfinite(field.ratio)
+    ratio, noise, around = (
+        np.ascontiguousarray(np.moveaxis(a, -1, 0), np.float32)
+        for a in (np.where(bad, 1.0, field.ratio), field.sigma, field.around)
+    )
+    marks = ((field.saturated | bad) * np.array([1, 2, 4])).sum(axis=-1).astype(np.uint8)
+    marks |= np.where(bad.any(axis=-1), NOT_FINITE, 0).astype(np.uint8)
+    return Picture(ratio, noise, around, marks)
+
+
+def solve(
+    field: ShadedField,
+    depth_mm: Map,
+    leds_mm: NDArray[np.float64],
+    membrane: Membrane,
+    *,
+    steps: Steps = BEST,
+    start: tuple[Map, Map] | None = None,
+    workers: int = 1,
+    coverage: object = ((-1.0, 2.0),) * 3,
+) -> RaySlopes:
+    """Solve every node's normal at the present depth, as `solve_near_light` does."""
+    full = full_model(membrane, leds_mm)
+    drift = np.moveaxis(field.drift, -1, 0)
+    kind = kinds(field.usable, field.inside, 1)
+    scale = sensor_scale(full, (field.x_mm, field.y_mm), drift, kind, factor=1)
+    depth = np.ascontiguousarray(depth_mm, np.float32)
+    slopes = slopes_like(depth)
+    if start is not None:
+        slopes = slopes._replace(normal_x=start[0].copy(), normal_y=start[1].copy())
+        steps = steps._replace(warm=True)
+    numbers = membrane_numbers(full, coverage)  # type: ignore[arg-type]
+    RowWorkers(workers).run(
+        len(depth), solve_rows, picture_of(field), depth, scale, (0, 0), numbers, steps, slopes
+    )
+    down = -np.sqrt(np.maximum(1.0 - slopes.normal_x**2 - slopes.normal_y**2, 0.0))
+    normals = np.stack([slopes.normal_x, slopes.normal_y, down], axis=-1)
+    return RaySlopes(slopes.slope_x, slopes.slope_y, normals, slopes.weight, slopes.flags)
+
+
+def place_on_grid(
+    depth_mm: Map, drift: Map, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
+) -> tuple[Map, Map, NDArray[np.bool_]]:
+    """Find the ray that sees each true position, as the oracle of that name does."""
+    full = full_model(Membrane(), np.array([[0.5, 11.8, -13.7], [-10, -5, -13], [10, -6, -13]]))
+    kind = np.full(depth_mm.shape, 2, np.uint8)
+    scale = sensor_scale(full, (x_mm, y_mm), np.moveaxis(drift, -1, 0), kind, factor=1)
+    depth = np.ascontiguousarray(depth_mm, np.float32)
+    flags, marks = np.zeros(depth.shape, np.uint8), np.zeros(depth.shape, np.uint8)
+    placed, place = np.empty_like(depth), np.empty((2, *depth.shape), np.float32)
+    hidden = int(Flag.NOT_OBSERVABLE)
+    rows = len(depth)
+    place_rows(0, rows, depth, scale, (0, 0), True, flags, hidden, placed, marks, place)
+    return place[0], place[1], marks != 0
+
+
+def quiet(
+    light: Map, background: Map, sigma: Map, usable: NDArray[np.bool_]
+) -> tuple[Map, Map, Map | None]:
+    """Denoise (rows, columns, 3) as `quiet_even_parts` does; also what was left as it is."""
+    unknown = np.where(usable[..., None], sigma, np.float32(1e6))
+    # The solver knows one noise of press minus background for each channel.
+    sd = tuple(np.float32(s) for s in np.median((sigma * background)[usable], axis=0))
+    ratio = np.where(usable[..., None], light / background, 1.0)
+    planes = [np.ascontiguousarray(np.moveaxis(a, -1, 0), np.float32) for a in (ratio, unknown)]
+    nothing = np.zeros((3, 1, 1), np.float32)
+    picture = Picture(planes[0], planes[1], nothing, np.zeros(usable.shape, np.uint8))
+    edge = quieted(picture, sd, RowWorkers(1), Buffers().take)
+    return np.moveaxis(picture.ratio, 0, -1), np.moveaxis(picture.noise, 0, -1), edge

@@ -1,0 +1,158 @@
+"""A user looks whether the sensor has drifted, and sets it to zero before work."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelpolight_core.calibration.file import read_calibration, write_calibration
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.errors import InputError
+from gelpolight_core.health.expected import raw_background
+from gelpolight_core.quality import Verdict
+from gelpolight_core.reconstruction.background_shift import background_drift, zeroed
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.simulation.exposure import Frame, exposed
+from gelpolight_core.simulation.lamps import lamps_of
+from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
+
+BRIGHTER = (1.03, 1.0, 0.97)
+# More than is corrected in an image.
+MUCH_BRIGHTER = (1.13, 1.0, 0.87)
+
+
+def frames(*shares: float, count: int = 4) -> list[Frame]:
+    """Return frames of the untouched virtual sensor, its LEDs changed by shares."""
+    design = SensorDesign().scaled(0.25)
+    sensor = VirtualSensor(design, 0)
+    changed = tuple(
+        replace(lamp, power=lamp.power * share)
+        for lamp, share in zip(lamps_of(design), shares, strict=True)
+    )
+    warm = VirtualSensor(design, 0, lamps=changed)
+    # The camera's exposure stays; a new sensor would be exposed anew.
+    picture = warm.brightness(BareMembrane()) * sensor.exposure / warm.exposure
+    random = np.random.default_rng(5)
+    return [exposed(picture, design.camera, random) for _ in range(count)]
+
+
+@pytest.fixture(scope="module")
+def warm() -> list[Frame]:
+    """Return frames after the red LED has grown 3 % brighter and the blue one darker."""
+    return frames(*BRIGHTER)
+
+
+def moved(frame: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
+    """Return a frame that the camera sees further to the right."""
+    return np.ascontiguousarray(np.roll(frame, columns, axis=1))
+
+
+def test_a_sensor_that_has_not_changed_has_not_drifted(small_calibration: Calibration) -> None:
+    drift = background_drift(frames(1.0, 1.0, 1.0, count=1)[0], small_calibration)
+    assert not drift.touched
+    assert np.abs(drift.brightness_percent).max() < 0.5
+    assert drift.differs_percent < 1.0
+    assert drift.shift_px is None or np.hypot(*drift.shift_px) < 0.2
+    assert drift.quality.verdict is Verdict.PASS
+
+
+def test_leds_that_changed_are_told_by_channel(
+    small_calibration: Calibration, warm: list[Frame]
+) -> None:
+    drift = background_drift(warm[0], small_calibration)
+    assert drift.brightness_percent == pytest.approx([3.0, 0.0, -3.0], abs=0.5)
+    assert not drift.touched
+    assert drift.quality.verdict is Verdict.WARN
+    assert any("zero" in line for line in drift.quality.advice)
+
+
+def test_a_membrane_that_moved_in_the_picture_is_told(
+    virtual_calibration: Calibration, virtual_session: Path
+) -> None:
+    bare = read_picture(next((virtual_session / "background").iterdir())).rgb
+    drift = background_drift(moved(bare, 3), virtual_calibration)
+    assert drift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
+    assert drift.quality["drift_shift_px"].verdict is Verdict.FAIL
+    with pytest.raises(InputError, match="the membrane has moved by"):
+        zeroed(virtual_calibration, [moved(bare, 3)], operator="me", made="now")
+
+
+def test_a_press_is_called_a_touch_and_never_taken_for_the_background(
+    small_calibration: Calibration, small_session: Path
+) -> None:
+    press = read_picture(small_session / "presses" / "cylinder_s5_d050.png").rgb
+    drift = background_drift(press, small_calibration)
+    assert drift.touched
+    assert drift.quality.verdict is Verdict.FAIL
+    with pytest.raises(InputError, match="something is pressed"):
+        zeroed(small_calibration, [press], operator="me", made="now")
+
+
+@pytest.mark.parametrize("model", ["paper", "full"])
+def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(
+    small_calibration: Calibration, model: str
+) -> None:
+    warm = frames(*MUCH_BRIGHTER)
+    new = zeroed(small_calibration, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
+    before, after = (
+        Reconstructor(c, model=model).depth(warm[0]).depth_mm for c in (small_calibration, new)
+    )
+    assert np.abs(before).max() > 0.02
+    assert np.sqrt(np.mean(after**2)) < 0.25 * np.sqrt(np.mean(before**2))
+    drift = background_drift(warm[0], new)
+    assert np.abs(drift.brightness_percent).max() < 0.3
+
+
+def test_a_place_too_dim_for_the_calibration_stays_out_after_zeroing(
+    small_calibration: Calibration, warm: list[Frame]
+) -> None:
+    dim = small_calibration.radiance.copy()
+    rows, columns = (slice(n // 2, n // 2 + 5) for n in dim.shape[:2])
+    dim[rows, columns, 1] *= 0.005 / dim[rows, columns, 1].max()
+    factors = small_calibration.factors.copy()
+    factors[rows, columns] = 0.0
+    dull = replace(small_calibration, radiance=dim, factors=factors)
+    new = zeroed(dull, warm[1:], operator="me", made="2026-01-02T03:04:05+00:00")
+    assert not new.factors[rows, columns].any()
+    assert new.factors.any(axis=2).mean() > 0.9 * factors.any(axis=2).mean()
+
+
+def test_zeroing_is_on_record_and_has_a_name_of_its_own(
+    small_calibration: Calibration, warm: list[Frame], tmp_path: Path
+) -> None:
+    new = zeroed(small_calibration, warm, operator="me", made="2026-01-02T03:04:05+00:00")
+    assert new.identity != small_calibration.identity
+    edit = new.provenance.edits[-1]
+    assert (edit.part, edit.operator) == ("background", "me")
+    write_calibration(new, tmp_path / "zero.gplcal")
+    again = read_calibration(tmp_path / "zero.gplcal")
+    assert again.identity == new.identity
+    assert again.provenance.edits == new.provenance.edits
+
+
+def test_the_papers_calibration_alone_knows_the_same_background(
+    small_calibration: Calibration,
+) -> None:
+    paper = replace(small_calibration, full=None)
+    known = (small_calibration.factors > 0.0).all(axis=2)
+    both = raw_background(paper)[known], raw_background(small_calibration)[known]
+    assert both[0] == pytest.approx(both[1], rel=1e-3, abs=1e-4)
+    flat = background_drift(frames(1.0, 1.0, 1.0, count=1)[0], paper)
+    assert np.abs(flat.brightness_percent).max() < 0.5
+
+
+def test_what_is_no_picture_of_this_sensor_is_refused(small_calibration: Calibration) -> None:
+    camera = small_calibration.camera
+    dark = np.zeros((camera.height, camera.width, 3), np.float32)
+    with pytest.raises(InputError, match="dark"):
+        background_drift(dark, small_calibration)
+    with pytest.raises(InputError, match="the calibration is for"):
+        background_drift(dark[1:], small_calibration)
+    with pytest.raises(InputError, match="no picture"):
+        zeroed(small_calibration, [], operator="me", made="now")

@@ -1,0 +1,214 @@
+"""Contacts that cross the boundary of the field: right, or said to be without an anchor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.experiments.known_sensor import (
+    KnownPress,
+    KnownSensor,
+    known_sensor,
+    matt_design,
+)
+from gelpolight_core.experiments.stability_trial import depth_error, rms_um
+from gelpolight_core.measurement.measure import measure_object
+from gelpolight_core.reconstruction.checks import (
+    free_boundary_note,
+    held_boundary_note,
+    unanchored_note,
+)
+from gelpolight_core.reconstruction.height_map import Flag, HeightMap
+from gelpolight_core.reconstruction.near_light.boundary import (
+    Boundary,
+    find_boundary,
+    region_strips,
+    rim_distance_mm,
+)
+from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.trace import EFFORTS
+from gelpolight_core.simulation.indenters import Ball, Cylinder
+from gelpolight_core.simulation.surface import PressedSurface
+
+Array = NDArray[np.float64]
+CELL_MM, HALF_MM = 0.025, 15.0
+AXIS = CELL_MM * np.arange(-round(HALF_MM / CELL_MM), round(HALF_MM / CELL_MM) + 1)
+DECAY_MM = 0.7
+DEPTH_MM = 1.0
+SEEN_MM = 12.0
+
+
+@lru_cache(maxsize=1)
+def sensor() -> KnownSensor:
+    """Return a sensor of 640 x 480 pixels with its exact calibration; its field is 26 mm wide."""
+    return known_sensor(matt_design(0.5))
+
+
+def draped(outside_mm: Array, depth_mm: float = DEPTH_MM) -> KnownPress:
+    """Return a press of a flat face from its distance to the outline, positive outside."""
+    depth = depth_mm * np.exp(-np.maximum(outside_mm, 0.0) / DECAY_MM)
+    first = float(AXIS[0])
+    return sensor().showing(PressedSurface(depth, outside_mm <= 0.0, first, first, CELL_MM), 1)
+
+
+@lru_cache(maxsize=4)
+def scene(name: str) -> KnownPress:
+    """Return a press across the boundary."""
+    x, y = np.meshgrid(AXIS, AXIS)
+    kind, _, number = name.partition(" ")
+    if kind == "cylinder":
+        width, at = (float(n) for n in number.split(" at "))
+        return sensor().pressed(Cylinder(width, DEPTH_MM), x_mm=at, samples=1)
+    outlines: dict[str, Callable[[], Array]] = {
+        # Pressed over this share of the field's boundary.
+        "edge": lambda: 12.0 * np.cos(np.pi * float(number)) - x,
+        "half": lambda: -y,
+        "quadrant": lambda: np.hypot(np.maximum(-x, 0.0), np.maximum(-y, 0.0)),
+        "ring": lambda: float(number) - np.hypot(x, y),
+    }
+    return draped(outlines[kind]())
+
+
+def error_um(found: HeightMap, press: KnownPress) -> float:
+    return rms_um(depth_error(found, press.truth, radius_mm=SEEN_MM))
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(f"cylinder {width} at 11" for width in (6, 8, 10, 12)),
+        "cylinder 12 at 10.5",
+        "cylinder 12 at 12",
+        *(f"edge {share}" for share in (0.23, 0.33, 0.42, 0.5)),
+        "half plane",
+        "quadrant",
+    ],
+)
+def test_a_flat_face_across_the_boundary_keeps_its_depth(name: str, effort: str) -> None:
+    """Held at depth 0 all around, or freed by brightness, these are 80 to 480 um off."""
+    press = scene(name)
+    found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
+    # A straight wall across the whole field gives its own error to all that lies behind it.
+    assert error_um(found, press) < (30.0 if name in ("edge 0.5", "half plane") else 15.0)
+    assert free_boundary_note() in found.notes
+    assert not (found.flags & int(Flag.UNANCHORED)).any()
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_a_shallow_face_that_goes_on_beyond_the_region_is_solved_whole(effort: str) -> None:
+    """Only its edge changes the light: the region around the edge ends on the face."""
+    x, _ = np.meshgrid(AXIS, AXIS)
+    press = draped(-x, 0.05)
+    found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
+    assert error_um(found, press) < 2.0
+
+
+def test_the_stated_deviation_covers_what_a_far_face_is_off_by() -> None:
+    press = scene("edge 0.5")
+    found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
+    assert found.depth_sd_mm is not None
+    assert found.depth_model_sd_mm is not None
+    seen = (found.flags & int(Flag.OUTSIDE)) == 0
+    x, _ = np.meshgrid(found.x_mm, found.y_mm)
+    sd = np.hypot(found.depth_sd_mm, found.depth_model_sd_mm)
+    near, far = (np.median(sd[seen & part]) for part in (x < -10.0, x > 10.0))
+    assert far > 2.0 * near
+    face = seen & (x > 2.0) & (x < 10.0)
+    off = np.abs(found.depth_mm[face] - DEPTH_MM)
+    assert np.mean(off < 3.0 * sd[face]) > 0.95
+
+
+def test_a_face_all_around_is_levelled_by_the_hole_and_says_that_it_has_no_anchor() -> None:
+    press = scene("ring 8")
+    found = Reconstructor(sensor().calibration).depth(press.frame, uncertainty=True)
+    assert error_um(found, press) < 10.0
+    assert unanchored_note() in found.notes
+    inside = (found.flags & int(Flag.OUTSIDE)) == 0
+    assert (found.flags[inside] & int(Flag.UNANCHORED)).all()
+    assert found.depth_model_sd_mm is not None
+    assert np.median(found.depth_model_sd_mm[inside]) > 0.5 * DEPTH_MM
+
+
+def test_a_contact_inside_the_field_leaves_the_boundary_held() -> None:
+    press = sensor().pressed(Cylinder(5.0, DEPTH_MM), x_mm=0.5, y_mm=0.3, samples=1)
+    found = Reconstructor(sensor().calibration).near_light.depth(press.frame)
+    assert found.boundary == Boundary()
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("x_mm", [10.5, 11.0, 12.0])
+def test_what_the_boundary_cuts_off_is_not_measured(x_mm: float, effort: str) -> None:
+    press = scene(f"cylinder 12 at {x_mm:g}")
+    found = Reconstructor(sensor().calibration, effort=effort).depth(press.frame, normals=False)
+    with pytest.raises(InputError, match="cut by the border"):
+        measure_object(found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=found.flags)
+
+
+def test_the_papers_model_says_that_it_holds_the_boundary_down() -> None:
+    press = scene("cylinder 12 at 10.5")
+    paper = Reconstructor(sensor().calibration, model="paper")
+    found = paper.depth(press.frame)
+    assert held_boundary_note() in found.notes
+    measured = measure_object(
+        found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=found.flags
+    )
+    assert measured.verdict == "doubtful"
+    central = sensor().pressed(Ball(4.0, DEPTH_MM), x_mm=1.0, samples=1)
+    assert not paper.depth(central.frame).notes
+
+
+def test_a_face_without_an_anchor_is_doubtful() -> None:
+    """A block in the middle of a field whose boundary is pressed all around."""
+    press = sensor().pressed(Cylinder(5.0, DEPTH_MM), samples=1)
+    found = Reconstructor(sensor().calibration).depth(press.frame)
+
+    def verdict(flags: NDArray[np.uint8]) -> str:
+        return measure_object(
+            found.depth_mm, found.x_mm, found.y_mm, shape="cylinder", flags=flags
+        ).verdict
+
+    assert verdict(found.flags) == "ok"
+    assert verdict(found.flags | np.uint8(Flag.UNANCHORED)) == "doubtful"
+
+
+PITCH_MM = 0.2
+FIELD = np.hypot(*np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))) * PITCH_MM < 12.0
+WHOLE = Region((0, 0), FIELD.shape)
+STRIPS = region_strips(rim_distance_mm(FIELD, PITCH_MM), WHOLE, PITCH_MM)
+
+
+def test_the_strip_lies_inside_the_field_next_to_its_boundary() -> None:
+    radius = np.hypot(*np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))) * PITCH_MM
+    assert (STRIPS.rim <= FIELD).all()
+    assert radius[STRIPS.rim].min() > 12.0 - 0.5 - PITCH_MM
+    assert not STRIPS.inner.any()
+    half = Region((20, 30), (40, 50))
+    inner = region_strips(rim_distance_mm(FIELD, PITCH_MM), half, PITCH_MM).inner
+    assert inner[0].all() and inner[:, -1].any() and not inner[20, 25]
+
+
+def test_only_the_pressed_part_of_the_boundary_is_free() -> None:
+    x = np.broadcast_to(np.arange(-64, 65) * PITCH_MM, FIELD.shape)
+    # What is integrated without an anchor has any level.
+    open_mm = np.where(x > 8.0, 1.0, 0.0).astype(np.float32) + np.float32(0.7)
+    held_mm = np.where(x > 8.0, 0.5, 0.0).astype(np.float32)
+    found = find_boundary(held_mm, STRIPS, lambda free: open_mm, PITCH_MM)
+    assert found.free is not None
+    assert found.free[STRIPS.rim & (x > 8.0)].all()
+    assert not found.free[x < 5.0].any()
+    assert found.level_sd_mm == 0.0
+
+
+def test_a_boundary_that_is_pressed_all_around_has_no_level() -> None:
+    x, y = np.meshgrid(np.arange(-64, 65), np.arange(-64, 65))
+    open_mm = np.where(np.hypot(x, y) * PITCH_MM > 6.0, 1.0, 0.0).astype(np.float32)
+    found = find_boundary(open_mm - 1.0, STRIPS, lambda free: open_mm, PITCH_MM)
+    assert found.level_sd_mm == 1.0
+    np.testing.assert_allclose(found.levelled(open_mm + 3.0), open_mm, atol=1e-6)

@@ -1,0 +1,303 @@
+"""The compiled solve and its parts do what their plain oracles do, in single precision."""
+
+from __future__ import annotations
+
+import warnings
+
+import compiled
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from reference.near_light import ShadedField, solve_near_light
+from reference.placement import place_on_grid, resample
+from reference.weighted import integrate_weighted as plain_integration
+from scipy.ndimage import map_coordinates
+
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.near_light.maps import light_levels
+from gelpolight_core.reconstruction.near_light.sampling import block_means, halve, sample_rows
+from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE, Picture
+from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+ROWS, COLUMNS, PITCH = 70, 90, 0.1
+X = -4.0 + PITCH * np.arange(COLUMNS)
+Y = -3.0 + PITCH * np.arange(ROWS)
+POINTS = np.stack(np.meshgrid(X, Y), axis=-1)
+DRIFT = -(POINTS - np.array([0.4, -0.7])) / np.array([28.0, 33.0])
+LEDS = np.array([[0.5, 11.8, -13.7], [-10.4, -5.6, -13.9], [10.1, -6.3, -13.5]])
+_EVEN = np.linspace(0.0, 1.0, CURVE_NODES)
+KINKED = (tuple(np.minimum(_EVEN, 0.5 + 0.2 * (_EVEN - 0.5)).tolist()),) * 3
+BENT = tuple(tuple((_EVEN * (1.0 + g * (1.0 - _EVEN))).tolist()) for g in (0.2, 0.35, 0.5))
+
+# Each kind of membrane is compiled by itself: these two stand for all.
+membranes = st.one_of(
+    st.builds(Membrane, st.floats(0.9, 1.3)),
+    st.builds(
+        Membrane,
+        st.floats(0.9, 1.3),
+        st.floats(0.05, 0.5),
+        st.floats(0.3, 0.7),
+        st.floats(0.1, 0.9),
+    ),
+)
+
+
+def dented(membrane: Membrane, seed: int) -> tuple[ShadedField, Map]:
+    """Return a noisy picture of dents with walls up to 60 degrees, shadows in it, and a depth."""
+    random = np.random.default_rng(seed)
+    depth = np.zeros((ROWS, COLUMNS))
+    slopes = np.zeros((ROWS, COLUMNS, 2))
+    for _ in range(3):
+        off = POINTS - random.uniform([-3.0, -2.0], [4.0, 3.0])
+        wide, deep = random.uniform(0.5, 1.5), random.uniform(0.2, 0.9)
+        dent = deep * np.exp(-(off**2).sum(-1) / (2.0 * wide**2))
+        depth, slopes = depth + dent, slopes - off / wide**2 * dent[..., None]
+    normals = np.concatenate([-slopes, -np.ones((ROWS, COLUMNS, 1))], axis=-1).reshape(-1, 3)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    view = np.concatenate([DRIFT, -np.ones((ROWS, COLUMNS, 1))], axis=-1).reshape(-1, 3)
+    view /= np.linalg.norm(view, axis=-1, keepdims=True)
+    flat = np.tile([0.0, 0.0, -1.0], (ROWS * COLUMNS, 1))
+    light = LEDS - np.append(POINTS, np.zeros((ROWS, COLUMNS, 1)), axis=-1).reshape(-1, 1, 3)
+    light /= np.linalg.norm(light, axis=-1, keepdims=True)
+    ratio = membrane.response(light, normals, view) / membrane.response(light, flat, view)
+    ratio = ratio.reshape(ROWS, COLUMNS, 3) * random.normal(1.0, 0.004, (ROWS, COLUMNS, 3))
+    around = random.uniform(0.7, 1.2, 3) * np.ones_like(ratio)
+    ratio += membrane.bounce * around * 0.5 * (1.0 + normals[:, 2].reshape(ROWS, COLUMNS, 1))
+    usable = random.random((ROWS, COLUMNS)) > 0.01
+    field = ShadedField(
+        ratio.astype(np.float32),
+        np.full(ratio.shape, 0.004, np.float32),
+        around.astype(np.float32),
+        random.random(ratio.shape) > 0.98,
+        usable,
+        usable | (random.random(usable.shape) > 0.5),
+        DRIFT.astype(np.float32),
+        X,
+        Y,
+    )
+    return field, depth.astype(np.float32)
+
+
+@settings(max_examples=16, deadline=None)
+@given(
+    membranes,
+    st.sampled_from([(), BENT, KINKED]),
+    st.sampled_from([(compiled.BEST, 1e-3), (compiled.QUICK, 5e-3)]),
+    st.integers(0, 999),
+)
+def test_the_compiled_solve_finds_the_normals_of_the_scalar_one(
+    membrane: Membrane, diffuse: tuple, steps: tuple, seed: int
+) -> None:  # type: ignore[type-arg]
+    """In single precision, with as many steps as a block of nodes needs.
+
+    Nodes at the edge of darkness may fall to either side of it.
+    """
+    if diffuse:
+        membrane = Membrane(gloss=membrane.gloss, bounce=membrane.bounce, diffuse=diffuse)
+    field, depth = dented(membrane, seed)
+    plain = solve_near_light(field, depth, LEDS, membrane)
+    found = compiled.solve(field, depth, LEDS, membrane, steps=steps[0])
+    for name in ("slope_x", "slope_y"):
+        off = np.abs(getattr(found, name) - getattr(plain, name))[2:-2, 2:-2]
+        assert np.percentile(off, 95) < steps[1]
+        assert np.isfinite(getattr(found, name)).all()
+    told = ~np.uint8(Flag.INVALID)
+    assert ((found.flags & told) == plain.flags).mean() > 0.99
+    assert (found.weight == plain.weight).mean() > 0.99
+    assert (np.linalg.norm(found.normals, axis=-1) < 1.0 + 1e-5).all()
+
+
+@settings(max_examples=6, deadline=None)
+@given(membranes, st.integers(0, 999))
+def test_a_start_from_other_normals_ends_at_the_same(membrane: Membrane, seed: int) -> None:
+    field, depth = dented(membrane, seed)
+    cold = compiled.solve(field, depth, LEDS, membrane, steps=compiled.QUICK)
+    random = np.random.default_rng(seed)
+    near = [
+        np.clip(cold.normals[..., k] + random.normal(0.0, 0.05, depth.shape), -0.7, 0.7)
+        for k in (0, 1)
+    ]
+    start = (near[0].astype(np.float32), near[1].astype(np.float32))
+    warm = compiled.solve(field, depth, LEDS, membrane, steps=compiled.QUICK, start=start)
+    for name in ("slope_x", "slope_y"):
+        off = np.abs(getattr(warm, name) - getattr(cold, name))[2:-2, 2:-2]
+        assert np.percentile(off, 95) < 2e-3
+
+
+def test_a_channel_seen_at_a_cosine_that_no_ball_showed_is_flagged() -> None:
+    membrane = Membrane()
+    field, depth = dented(membrane, 3)
+    found = compiled.solve(field, depth, LEDS, membrane)
+    place = np.concatenate([POINTS + depth[..., None] * DRIFT, -depth[..., None]], axis=-1)
+    away = LEDS - place[..., None, :]
+    away /= np.linalg.norm(away, axis=-1, keepdims=True)
+    cosines = (away * found.normals[..., None, :]).sum(-1)
+    counts = field.usable & (found.flags == 0)
+    limit = float(np.percentile(cosines[counts], 90))
+    coverage = ((-1.0, 2.0), (-1.0, limit), (-1.0, 2.0))
+    flagged = compiled.solve(field, depth, LEDS, membrane, coverage=coverage).flags
+    far = (flagged & int(Flag.EXTRAPOLATED)) != 0
+    clear = counts & (np.abs(cosines[..., 1] - limit) > 1e-3)
+    np.testing.assert_array_equal(far[clear], (cosines[..., 1] > limit)[clear])
+    assert far[clear].any()
+
+
+def test_nodes_without_membrane_are_flat_and_flagged() -> None:
+    field, depth = dented(Membrane(), 1)
+    found = compiled.solve(field, depth, LEDS, Membrane())
+    outside = ~field.usable & ~field.inside
+    assert (found.flags[outside] == Flag.OUTSIDE).all()
+    assert (found.flags[~field.usable & field.inside] == Flag.OUTSIDE | Flag.INVALID).all()
+    assert (found.slope_x[~field.usable] == 0.0).all()
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 999), st.booleans(), st.booleans())
+def test_the_compiled_integration_is_the_plain_one(seed: int, let_go: bool, started: bool) -> None:
+    random = np.random.default_rng(seed)
+    bump = cv2.GaussianBlur(random.normal(size=(ROWS, COLUMNS)).astype(np.float32), (0, 0), 6.0)
+    slope_y, slope_x = (np.gradient(2.0 * bump, PITCH, axis=axis) for axis in (0, 1))
+    weight = np.where(random.random(bump.shape) > 0.1, 1.0, 0.01).astype(np.float32)
+    hold = np.ones_like(weight)
+    if let_go:
+        hold[:, -20:] = 1e-3
+    plain = plain_integration(slope_x, slope_y, weight, pitch_mm=PITCH, hold=hold, tolerance=1e-6)
+    fast = integrate_weighted(
+        slope_x,
+        slope_y,
+        weight,
+        pitch_mm=PITCH,
+        start_mm=bump if started else None,
+        hold=hold if let_go else None,
+        tolerance=1e-6,
+    )
+    assert np.abs(fast.depth_mm - plain.depth_mm).max() < 1e-3 * np.abs(plain.depth_mm).max()
+
+
+def test_a_solution_to_start_from_needs_no_round() -> None:
+    random = np.random.default_rng(4)
+    slopes = [random.normal(0.0, 0.1, (ROWS, COLUMNS)).astype(np.float32) for _ in range(2)]
+    weight = random.uniform(0.2, 1.0, (ROWS, COLUMNS)).astype(np.float32)
+    first = integrate_weighted(
+        *slopes,
+        weight,
+        pitch_mm=PITCH,
+        tolerance=1e-4,
+    )
+    again = integrate_weighted(
+        *slopes,
+        weight,
+        pitch_mm=PITCH,
+        start_mm=first.depth_mm,
+        tolerance=1e-3,
+    )
+    assert first.rounds > 1
+    assert again.rounds == 0
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 999), st.floats(0.1, 1.2))
+def test_true_positions_are_those_of_the_plain_oracle(seed: int, deep: float) -> None:
+    """Within a hundredth of a node times the steepest slope, where no wall hides the surface."""
+    random = np.random.default_rng(seed)
+    off = POINTS - random.uniform([-2.0, -1.0], [3.0, 2.0])
+    depth = (deep * np.exp(-(off**2).sum(-1) / 1.5)).astype(np.float32)
+    drift = DRIFT.astype(np.float32)
+    column, row, folded = place_on_grid(depth, drift, X, Y)
+    found_column, found_row, hidden = compiled.place_on_grid(depth, drift, X, Y)
+    assert not folded.any()
+    assert not hidden.any()
+    off_by = np.abs(resample(depth, found_column, found_row) - resample(depth, column, row))
+    assert off_by[3:-3, 3:-3].max() < 2e-3
+
+
+def sampled(
+    raw: NDArray[np.uint8] | NDArray[np.uint16],
+    place: tuple[Map, Map],
+    background: Map,
+    mix: Map,
+    *,
+    wide: bool,
+    coded: bool = False,
+) -> Picture:
+    """Compare a raw image with a background at the given pixels."""
+    shape = place[0].shape
+    planes = [np.empty((3, *shape), np.float32) for _ in range(2)]
+    nothing = np.zeros((3, 1, 1), np.float32)
+    picture = Picture(planes[0], planes[1], nothing, np.empty(shape, np.uint8))
+    light = light_levels(None, raw.dtype, coded=coded)
+    sensor = (tuple(tuple(row) for row in mix), (np.float32(0.01),) * 3)
+    kind, limit = np.full(shape, 2, np.uint8), np.float32(0.995)
+    source = (*place, background)
+    sample_rows(0, shape[0], raw, light, limit, source, wide, sensor, kind, (0, 0), picture)
+    return picture
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(0, 999), st.sampled_from([np.uint8, np.uint16]), st.booleans())
+def test_a_node_sees_the_pixels_about_it(seed: int, kind: type, wide: bool) -> None:
+    """Bilinear, at the coarser scales in an image that was averaged over 2 x 2 pixels."""
+    random = np.random.default_rng(seed)
+    top = np.iinfo(kind).max
+    raw = random.integers(0, int(0.99 * top), (40, 50, 3)).astype(kind)
+    u, v = (random.uniform(1.0, n - 2.0, (12, 14)).astype(np.float32) for n in (50, 40))
+    mix = np.linalg.inv(np.eye(3) + 0.05 * random.random((3, 3))).astype(np.float32)
+    background = random.uniform(0.3, 1.0, (12, 14, 3)).astype(np.float32)
+    found = sampled(raw, (u, v), background, mix, wide=wide)
+    even = (raw / np.float32(top)).astype(np.float64)
+    if wide:
+        even = 0.25 * (even[1:, 1:] + even[:-1, 1:] + even[1:, :-1] + even[:-1, :-1])
+    shift = 0.5 if wide else 0.0
+    at = [v.astype(np.float64) - shift, u.astype(np.float64) - shift]
+    seen = np.stack([map_coordinates(even[..., k], at, order=1) for k in range(3)], axis=-1)
+    expected = np.moveaxis(seen @ mix.T / background, -1, 0)
+    np.testing.assert_allclose(found.ratio, expected, atol=2e-4)
+    np.testing.assert_allclose(found.noise, np.moveaxis(0.01 / background, -1, 0), rtol=1e-5)
+    assert not found.marks.any()
+
+
+def _means_of_numbers(found: Picture) -> NDArray[np.float32]:
+    """Return the mean of each 2 x 2 nodes without those that are no number; 1 where none is."""
+    blocks = np.where(found.marks & NOT_FINITE, np.nan, found.ratio[1]).reshape(8, 2, 8, 2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of blocks without any number
+        return np.nan_to_num(np.nanmean(blocks, axis=(1, 3)), nan=1.0)
+
+
+@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize(("code", "mark"), [(65534, 2), (65535, 2 + 8)])
+def test_a_spoilt_pixel_marks_its_channel_in_the_nodes_about_it(
+    wide: bool, code: int, mark: int
+) -> None:
+    """A saturated value, and one that was not a number."""
+    raw = np.zeros((20, 20, 3), np.uint16)
+    raw[10, 10, 1] = code
+    u, v = (a.astype(np.float32) for a in np.meshgrid(np.arange(16.0), np.arange(16.0)))
+    ones = np.ones((16, 16, 3), np.float32)
+    found = sampled(raw, (u, v), ones, np.eye(3, dtype=np.float32), wide=wide, coded=True)
+    assert set(np.unique(found.marks)) == {0, mark}
+    assert found.marks[10, 10] == mark
+    assert (found.marks > 0).sum() <= 9
+    planes = [np.empty((3, 8, 8), np.float32) for _ in range(2)]
+    small = Picture(planes[0], planes[1], found.around, np.empty((8, 8), np.uint8))
+    halve(0, 8, found, small)
+    np.testing.assert_allclose(small.ratio[1], _means_of_numbers(found))
+    # An average of four has half the noise.
+    np.testing.assert_allclose(small.noise, 0.005, rtol=1e-5)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_block_means_are_the_means(workers: int) -> None:
+    raw = np.random.default_rng(2).integers(0, 255, (50, 66, 3)).astype(np.uint8)
+    means = np.empty((10, 13, 3), np.float32)
+    flat = raw.reshape(50, -1)
+    RowWorkers(workers).run(10, block_means, flat, np.float32(1 / 255), 5, means)
+    plain = raw[:50, :65].reshape(10, 5, 13, 5, 3).mean(axis=(1, 3)) / 255
+    np.testing.assert_allclose(means, plain, rtol=1e-5)

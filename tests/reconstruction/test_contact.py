@@ -1,0 +1,177 @@
+"""What counts as a contact: shallow relief does, noise does not; what the sensor cannot show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from gelpolight_core.experiments.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.experiments.stability_trial import depth_error, rms_um
+from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.reconstruction.checks import small_image_note, visible_depth_note
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.trace import EFFORTS
+from gelpolight_core.simulation.indenters import Ball, Cylinder
+
+AT_MM = (1.0, -2.0)
+EMPTY_FRAMES = 300
+
+
+@lru_cache(maxsize=3)
+def sensor(scale: float) -> KnownSensor:
+    """Return a sensor of 1280 x 960 pixels, scaled, with its exact calibration."""
+    return known_sensor(matt_design(scale))
+
+
+def face_um(found: object, at_mm: tuple[float, float]) -> float:
+    """Return the median depth of the middle of a face 5 mm wide."""
+    x, y = np.meshgrid(found.x_mm, found.y_mm)  # type: ignore[attr-defined]
+    middle = np.hypot(x - at_mm[0], y - at_mm[1]) < 2.2
+    return float(1e3 * np.median(found.depth_mm[middle]))  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("noisy", [False, True], ids=["clean", "noisy"])
+@pytest.mark.parametrize("depth_um", [10.0, 15.0, 20.0])
+def test_shallow_faces_are_seen(depth_um: float, noisy: bool, effort: str) -> None:
+    """By single blocks of pixels all of these read 0."""
+    known = sensor(0.5)
+    press = known.pressed(Cylinder(5.0, 1e-3 * depth_um), x_mm=AT_MM[0], y_mm=AT_MM[1], samples=1)
+    frame = known.noisy(press.frame, seed=3) if noisy else press.frame
+    found = Reconstructor(known.calibration, effort=effort).depth(frame, normals=False)
+    assert face_um(found, AT_MM) == pytest.approx(depth_um, abs=1.0)
+
+
+def test_the_stated_smallest_depth_is_seen_and_half_of_it_is_not() -> None:
+    known = sensor(0.5)
+    reconstruct = Reconstructor(known.calibration, effort="fast")
+    least_um = 1e3 * (reconstruct.visible_depth_mm or 0.0)
+    # 50 dB, 640 x 480 pixels.
+    assert 8.0 < least_um < 20.0
+    for at_mm in ((0.0, 0.0), (-7.0, 1.0), (5.0, 6.0)):
+        for share, seen in ((1.0, True), (0.3, False)):
+            face = Cylinder(5.0, 1e-3 * share * least_um)
+            press = known.pressed(face, x_mm=at_mm[0], y_mm=at_mm[1], samples=1)
+            found = reconstruct.depth(known.noisy(press.frame, seed=1), normals=False)
+            assert found.visible_depth_mm == reconstruct.visible_depth_mm
+            wanted = share * least_um if seen else 0.0
+            assert face_um(found, at_mm) == pytest.approx(wanted, abs=1.5)
+
+
+def test_more_noise_hides_more() -> None:
+    calibration = sensor(0.25).calibration
+    noisier = replace(calibration, noise=4.0 * calibration.noise)
+    least, more = (Reconstructor(c).visible_depth_mm or 0.0 for c in (calibration, noisier))
+    assert more == pytest.approx(4.0 * least, rel=0.3)
+
+
+def test_noise_is_no_contact() -> None:
+    known = sensor(0.25)
+    bare = known.bare()
+    solver = Reconstructor(known.calibration).near_light
+    for seed in range(EMPTY_FRAMES):
+        found = solver.depth(known.noisy(bare, seed=seed), effort="fast", normals=False)
+        assert found.rounds is None
+
+
+def test_light_that_is_stronger_all_over_is_no_contact() -> None:
+    known = sensor(0.25)
+    warmer = known.bare() * np.array([1.004, 1.003, 1.004], np.float32)
+    found = Reconstructor(known.calibration).near_light.depth(known.noisy(warmer))
+    assert found.rounds is None
+
+
+def test_a_shallow_face_beside_a_deep_one_is_seen() -> None:
+    known = sensor(0.5)
+    deep = known.pressed(Cylinder(4.0, 0.5), x_mm=-7.0, samples=1)
+    shallow = known.pressed(Cylinder(5.0, 0.03), x_mm=6.0, samples=1)
+    # The two do not light each other.
+    frame = deep.frame * (shallow.frame / np.maximum(known.bare(), 1e-6))
+    found = Reconstructor(known.calibration, effort="fast").depth(frame, normals=False)
+    assert face_um(found, (6.0, 0.0)) == pytest.approx(30.0, abs=3.0)
+
+
+@pytest.mark.parametrize("model", ["linear", "bent"])
+def test_with_any_camera_response_nothing_is_solved_while_nothing_is_pressed(model: str) -> None:
+    known = sensor(0.25)
+    calibration, frame = known.calibration, known.noisy(known.bare())
+    if model == "bent":
+        levels = np.linspace(0.0, 1.0, 256)
+        response = CameraResponse(np.tile(levels**1.2, (3, 1)))
+        calibration = replace(calibration, response=response)
+        frame = np.rint(255.0 * (frame / 255.0) ** (1.0 / 1.2)).astype(np.uint8)
+    for effort in EFFORTS:
+        found = Reconstructor(calibration, effort=effort).depth(frame)
+        assert not found.depth_mm.any()
+        assert found.trace is not None
+        assert len(found.trace.done) == 1
+
+
+def test_a_calibration_whose_noise_hides_presses_says_so() -> None:
+    known = sensor(0.25)
+    deaf = replace(known.calibration, noise=np.full(3, 0.2))
+    press = known.pressed(Ball(4.0, 0.05), samples=1)
+    for effort in EFFORTS:
+        reconstruct = Reconstructor(deaf, effort=effort)
+        found = reconstruct.depth(press.frame)
+        assert reconstruct.visible_depth_mm is not None
+        assert visible_depth_note(reconstruct.visible_depth_mm) in found.notes
+    assert not visible_depth_note(Reconstructor(known.calibration).visible_depth_mm or 1.0)
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_small_images_are_solved_at_a_scale_that_resolves_the_drape(effort: str) -> None:
+    """64 x 48 pixels at a quarter scale: nodes of 2 mm, and a plateau of 1 mm that reads 0.85."""
+    known = sensor(0.05)
+    press = known.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+    found, best = (
+        Reconstructor(known.calibration, effort=e).depth(press.frame) for e in (effort, "best")
+    )
+    np.testing.assert_array_equal(found.depth_mm, best.depth_mm)
+    assert found.trace is not None
+    assert found.trace.effort == "best"
+    assert (f"effort {effort}" in found.trace.left_out) == (effort != "best")
+    note = small_image_note(found.pitch_mm, 0.7)
+    assert note and note in found.notes
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_images_of_ordinary_size_are_solved_as_wanted(effort: str) -> None:
+    known = sensor(0.5)
+    press = known.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, samples=2)
+    found = Reconstructor(known.calibration, effort=effort).depth(press.frame)
+    assert found.trace is not None
+    assert found.trace.effort == effort
+    assert not found.notes
+    assert rms_um(depth_error(found, press.truth, radius_mm=12.0)) < 10.0
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("decay_mm", [0.35, 0.18, 0.1])
+def test_walls_are_right_or_said_to_be_too_steep(decay_mm: float, effort: str) -> None:
+    """Walls of 71, 80 and 84 degrees."""
+    design = matt_design(0.5)
+    steep = known_sensor(
+        replace(design, membrane=replace(design.membrane, decay_length_mm=decay_mm))
+    )
+    press = steep.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+    found = Reconstructor(steep.calibration, effort=effort).depth(press.frame, normals=False)
+    error_um = rms_um(depth_error(found, press.truth, radius_mm=12.0))
+    assert found.notes or error_um < 15.0
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("focal_px", [150.0, 80.0, 40.0])
+def test_wide_lenses_are_right_or_said_to_see_too_little(focal_px: float, effort: str) -> None:
+    """Rays up to 47, 63 and 76 degrees: wide pixels."""
+    design = matt_design(0.25)
+    camera = replace(design.camera, fx=focal_px, fy=focal_px, distortion=(0.0, 0.0, 0.0, 0.0))
+    wide = replace(design.membrane, working_diameter_mm=100.0)
+    known = known_sensor(replace(design, camera=camera, membrane=wide))
+    press = known.pressed(Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
+    found = Reconstructor(known.calibration, effort=effort).depth(press.frame, normals=False)
+    error_um = rms_um(depth_error(found, press.truth, radius_mm=7.0))
+    assert found.notes or error_um < 10.0

@@ -1,0 +1,333 @@
+"""What the solver leaves out at each effort, and that it changes no more than is stated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.near_light import denoise
+from gelpolight_core.reconstruction.near_light.settings import SETTINGS
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.reconstruction.trace import EFFORTS
+from gelpolight_core.reflectance.membrane import CURVE_NODES
+from gelpolight_core.sensor_calibration import Calibration
+from gelpolight_core.session.images import read_picture
+from gelpolight_core.simulation.indenters import Ball, Cylinder
+from gelpolight_core.simulation.indenters import press as pressed
+from gelpolight_core.simulation.virtual_sensor import (
+    BareMembrane,
+    PressedMembrane,
+    State,
+    VirtualSensor,
+)
+
+Frame = NDArray[np.uint8]
+PRESS = "cylinder_s5_d100"
+# What a region of the contact may change: drape below half a degree, and depth 0 at its border.
+REGION_MM = 8e-3
+ALWAYS_TWO_ROUNDS = {effort: replace(own, shallow_mm=0.0) for effort, own in SETTINGS.items()}
+
+
+def as_camera(rgb: NDArray[np.float32]) -> Frame:
+    return np.asarray(np.round(rgb * 255.0), np.uint8)
+
+
+@pytest.fixture(scope="module")
+def shown() -> Callable[[State], Frame]:
+    """Return a function that shows a state of the virtual sensor at half its size."""
+    sensor = VirtualSensor(SensorDesign().scaled(0.5), 0)
+    return lambda state: np.asarray(sensor.frame(state, averaged=1, stream="another"), np.uint8)
+
+
+@pytest.fixture(scope="module")
+def balanced(virtual_calibration: Calibration) -> Reconstructor:
+    return Reconstructor(virtual_calibration, effort="balanced")
+
+
+@pytest.fixture(scope="module")
+def frame(virtual_session: Path) -> Frame:
+    return as_camera(read_picture(virtual_session / "presses" / f"{PRESS}.png").rgb)
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_without_a_contact_nothing_is_solved_at_any_effort(
+    effort: str, shown: Callable[[State], Frame], virtual_calibration: Calibration
+) -> None:
+    """Another frame than the calibration's, with its own noise."""
+    heightmap = Reconstructor(virtual_calibration, effort=effort).depth(shown(BareMembrane()))
+    assert heightmap.trace is not None
+    assert heightmap.trace.done == ("looking for a contact",)
+    assert "integration" in heightmap.trace.left_out
+    assert not heightmap.depth_mm.any()
+    assert heightmap.normals is not None
+    assert (heightmap.normals == [0.0, 0.0, -1.0]).all()
+    assert set(np.unique(heightmap.flags)) == {0, Flag.OUTSIDE, Flag.OUTSIDE | Flag.INVALID}
+
+
+@pytest.mark.parametrize("effort", ["balanced", "best"])
+@settings(
+    max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)),
+    st.floats(0.05, 1.2),
+    st.booleans(),
+)
+def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
+    effort: str,
+    balanced: Reconstructor,
+    shown: Callable[[State], Frame],
+    centre_mm: tuple[float, float],
+    depth_mm: float,
+    round_end: bool,
+) -> None:
+    indenter = Ball(3.0, depth_mm) if round_end else Cylinder(3.0, depth_mm)
+    surface = pressed(indenter, x_mm=centre_mm[0], y_mm=centre_mm[1])
+    picture = shown(PressedMembrane(surface))
+    region, whole = (
+        balanced.near_light.depth(picture, effort=effort, normals=False, everywhere=e)
+        for e in (False, True)
+    )
+    assert region.depth_mm.max() > 0.5 * depth_mm
+    assert np.abs(region.depth_mm - whole.depth_mm).max() < REGION_MM
+
+
+@settings(
+    max_examples=4, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.floats(0.01, 0.06))
+def test_one_round_is_enough_for_a_shallow_press(
+    balanced: Reconstructor, shown: Callable[[State], Frame], depth_mm: float
+) -> None:
+    surface = pressed(Cylinder(3.0, depth_mm), x_mm=1.0, y_mm=-2.0)
+    picture = shown(PressedMembrane(surface))
+    once = balanced.depth(picture)
+    assert once.depth_mm.max() > 0.5 * depth_mm
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(balanced.near_light, "_settings", ALWAYS_TWO_ROUNDS)
+        twice = balanced.depth(picture)
+    assert np.abs(once.depth_mm - twice.depth_mm).max() < 1e-3
+
+
+def test_an_image_without_noise_is_not_denoised(virtual_calibration: Calibration) -> None:
+    """Linear light without a camera's noise: denoising would change next to nothing."""
+    sensor = VirtualSensor(SensorDesign().scaled(0.5), 0)
+    surface = pressed(Cylinder(3.0, 0.8), x_mm=1.0, y_mm=-2.0)
+    light = sensor.brightness(PressedMembrane(surface)).astype(np.float32)
+    best = Reconstructor(virtual_calibration)
+    silent = best.depth(light)
+    assert silent.trace is not None
+    assert "denoising" in silent.trace.left_out
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(denoise, "SILENT", 0.0)
+        quieted = best.depth(light)
+    assert quieted.trace is not None
+    assert "denoising" not in quieted.trace.left_out
+    assert np.sqrt(np.mean((silent.depth_mm - quieted.depth_mm) ** 2)) < 1e-3
+
+
+def test_wider_averages_that_few_nodes_need_change_next_to_nothing(
+    frame: Frame, virtual_calibration: Calibration
+) -> None:
+    best = Reconstructor(virtual_calibration)
+    once = best.depth(frame)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(denoise, "FEW", 0.0)
+        patch.setattr(denoise, "LOUD", 1.0)
+        all_widths = best.depth(frame)
+    assert np.sqrt(np.mean((once.depth_mm - all_widths.depth_mm) ** 2)) < 1e-3
+
+
+@pytest.mark.parametrize("name", [PRESS, "cuboid_s4_d100"])
+def test_half_scale_is_near_to_the_best(
+    name: str,
+    balanced: Reconstructor,
+    virtual_session: Path,
+    virtual_calibration: Calibration,
+) -> None:
+    """In a picture of half the size, whose nodes are twice as far apart as a camera's."""
+    picture = as_camera(read_picture(virtual_session / "presses" / f"{name}.png").rgb)
+    best = Reconstructor(virtual_calibration).depth(picture)
+    planned = balanced.depth(picture)
+    off = planned.depth_mm - best.depth_mm
+    plateau = best.depth_mm > 0.95 * best.depth_mm.max()
+    assert abs(np.median(off[plateau])) < 0.01 * best.depth_mm.max()
+    assert np.sqrt(np.mean(off**2)) < 6e-3
+    assert best.normals is not None
+    assert planned.normals is not None
+    across = np.linalg.norm(np.cross(planned.normals, best.normals), axis=-1)
+    assert np.median(np.degrees(np.arcsin(np.clip(across[plateau], 0.0, 1.0)))) < 1.0
+    same = (planned.flags & Flag.OUTSIDE) == (best.flags & Flag.OUTSIDE)
+    assert same.all()
+
+
+@pytest.mark.parametrize(("decay_mm", "said"), [(0.7, False), (0.1, True)])
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_walls_that_light_does_not_decide_are_said_at_every_effort(
+    effort: str,
+    decay_mm: float,
+    said: bool,
+    shown: Callable[[State], Frame],
+    virtual_calibration: Calibration,
+) -> None:
+    """Walls of 57 degrees, and of 84."""
+    surface = pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, decay_mm=decay_mm)
+    picture = shown(PressedMembrane(surface))
+    notes = Reconstructor(virtual_calibration, effort=effort).depth(picture).notes
+    assert any("steep walls" in note for note in notes) is said
+
+
+def test_the_papers_model_leaves_nothing_of_itself_out(
+    frame: Frame, virtual_calibration: Calibration
+) -> None:
+    trace = Reconstructor(virtual_calibration, model="paper").depth(frame, normals=False).trace
+    assert trace is not None
+    assert trace.left_out == ("light of the image", "normals", "standard deviations")
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_a_trace_says_what_was_done_and_why(
+    effort: str, frame: Frame, virtual_calibration: Calibration
+) -> None:
+    reconstruct = Reconstructor(virtual_calibration, effort=effort)
+    trace = reconstruct.depth(frame, normals=False).trace
+    assert trace is not None
+    assert trace.effort == effort
+    reasons = {step.name: step.reason for step in trace.steps}
+    assert "of the field" in reasons["looking for a contact"]
+    assert reasons["normals"]
+    assert all(step.milliseconds is not None for step in trace.steps if step.done)
+    numbers = reconstruct.near_light.maps.membrane
+    assert ("gloss" in trace.left_out) is (numbers.gloss is None)
+    assert ("interreflection" in trace.left_out) is (numbers.bounce is None)
+
+
+@pytest.mark.parametrize("model", ["paper", "full"])
+def test_what_a_frame_needs_is_known_without_reconstructing_it(
+    model: str, frame: Frame, shown: Callable[[State], Frame], virtual_calibration: Calibration
+) -> None:
+    reconstruct = Reconstructor(virtual_calibration, model=model)
+    for picture in (frame, shown(BareMembrane())):
+        needed, found = reconstruct.needs(picture), reconstruct.depth(picture).trace
+        assert found is not None
+        asked = {"normals", "standard deviations", "second near-light round"}
+        assert set(needed.done) == set(found.done) - asked
+        assert set(needed.left_out) <= set(found.left_out)
+
+
+def test_the_fast_effort_leaves_the_finer_scale_out(
+    frame: Frame, balanced: Reconstructor, virtual_calibration: Calibration
+) -> None:
+    fast = Reconstructor(virtual_calibration, effort="fast").depth(frame)
+    assert fast.trace is not None
+    assert "near light, full scale" in fast.trace.left_out
+    off = fast.depth_mm - balanced.depth(frame).depth_mm
+    assert np.sqrt(np.mean(off**2)) < 10e-3
+
+
+def test_the_number_of_threads_changes_no_bit(
+    frame: Frame, balanced: Reconstructor, virtual_calibration: Calibration
+) -> None:
+    alone = Reconstructor(virtual_calibration, effort="balanced", workers=1).depth(frame)
+    both = balanced.depth(frame)
+    np.testing.assert_array_equal(alone.depth_mm, both.depth_mm)
+    np.testing.assert_array_equal(alone.flags, both.flags)
+
+
+def test_a_result_is_not_touched_by_the_next_frames(frame: Frame, balanced: Reconstructor) -> None:
+    first = balanced.depth(frame)
+    kept = first.depth_mm.copy()
+    balanced.depth(frame[::-1, ::-1].copy())
+    np.testing.assert_array_equal(first.depth_mm, kept)
+
+
+def test_several_threads_may_ask_at_once(frame: Frame, balanced: Reconstructor) -> None:
+    expected = balanced.depth(frame).depth_mm
+    frames = [frame, frame[::-1].copy()] * 4
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(balanced.depth, frames))
+    for heightmap in found[::2]:
+        np.testing.assert_array_equal(heightmap.depth_mm, expected)
+
+
+def test_bit_depth_and_float_pictures_give_the_same_depth(
+    frame: Frame, balanced: Reconstructor
+) -> None:
+    eight = balanced.depth(frame).depth_mm
+    for other in (frame.astype(np.uint16) * 257, frame.astype(np.float32) / np.float32(255.0)):
+        assert np.abs(balanced.depth(other).depth_mm - eight).max() < 1e-3
+
+
+def test_what_is_not_finite_is_a_missing_channel(frame: Frame, balanced: Reconstructor) -> None:
+    bad = frame.astype(np.float32) / 255.0
+    bad[200:204, 300:310, 1] = np.nan
+    bad[260:262, 280:300] = np.inf
+    found = balanced.depth(bad)
+    assert np.isfinite(found.depth_mm).all()
+    assert np.isfinite(found.normals).all()
+    assert (found.flags & Flag.INVALID).any()
+
+
+@pytest.mark.parametrize("value", [0, 255])
+def test_an_even_picture_is_survived(value: int, frame: Frame, balanced: Reconstructor) -> None:
+    assert np.isfinite(balanced.depth(np.full_like(frame, value)).depth_mm).all()
+
+
+def test_standard_deviations_are_those_of_the_best_answer(
+    frame: Frame, virtual_calibration: Calibration
+) -> None:
+    stated = Reconstructor(virtual_calibration, effort="fast").depth(frame, uncertainty=True)
+    best = Reconstructor(virtual_calibration).depth(frame)
+    np.testing.assert_array_equal(stated.depth_mm, best.depth_mm)
+    assert stated.trace is not None
+    assert stated.trace.effort == "best"
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_a_curve_with_a_kink_is_solved_at_every_effort(
+    effort: str, frame: Frame, virtual_calibration: Calibration
+) -> None:
+    """As a hand may draw it: no polynomial follows it, and it is looked up instead."""
+    full = virtual_calibration.full
+    assert full is not None
+    even = np.linspace(0.0, 1.0, CURVE_NODES)
+    kinked = tuple(np.minimum(even, 0.5 + 0.2 * (even - 0.5)).tolist())
+    bent = replace(full.membrane, diffuse=(kinked, kinked, kinked))
+    calibration = replace(virtual_calibration, full=replace(full, membrane=bent))
+    assert Reconstructor(calibration).near_light.maps.membrane.table is not None
+    found = Reconstructor(calibration, effort=effort).depth(frame)
+    assert np.isfinite(found.depth_mm).all()
+    assert 0.3 < found.depth_mm.max() < 3.0
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+def test_a_press_almost_to_the_lights_stays_finite(
+    effort: str, shown: Callable[[State], Frame], virtual_calibration: Calibration
+) -> None:
+    surface = pressed(Ball(8.0, 12.0), x_mm=1.2, y_mm=-0.8)
+    picture = shown(PressedMembrane(surface))
+    found = Reconstructor(virtual_calibration, effort=effort).depth(picture)
+    assert found.normals is not None
+    assert np.isfinite(found.depth_mm).all()
+    np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-4)
+
+
+def test_an_unknown_effort_is_refused(virtual_calibration: Calibration) -> None:
+    with pytest.raises(ValueError, match="some"):
+        Reconstructor(virtual_calibration, effort="some")
+
+
+def test_warming_up_changes_nothing(frame: Frame, virtual_calibration: Calibration) -> None:
+    warm, cold = (Reconstructor(virtual_calibration, effort="balanced") for _ in range(2))
+    warm.warm_up()
+    np.testing.assert_array_equal(warm.depth(frame).depth_mm, cold.depth(frame).depth_mm)

@@ -1,0 +1,50 @@
+"""The noise of a picture, found in the picture itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelpolight_core.reconstruction.near_light.image_noise import ImageNoise, image_noise
+from gelpolight_core.reconstruction.near_light.maps import light_levels
+from gelpolight_core.reconstruction.threads import RowWorkers
+
+ROWS, COLUMNS = 240, 320
+
+
+def measured(light: np.ndarray) -> ImageNoise:
+    """Measure an image of 8 bits."""
+    raw = np.round(255.0 * np.clip(light, 0.0, 1.0)).astype(np.uint8)
+    levels = light_levels(None, raw.dtype, coded=False)
+    return image_noise(raw, levels, RowWorkers(2))
+
+
+def scene() -> np.ndarray:
+    """Return smooth light from dark to bright, with a step and a few specks."""
+    light = np.tile(np.linspace(0.05, 0.9, COLUMNS), (ROWS, 1))
+    light[60:120, 100:180] *= 0.6
+    light[::40, ::37] *= 0.3
+    return np.repeat(light[..., None], 3, axis=2)
+
+
+@pytest.mark.parametrize(("shot", "read"), [(4e-5, 0.0015), (4e-4, 0.005)])
+def test_noise_is_found_at_every_brightness(shot: float, read: float) -> None:
+    light, random = scene(), np.random.default_rng(0)
+    sd = np.sqrt(shot * light + read**2)
+    seen = light + sd * random.normal(size=light.shape)
+    # Rounding to 8 bits adds its own twelfth of a step squared.
+    expected = np.sqrt(sd**2 + 1.0 / 12.0 / 255.0**2)
+    at = np.moveaxis(light, -1, 0).astype(np.float32)
+    found = np.moveaxis(np.sqrt(measured(seen).at(at)), 0, -1)
+    middle = (light > 0.15) & (light < 0.8)
+    # 64 differences in each of some 35 blocks of like brightness: 3 %; the classes are broad.
+    assert np.median(found[middle] / expected[middle]) == pytest.approx(1.0, abs=0.04)
+    assert np.abs(found[middle] / expected[middle] - 1.0).max() < 0.2
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_a_picture_without_information_has_a_finite_noise(value: float) -> None:
+    noise = measured(np.full((ROWS, COLUMNS, 3), value))
+    found = noise.at(np.full((3, 4, 4), 0.5, np.float32))
+    assert np.isfinite(found).all()
+    assert (found >= 0.0).all()

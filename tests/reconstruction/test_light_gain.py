@@ -1,0 +1,149 @@
+"""A change of exposure or of an LED by some percent is measured and undone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gelpolight_core.design.sensor_design import SensorDesign
+from gelpolight_core.experiments.known_sensor import KnownPress, KnownSensor, known_sensor
+from gelpolight_core.experiments.stability_trial import depth_error, rms_um
+from gelpolight_core.image.response import gamma_response
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.measurement.trust import judged
+from gelpolight_core.reconstruction.height_map import HeightMap
+from gelpolight_core.reconstruction.misfit import solve_misfit
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.simulation.exposure import exposed
+from gelpolight_core.simulation.indenters import Cylinder
+
+TEN_UM = 10.0
+CORRECTION = "light of the image"
+CHANGES = {
+    "exposure 3 % longer": (1.03, 1.03, 1.03),
+    "exposure 3 % shorter": (0.97, 0.97, 0.97),
+    "exposure 0.2 % longer": (1.002, 1.002, 1.002),
+    "red LED 2 % brighter": (1.02, 1.0, 1.0),
+    "all LEDs otherwise": (0.98, 1.02, 1.01),
+}
+
+
+@pytest.fixture(scope="module")
+def known() -> KnownSensor:
+    """Return a sensor with specks, crosstalk and gloss, and its exact calibration."""
+    return known_sensor(SensorDesign().scaled(0.5))
+
+
+@pytest.fixture(scope="module")
+def press(known: KnownSensor) -> KnownPress:
+    """Return a press without noise."""
+    return known.pressed(Cylinder(5.0, 1.0), x_mm=1.2, y_mm=-0.8, samples=1)
+
+
+def error_um(found: HeightMap, press: KnownPress) -> float:
+    """Return the depth's error over the working circle, root mean square."""
+    return rms_um(depth_error(found, press.truth, radius_mm=12.0))
+
+
+@pytest.mark.parametrize(
+    ("model", "effort"), [("full", "best"), ("full", "fast"), ("paper", "best")]
+)
+def test_a_change_of_light_costs_less_than_ten_micrometres(
+    known: KnownSensor, press: KnownPress, model: str, effort: str
+) -> None:
+    reconstructor = Reconstructor(known.calibration, model=model, effort=effort)
+    usual = error_um(reconstructor.depth(known.noisy(press.frame), normals=False), press)
+    for name, shares in CHANGES.items():
+        frame = known.noisy(press.frame * np.array(shares, np.float32))
+        found = reconstructor.depth(frame, normals=False)
+        assert abs(error_um(found, press) - usual) < 0.3 * TEN_UM, name
+        assert found.health is not None
+        assert found.health.light is not None
+        np.testing.assert_allclose(found.health.light.share, shares, atol=6e-4)
+        assert found.trace is not None
+        assert CORRECTION in found.trace.done
+        assert reconstructor.needs(frame).done[0] == CORRECTION
+
+
+def test_a_corrected_image_is_measured_well_and_says_what_was_done(
+    known: KnownSensor, press: KnownPress
+) -> None:
+    reconstructor = Reconstructor(known.calibration)
+    still, changed = (
+        reconstructor.depth(known.noisy(press.frame * np.float32(share)), uncertainty=True)
+        for share in (1.0, 1.03)
+    )
+    assert changed.health is not None
+    assert changed.health.keys == ("exposure",)
+    assert not changed.health.faults
+    assert any("corrected" in note for note in changed.notes)
+    found = judged(measure_heightmap(changed, shape="cylinder"), changed)
+    assert found.verdict == "ok"
+    assert found.height_mm == pytest.approx(1.0, abs=3.0 * found.sd["height_mm"])
+    # The gain is known to a few hundredths of a percent only.
+    assert still.depth_model_sd_mm is not None
+    assert changed.depth_model_sd_mm is not None
+    seen = np.hypot(*np.meshgrid(still.x_mm, still.y_mm)) < 8.0
+    assert (changed.depth_model_sd_mm[seen] >= still.depth_model_sd_mm[seen]).mean() > 0.99
+    left = [
+        solve_misfit(reconstructor, known.noisy(press.frame * np.float32(share)), heightmap).values
+        for share, heightmap in ((1.0, still), (1.03, changed))
+    ]
+    assert np.nanmean(left[1]) == pytest.approx(np.nanmean(left[0]), rel=0.2)
+
+
+def test_light_as_at_calibration_changes_nothing(known: KnownSensor, press: KnownPress) -> None:
+    for model in ("full", "paper"):
+        reconstructor = Reconstructor(known.calibration, model=model)
+        for seed in range(3):
+            found = reconstructor.depth(known.noisy(press.frame, seed=seed), normals=False)
+            assert found.health is not None
+            assert found.health.light is None
+            assert found.trace is not None
+            assert CORRECTION in found.trace.left_out
+
+
+def test_where_nothing_is_pressed_nothing_is_solved_whatever_the_exposure(
+    known: KnownSensor,
+) -> None:
+    for share in (0.96, 1.04):
+        found = Reconstructor(known.calibration).depth(
+            known.noisy(known.bare() * np.float32(share))
+        )
+        assert found.trace is not None
+        assert found.trace.done == (CORRECTION, "looking for a contact")
+        assert not found.depth_mm.any()
+
+
+def test_with_a_camera_that_is_not_linear_the_light_is_corrected_too(
+    known: KnownSensor, press: KnownPress
+) -> None:
+    camera = replace(known.sensor.design.camera, response="gamma", gamma=2.2)
+    bent = replace(known.calibration, response=gamma_response(2.2))
+    for effort in ("best", "fast"):
+        reconstructor = Reconstructor(bent, effort=effort)
+        depths = []
+        for share in (1.0, 1.03):
+            random = np.random.default_rng(0)
+            for frame in (press.frame, known.bare()):
+                encoded = exposed(frame.astype(np.float64) * share, camera, random, averaged=1)
+                depths.append(reconstructor.depth(encoded, normals=False))
+        pressed, bare, pressed_brighter, bare_brighter = depths
+        assert abs(error_um(pressed_brighter, press) - error_um(pressed, press)) < 0.3 * TEN_UM
+        assert not bare.depth_mm.any()
+        assert not bare_brighter.depth_mm.any()
+
+
+def test_what_is_beyond_correction_stays_a_fault(known: KnownSensor, press: KnownPress) -> None:
+    for change in (
+        lambda frame: frame * np.float32(0.8),
+        lambda frame: frame * np.array([1.0, 0.7, 1.0], np.float32),
+    ):
+        found = Reconstructor(known.calibration).health(known.noisy(change(press.frame)))
+        assert found.light is None
+        assert found.faults
+    lit = press.frame * np.float32(1.02) + np.float32(0.002)
+    found = Reconstructor(known.calibration).health(known.noisy(lit))
+    assert [fault.key for fault in found.faults] == ["room_light"]

@@ -1,0 +1,119 @@
+"""The fused pass against the plain version, and against slopes that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scene
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.experiments.plain_paper import plain_depth, plain_slopes
+from gelpolight_core.reconstruction.height_map import Flag
+from gelpolight_core.reconstruction.paper.depth import shading_maps
+from gelpolight_core.reconstruction.paper.model import normals_from_slopes, solve_slopes
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+
+CALIBRATION = scene.calibration()
+MAPS = shading_maps(CALIBRATION)
+
+
+def lopsided(points: np.ndarray) -> np.ndarray:
+    """Return slopes of 0.6 exp(-((x-2)^2/4 + (y+1)^2)), which no swap or flip leaves alone."""
+    x, y = points[..., 0] - 2.0, points[..., 1] + 1.0
+    bump = 0.6 * np.exp(-(x**2) / 4 - y**2)
+    return np.stack([-x / 2 * bump, -2 * y * bump], axis=-1)
+
+
+def test_known_slopes_are_found_with_their_signs() -> None:
+    field = solve_slopes(scene.raw_picture(lopsided, CALIBRATION), MAPS)
+    expected = lopsided(CALIBRATION.table.grid.points_mm())
+    seen = field.flags & int(Flag.OUTSIDE) == 0
+    # A pixel is 0.1 mm here and the picture is interpolated between pixels.
+    np.testing.assert_allclose(field.slope_x[seen], expected[seen][:, 0], atol=0.02)
+    np.testing.assert_allclose(field.slope_y[seen], expected[seen][:, 1], atol=0.02)
+    assert np.median(field.length_error[seen]) < 1e-3
+
+
+def test_the_bump_stands_at_its_place_and_height() -> None:
+    heightmap = Reconstructor(CALIBRATION).depth(scene.raw_picture(lopsided, CALIBRATION))
+    row, column = np.unravel_index(heightmap.depth_mm.argmax(), heightmap.depth_mm.shape)
+    assert heightmap.x_mm[column] == pytest.approx(2.0, abs=0.15)
+    assert heightmap.y_mm[row] == pytest.approx(-1.0, abs=0.15)
+    assert heightmap.depth_mm.max() == pytest.approx(0.6, rel=0.01)
+
+
+def test_the_fused_pass_is_the_plain_mathematics() -> None:
+    raw = scene.raw_picture(lopsided, CALIBRATION)
+    raw8 = np.round(np.clip(raw, 0, 1) * 255).astype(np.uint8)
+    field = solve_slopes(raw8, MAPS)
+    slope_x, slope_y = plain_slopes(raw8, CALIBRATION)
+    seen = field.flags & int(Flag.OUTSIDE) == 0
+    np.testing.assert_allclose(field.slope_x[seen], slope_x[seen], atol=2e-4)
+    np.testing.assert_allclose(field.slope_y[seen], slope_y[seen], atol=2e-4)
+    depth = Reconstructor(CALIBRATION).depth(raw8).depth_mm
+    plain = plain_depth(slope_x, slope_y, CALIBRATION.table.grid.pitch_mm)
+    assert np.abs(depth - plain)[seen].max() < 2e-3
+
+
+def test_eight_and_sixteen_bit_and_float_pictures_agree() -> None:
+    raw = np.clip(scene.raw_picture(lopsided, CALIBRATION), 0, 1)
+    fields = [
+        solve_slopes(picture, MAPS)
+        for picture in (
+            raw,
+            np.round(raw * 255).astype(np.uint8),
+            np.round(raw * 65535).astype("u2"),
+        )
+    ]
+    seen = fields[0].flags & int(Flag.OUTSIDE) == 0
+    assert np.abs(fields[0].slope_x - fields[2].slope_x)[seen].max() < 1e-3
+    assert np.abs(fields[0].slope_x - fields[1].slope_x)[seen].max() < 0.15
+
+
+def test_the_number_of_threads_does_not_change_a_bit() -> None:
+    raw = scene.raw_picture(lopsided, CALIBRATION)
+    one, three = (solve_slopes(raw, MAPS, workers=n) for n in (1, 3))
+    np.testing.assert_array_equal(one.slope_x, three.slope_x)
+    np.testing.assert_array_equal(one.flags, three.flags)
+
+
+def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
+    raw = scene.raw_picture(lopsided, CALIBRATION)
+    bad = raw.copy()
+    bad[100, 120] = np.nan
+    bad[101, 140] = np.inf
+    bad[130, 160] = 1.0
+    bad[80, 150, 2] = 0.0
+    bad[60, 170] = -1.0
+    clean, field = solve_slopes(raw, MAPS), solve_slopes(bad, MAPS)
+    touched = field.flags != clean.flags
+    assert np.isfinite(field.slope_x).all()
+    assert (field.flags & int(Flag.SATURATED)).any()
+    assert (field.flags & int(Flag.INVALID)).any()
+    assert (field.flags & int(Flag.DARK)).any()
+    near = np.zeros_like(touched)
+    for v, u in ((100, 120), (101, 140), (130, 160), (80, 150), (60, 170)):
+        near |= (np.abs(MAPS.v_px - v) < 1.001) & (np.abs(MAPS.u_px - u) < 1.001)
+    np.testing.assert_array_equal(field.slope_x[~near], clean.slope_x[~near])
+    assert np.isfinite(Reconstructor(CALIBRATION).depth(bad).depth_mm).all()
+
+
+def test_a_black_picture_is_dark_everywhere_and_finite() -> None:
+    heightmap = Reconstructor(CALIBRATION).depth(np.zeros((240, 320, 3), np.uint8))
+    seen = heightmap.flags & int(Flag.OUTSIDE) == 0
+    assert (heightmap.flags[seen] & int(Flag.DARK) != 0).all()
+    assert np.isfinite(heightmap.depth_mm).all()
+
+
+def test_normals_are_unit_and_face_the_camera() -> None:
+    normals = normals_from_slopes(np.float32([[0.5]]), np.float32([[-2.0]]))
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, rtol=1e-6)
+    assert normals[0, 0, 2] < 0
+    assert normals[0, 0, 0] / normals[0, 0, 2] == pytest.approx(0.5)
+
+
+def test_a_picture_of_another_size_is_refused_with_both_sizes() -> None:
+    with pytest.raises(InputError, match="320x240x3") as refusal:
+        Reconstructor(CALIBRATION).depth(np.zeros((480, 640, 3), np.uint8), name="other.png")
+    assert "640x480x3" in str(refusal.value)
+    assert refusal.value.where == "other.png"

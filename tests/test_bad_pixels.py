@@ -1,0 +1,64 @@
+"""Dead and hot pixels are found once, kept, and left out of everything that follows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelpolight_core.bad_pixels import BadPixels, find_bad_pixels, no_bad_pixels
+
+HEIGHT, WIDTH = 60, 80
+
+
+def scene(seed: int) -> np.ndarray:
+    """Return an image whose light runs across it, with noise."""
+    rng = np.random.default_rng(seed)
+    rows, columns = np.indices((HEIGHT, WIDTH))
+    light = 0.3 + 0.3 * (rows / HEIGHT if seed % 2 else columns / WIDTH)
+    return np.asarray(light[..., None] + rng.normal(0.0, 0.004, (HEIGHT, WIDTH, 3)), np.float32)
+
+
+def spoilt(image: np.ndarray) -> np.ndarray:
+    """Return it from a camera with a dead column, a hot row and two bad pixels."""
+    image = image.copy()
+    image[:, 30] = 0.0
+    image[41, :] = 1.0
+    image[10, 50] = 1.0
+    image[20, 60, 1] = 0.0
+    return image
+
+
+def test_lines_and_pixels_are_found_and_nothing_else() -> None:
+    found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))], noise=0.004)
+    wanted = np.zeros((HEIGHT, WIDTH), bool)
+    wanted[:, 30] = wanted[41, :] = wanted[10, 50] = wanted[20, 60] = True
+    assert (found.mask == wanted).all()
+    assert not find_bad_pixels([scene(0), scene(1)], noise=0.004).places.size
+
+
+def test_dirt_in_one_scene_and_specks_are_no_bad_pixels() -> None:
+    dirty, clean = scene(0), scene(1)
+    dirty[10, 50] = 0.0
+    assert not find_bad_pixels([dirty, clean], noise=0.004).places.size
+    for image in (dirty, clean):
+        image[30:36, 40:46] *= 0.5
+    assert not find_bad_pixels([dirty, clean], noise=0.004).places.size
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.uint8, np.uint16])
+def test_what_is_left_out_becomes_what_the_neighbours_show(kind: type) -> None:
+    top = 1.0 if kind is np.float32 else np.iinfo(kind).max
+    clean, other = (np.asarray(scene(n) * top, kind) for n in (0, 1))
+    bad = [np.asarray(spoilt(scene(n)) * top, kind) for n in (0, 1)]
+    found = find_bad_pixels([spoilt(scene(0)), spoilt(scene(1))], noise=0.004)
+    mended = found.left_out(bad[0])
+    assert mended.dtype == kind
+    assert np.abs(mended / top - clean / top).max() < 0.04
+    # The image itself is the caller's.
+    assert bad[0][10, 50, 0] == top
+    assert no_bad_pixels(HEIGHT, WIDTH).left_out(other) is other
+
+
+def test_places_outside_the_image_are_refused() -> None:
+    with pytest.raises(ValueError, match="outside"):
+        BadPixels(np.array([[60, 3]], np.int32), HEIGHT, WIDTH)

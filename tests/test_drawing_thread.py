@@ -1,0 +1,70 @@
+"""Drawings are made one at a time, and do not open a font for each calling thread."""
+
+from __future__ import annotations
+
+import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from matplotlib import rcParams
+from matplotlib.figure import Figure
+
+from gelpolight_core.drawing_thread import THREAD_NAME, in_drawing_thread
+from gelpolight_core.report.drawing import draw
+
+FILES = Path("/proc/self/fd")
+
+
+def open_typefaces() -> int:
+    names = (os.readlink(FILES / name) for name in os.listdir(FILES) if (FILES / name).exists())
+    return sum(name.endswith((".ttf", ".otf", ".ttc")) for name in names)
+
+
+def words(figure: Figure) -> None:
+    figure.text(0.1, 0.5, "height (mm)", fontweight="bold")
+
+
+@pytest.mark.skipif(not FILES.is_dir(), reason="open files can be listed on Linux only")
+def test_typefaces_are_opened_once_whoever_asks_for_a_drawing() -> None:
+    draw("first", 20.0, words)
+    before = open_typefaces()
+    for _ in range(4):
+        thread = threading.Thread(target=draw, args=("another", 20.0, words))
+        thread.start()
+        thread.join()
+    assert before > 0
+    assert open_typefaces() == before
+
+
+def test_drawings_asked_for_at_once_are_made_one_after_the_other() -> None:
+    style = dict(rcParams)
+    meeting = threading.Barrier(3)
+    drawn: list[bytes] = []
+
+    def ask() -> None:
+        meeting.wait()
+        drawn.append(draw("at once", 20.0, words).png)
+
+    with ThreadPoolExecutor(3) as people:
+        for asked in [people.submit(ask) for _ in range(3)]:
+            asked.result()
+    assert len(set(drawn)) == 1
+    assert dict(rcParams) == style
+
+
+def test_a_drawing_within_a_drawing_and_its_errors_come_to_the_caller() -> None:
+    @in_drawing_thread
+    def inner(name: str) -> str:
+        if not name:
+            raise ValueError("without a name")
+        return f"{threading.current_thread().name.rpartition('_')[0]}: {name}"
+
+    @in_drawing_thread
+    def outer(name: str) -> str:
+        return inner(name)
+
+    assert outer("spots") == f"{THREAD_NAME}: spots"
+    with pytest.raises(ValueError, match="without a name"):
+        outer("")

@@ -1,0 +1,53 @@
+"""One definition each of saturated, lit, dark and usable."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gelpolight_core import masks
+from gelpolight_core.reconstruction.near_light.maps import dark_brightness
+from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+
+CORE = Path(masks.__file__).parent
+
+
+def test_the_two_uppermost_numbers_of_eight_bits_are_saturated() -> None:
+    """A camera's 254 may be its 255 with another pedestal; 253 is light."""
+    light = np.array([0, 128, 253, 254, 255]) / 255.0
+    np.testing.assert_array_equal(masks.saturated(light), [False, False, False, True, True])
+
+
+def test_a_node_is_usable_in_view_with_light_and_reflectance_in_all_channels() -> None:
+    valid = np.array([[True, True, True, False]])
+    light = np.array([[[0.5, 0.5, 0.5], [0.5, 0.5, 0.005], [0.5, 0.5, 0.5], [0.5, 0.5, 0.5]]])
+    factors = np.array([[[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]]])
+    np.testing.assert_array_equal(
+        masks.usable(valid, light, factors), [[True, False, False, False]]
+    )
+
+
+@pytest.mark.parametrize("gloss", [0.0, 0.4])
+def test_dark_is_the_brightness_at_grazing_light(gloss: float) -> None:
+    """Lambert's law, and a curve that is twice as bright there."""
+    dark = dark_brightness(Membrane(gloss=gloss))
+    np.testing.assert_allclose(dark, (1.0 - gloss) * masks.DARK_COSINE / np.pi)
+    curve = tuple(np.minimum(2.0 * np.linspace(0.0, 1.0, CURVE_NODES), 1.0).tolist())
+    twice = dark_brightness(Membrane(gloss=gloss, diffuse=(curve,) * 3))
+    np.testing.assert_allclose(twice, 2.0 * dark, rtol=1e-6)
+
+
+def test_no_other_module_of_the_core_has_a_limit_of_its_own_for_saturation() -> None:
+    """The virtual sensor has light code of its own, and height maps a flag of that name."""
+    own = re.compile(r"^SATURATED\s*=|>=?\s*0\.99\d?\b.*satur|satur.*>=?\s*0\.99", re.MULTILINE)
+    found = [
+        str(path.relative_to(CORE))
+        for path in CORE.rglob("*.py")
+        if path.name != "masks.py"
+        and "simulation" not in path.parts
+        and own.search(path.read_text())
+    ]
+    assert not found
