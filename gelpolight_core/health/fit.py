@@ -36,6 +36,11 @@ CORRELATED = 1.6
 ROUGHEST = 9.0
 """A cell whose samples scatter by this variance over the usual one has another texture."""
 LEAST_CELLS = 4
+LEAST_AS_BEFORE = 0.15
+"""A connected share of the field that looks as at calibration: the light has not changed, and the
+rest of the field is pressed, such as by a shallow face."""
+AS_BEFORE_OFF = 0.4
+"""Its light may have changed by this share of the supposed change."""
 WITHOUT_OFFSETS = np.array([0, 2, 4, 6, 7, 8])
 """Room light cannot be told from gain by much; where there is none, the gain alone is surer."""
 
@@ -83,7 +88,8 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     # A saturated sample says nothing of the light.
     usable = full == 0.0
     values = np.zeros(PARAMETERS)
-    first = np.abs(change[:, :6:2] / samples.normal[:, [0, 2, 4], [0, 2, 4]]).max(axis=1)
+    light = change[:, :6:2] / samples.normal[:, [0, 2, 4], [0, 2, 4]]
+    first = np.abs(light).max(axis=1)
     kept = usable & (first < NEAR)
     _outer_part(samples.beside, kept)
     if kept.mean() < LEAST_NEAR:
@@ -101,9 +107,33 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
         samples.normal, samples.count, samples.beside, change, square, usable,
         TOLERANCES, PRECISION, bool(small), values, sd, alone, alone_sd, kept, left,
     )  # fmt: skip
-    if not small and kept.mean() < LEAST_START:
+    before = _as_before(samples, light, light - left) if small else None
+    if before is not None:
+        kept = before
+        _rounds(
+            samples.normal, samples.count, samples.beside, change, square, usable,
+            TOLERANCES[-1:], PRECISION, True, values, sd, alone, alone_sd, kept, left,
+        )  # fmt: skip
+    elif not small and kept.mean() < LEAST_START:
         kept[:] = False
     return CommonChange(values, sd, kept, left, alone[:3], alone_sd[:3])
+
+
+def _as_before(samples: Samples, light: Array, supposed: Array) -> Mask | None:
+    """Return the part of the field whose light has not changed; None where it is too small.
+
+    Parameters
+    ----------
+    samples : Samples
+        The sensor's.
+    light, supposed : (cells, 3)
+        Change of each cell's light, and what of it the fit takes for a change of all the light.
+    """
+    size = float(np.abs(supposed).mean(axis=0).max())
+    around = np.abs(light[samples.beside].mean(axis=1)).max(axis=1)
+    part = np.asarray(around < AS_BEFORE_OFF * size)
+    _outer_part(samples.beside, part)
+    return part if part.mean() > LEAST_AS_BEFORE else None
 
 
 def _gross(samples: Samples, change: Array, usable: Mask) -> Array:
