@@ -107,12 +107,16 @@ def gather_ball_pixels(
 
 def thinned(pixels: BallPixels) -> BallPixels:
     """Return every second pixel of a press."""
+
+    def half(part: Array) -> Array:
+        return np.ascontiguousarray(part[::2])
+
     return BallPixels(
-        pixels.points_mm[::2],
-        pixels.drift[::2],
-        pixels.view[::2],
-        pixels.ratio[::2],
-        pixels.weight[::2],
-        pixels.around[::2],
+        half(pixels.points_mm),
+        half(pixels.drift),
+        half(pixels.view),
+        half(pixels.ratio),
+        half(pixels.weight),
+        half(pixels.around),
         pixels.radius_mm,
     )

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import BOUNCE_REACH_MM, BallPixels, thinned
 from gelpolight_core.calibration.jackknife import jackknife_covariance
+from gelpolight_core.calibration.joint_kernel import CORRELATION
 from gelpolight_core.calibration.joint_problem import (
     COMMON,
-    CORRELATION,
     CURVE_SIZE,
     DECAY,
     Problem,

@@ -10,17 +10,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from gelpolight_core.calibration.ball_pixels import BallPixels
-from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.calibration.joint_kernel import model_press
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.draped_ball import draped_ball
-from gelpolight_core.reflectance.membrane import CURVE_NODES, LEAST_COSINE, Membrane, bounce_weight
+from gelpolight_core.reflectance.membrane import CURVE_NODES
 
 Array = NDArray[np.float64]
 Surface = tuple[Array, Array, NDArray[np.bool_]]
-DARK_COSINE = 0.08
-# Errors of the pixels of one ball are correlated (lens, centre, membrane), so each pixel has a
-# weight below one.
-CORRELATION = 4.0
 LED_LATERAL_SD_MM = 0.05
 LED_HEIGHT_SD_MM = 0.2
 PRIOR_STRENGTH = 3.0
@@ -42,6 +38,7 @@ def _bumps() -> Array:
 
 
 _BUMPS = _bumps()
+_NO_CURVES = np.zeros((3, 0))
 
 
 def curve_terms(cosine: Array) -> Array:
@@ -102,31 +99,19 @@ class Problem:
     def _press(self, x: Array, index: int, seen: Surface) -> tuple[Array, Array, Array, Array]:
         """Return residuals, those from direct light alone, and its cosines, (N, 3)."""
         pixels = self.presses[index]
-        leds = x[:9].reshape(3, 3)
-        surface, normals, on_ball = seen
-        flat = np.concatenate([pixels.points_mm, np.zeros((len(surface), 1))], axis=1)
-        light, distance = light_directions(leds, surface)
-        flat_light, flat_distance = light_directions(leds, flat)
-        gain = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
-        facing = np.einsum("nkc,nc->nk", light, normals)
-        cosine = np.clip(facing, LEAST_COSINE, 1.0)
-        flat_cosine = np.clip(-flat_light[..., 2], LEAST_COSINE, 1.0)
-        if x.size > self.balls_end:
-            rise = curve_terms(cosine) - curve_terms(flat_cosine)
-            heights = x[self.balls_end :].reshape(3, -1)
-            direct = cosine / flat_cosine * np.exp(np.einsum("nkm,km->nk", rise, heights))
-        else:
-            up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
-            membrane = Membrane(float(x[9]), float(x[10]), float(x[11]))
-            direct = membrane.response(light, normals, pixels.view)
-            # A solver step may move an LED above the membrane, where it gives no light.
-            direct /= np.maximum(membrane.response(flat_light, up, pixels.view), LEAST_COSINE)
-        share = np.where(on_ball, x[12], x[13]) * bounce_weight(normals)
-        # Pixels in or near shadow depend on shadows that are not modelled here.
-        lit = np.clip((facing - DARK_COSINE) / DARK_COSINE, 0.0, 1.0)
-        model = gain * direct + share[:, None] * pixels.around
-        weight = pixels.weight * lit / CORRELATION
-        return (model - pixels.ratio) * weight, gain * direct * weight, cosine, flat_cosine
+        result = np.empty((4, *pixels.ratio.shape))
+        model_press(
+            (pixels.points_mm, pixels.view, pixels.ratio, pixels.weight, pixels.around),
+            seen,
+            x[:9].reshape(3, 3),
+            (float(x[9]), float(x[10]), float(x[11])),
+            x[self.balls_end :].reshape(3, -1),
+            _BUMPS,
+            _NO_CURVES,
+            (float(x[12]), float(x[13])),
+            result,
+        )
+        return result[0], result[1], result[2], result[3]
 
     def priors(self, x: Array) -> Array:
         """Return the residuals of the prior knowledge."""

@@ -16,7 +16,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reflectance.membrane import LEAST_COSINE, LEAST_VIEW, Membrane
+from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
 
 Map = NDArray[np.float32]
 WIDE = 4

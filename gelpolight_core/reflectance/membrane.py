@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.reflectance.membrane_kernel import brightness_of_points
+
 Array = NDArray[np.float64]
 MEMBRANES = ("two-lobe", "one-dimensional")
-LEAST_COSINE = 1e-3
-LEAST_VIEW = 1e-2
 # Between so many even cosines a straight line is within 1e-5 of any curve a fit or a hand makes.
 CURVE_NODES = 257
 
@@ -78,28 +78,13 @@ class Membrane:
         -------
         (N, 3)
         """
-        facing = np.einsum("nkc,nc->nk", light, normals)
-        cosine = np.clip(facing, LEAST_COSINE, 1.0)
-        diffuse = (1.0 - self.gloss) * self.diffuse_share(cosine) / np.pi
-        glossy = self.gloss * _glossy_lobe(light, normals, view, cosine, self.roughness)
-        return np.asarray(np.where(facing > 0.0, diffuse + glossy, 0.0))
-
-
-def _glossy_lobe(
-    light: Array, normals: Array, view: Array, cosine: Array, roughness: float
-) -> Array:
-    """Return the GGX lobe times the light's cosine, (N, 3)."""
-    half = light + view[:, None, :]
-    half /= np.sqrt(np.einsum("nkc,nkc->nk", half, half))[..., None]
-    tilt = np.clip(np.einsum("nkc,nc->nk", half, normals), 0.0, 1.0)
-    seen = np.clip(np.einsum("nc,nc->n", view, normals), LEAST_VIEW, 1.0)[:, None]
-    a2 = roughness * roughness
-    facets = a2 / (np.pi * (tilt * tilt * (a2 - 1.0) + 1.0) ** 2)
-
-    def masking(x: Array) -> Array:
-        return np.asarray(2.0 * x / (x + np.sqrt(a2 + (1.0 - a2) * x * x)))
-
-    return np.asarray(facets * masking(cosine) * masking(seen) / (4.0 * seen))
+        result = np.empty(light.shape[:2])
+        lobes = (self.exponent, self.gloss, self.roughness)
+        light, normals, view = (
+            np.ascontiguousarray(part, np.float64) for part in (light, normals, view)
+        )
+        brightness_of_points(light, normals, view, lobes, self.curves, result)
+        return result
 
 
 def bounce_weight(normals: Array) -> Array:
