@@ -4,8 +4,6 @@
 #
 #     sh packaging/oldest.sh         all of the core, and a choice of the windows
 #     sh packaging/oldest.sh thin    from pictures to measured sizes by the commands, and all files; no windows
-#     sh packaging/oldest.sh install, and then
-#     sh packaging/oldest.sh test    the two halves of thin
 #
 # Needs what "sh packaging/setup.sh test" installs from the system. PYTHON=/path/to/python chooses another Python.
 set -eu
@@ -17,9 +15,11 @@ needs_windows="tests/strangers/test_any_spoilt_file.py tests/strangers/test_cloc
     tests/strangers/test_forgeries.py tests/strangers/test_real_disks.py tests/strangers/test_two_programs.py"
 core="tests/command_line/test_without_window_libraries.py tests/export tests/io tests/records tests/session tests/test_house.py"
 windows=
+processes=1 # beside the tests with the locked libraries
 case $how in
-thin | install | test) ;;
+thin) ;;
 whole)
+    processes=2
     # A package is built from the locked versions, never from these.
     core="tests --ignore tests/app --ignore tests/packaging"
     for file in $needs_windows; do core="$core --ignore $file"; done
@@ -27,7 +27,7 @@ whole)
         tests/app/calibrate/test_wizard.py tests/app/inspect/test_inspect_page.py tests/export/test_heightmap_files.py"
     ;;
 *)
-    echo "packaging/oldest.sh: unknown argument \"$how\"; use thin, install, test, or nothing." >&2
+    echo "packaging/oldest.sh: unknown argument \"$how\"; use thin, or nothing." >&2
     exit 2
     ;;
 esac
@@ -48,7 +48,7 @@ entries() { # PROGRAM: the lock's entries whose first line it chooses, with thei
 run_tests() { # PYTEST-ARGUMENT...
     # Functions that another numba has compiled are of no use to this one, nor the other way round.
     env OPENBLAS_NUM_THREADS=1 NUMBA_CACHE_DIR="$PWD/$venv/compiled" "$venv/bin/python" -m pytest \
-        -p no:cacheprovider --numprocesses 2 --dist loadfile "$@"
+        -p no:cacheprovider --numprocesses $processes --dist loadfile "$@"
 }
 
 make_environment() {
@@ -60,8 +60,7 @@ make_environment() {
         --no-index --editable .
 }
 
-[ "$how" = test ] || make_environment
-[ "$how" != install ] || exit 0
+make_environment
 # shellcheck disable=SC2086 # no path of a test holds a space
 run_tests --no-xvfb $core
 

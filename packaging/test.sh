@@ -20,22 +20,29 @@ check() { # NAME COMMAND...
     echo "== $name $verdict in $(($(date +%s) - started)) s"
 }
 
-# These use one core each, so two of them run at a time.
+# One core for the types, and one for the rest.
 check "types of the core" .venv/bin/python -m mypy --strict >"$results/types" 2>&1 &
 types=$!
 check "code style" .venv/bin/python -m ruff check .
 check "formatting" .venv/bin/python -m ruff format --check .
 check "import contracts" .venv/bin/lint-imports
-# Not where only some tests are asked for.
-[ $# -gt 0 ] || check "installation of the oldest libraries" sh packaging/oldest.sh install
 wait "$types"
 cat "$results/types"
+
+# Mostly one long test, beside the others; not where only some tests are asked for.
+if [ $# -eq 0 ]; then
+    check "oldest libraries, and the core without Qt" sh packaging/oldest.sh thin >"$results/oldest" 2>&1 &
+    oldest=$!
+fi
 
 # Two processes share the cores, so that neither needs threads of its own for small matrices.
 # Files stay whole, so that what their tests share is made once; tests/conftest.py sets their order.
 check "tests" env OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest --numprocesses 2 --dist loadfile \
     --no-loadscope-reorder "$@"
-[ $# -gt 0 ] || check "oldest libraries, and the core without Qt" sh packaging/oldest.sh test
+if [ $# -eq 0 ]; then
+    wait "$oldest"
+    cat "$results/oldest"
+fi
 
 echo
 if [ -e "$results/failed" ]; then

@@ -34,23 +34,27 @@ settings.load_profile("repeatable")
 # What pyproject.toml sets for the window's tests means nothing where Qt is not installed.
 SETTINGS_OF_PYTEST_QT = ("qt_api", "qt_log_level_fail")
 
-# Files that take longest begin first, so that no process is left alone with one at the end; what
-# the first of them have made, and compiled, is there when the others need it.
+# Files that take longest begin first, so that no process is left alone with one at the end. While
+# the first file compiles what most others need, the second process runs files that need little of
+# it, so that nothing is compiled twice.
 LONGEST_FIRST = (
     "test_accuracy_on_rendered_sensors.py",
+    "image/test_camera_response.py",
     "app/calibrate/test_wizard.py",
+    "optics/test_pose.py",
+    "app/test_rounds.py",
+    "optics/test_lens.py",
     "reconstruction/test_efforts.py",
     "experiments/test_ablation.py",
     "app/calibrate/test_wizard_killed.py",
     "measurement/test_measure.py",
     "command_line/test_without_window_libraries.py",
     "response/test_bent_sessions.py",
-    "image/test_camera_response.py",
     "reconstruction/test_uncertainty.py",
     "reconstruction/test_best.py",
+    "reflectance/test_detect_ball.py",
     "command_line/test_commands.py",
     "app/live/test_first_calibration.py",
-    "optics/test_pose.py",
 )
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
