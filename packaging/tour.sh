@@ -1,5 +1,5 @@
 #!/bin/sh
-# A tour of the commands on the virtual sensor, from a bare machine on and without a screen: pictures, calibration,
+# A tour of the commands on the virtual sensor, from a bare machine on and without a screen: images, calibration,
 # depth maps, sizes, evaluation.
 set -eu
 cd "$(dirname "$0")/.."
@@ -23,9 +23,9 @@ if [ -e "$out" ]; then
 fi
 mkdir "$out"
 
-step 1 "The virtual sensor takes the pictures of a calibration, and presses with their true sizes." \
+step 1 "The virtual sensor takes the images of a calibration, and presses with their true sizes." \
     simulate "$session"
-step 2 "The pictures become one calibration file; every stage says how good it is." \
+step 2 "The images become one calibration file; every stage says how good it is." \
     calibrate "$session" -o "$calibration" --json "$out/calibration.json"
 
 # The first press of a known shape: truth.csv names the file and the shape in its first two columns.
@@ -33,7 +33,7 @@ truth=$session/presses/truth.csv
 press=$(sed -n 2p "$truth" | cut -d , -f 1)
 shape=$(sed -n 2p "$truth" | cut -d , -f 2)
 
-step 3 "Presses become depth maps in millimetres: as numbers, as pictures, as surfaces for a 3D viewer." \
+step 3 "Presses become depth maps in millimetres: as numbers, as images, as surfaces for a 3D viewer." \
     reconstruct "$calibration" "$session/presses/$press" "$session/presses/object_coin.png" \
     "$session/presses/object_nut.png" -o "$out/depth" --format npz,vtp --pictures
 step 4 "What was pressed in is measured, and compared with its true size." \

@@ -1,4 +1,4 @@
-"""Pictures of a printed checkerboard in any pose, traced ray by ray, for tests of lens and pose."""
+"""Images of a printed checkerboard in any pose, traced ray by ray, for tests of lens and pose."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.session.board import BoardSpec
 
@@ -48,7 +48,7 @@ def render_board(
     blur_px: float = 0.6,
     noise: float = 0.004,
     fine: int = 3,
-) -> Picture:
+) -> LinearImage:
     """Trace fine x fine rays per pixel onto a printed board: white 0.8, black 0.05, around 0.25."""
     u, v = np.meshgrid(np.arange(-1.0, camera.width + 1), np.arange(-1.0, camera.height + 1))
     rays = camera.directions(np.stack([u, v], axis=-1))[..., :2]
@@ -76,4 +76,4 @@ def render_board(
     if blur_px > 0.0:
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur_px))
     rgb = grey[..., None] + rng.normal(0.0, noise, (*grey.shape, 3))
-    return Picture(name, (np.round(np.clip(rgb, 0.0, 1.0) * 255.0) / 255.0).astype(np.float32))
+    return LinearImage(name, (np.round(np.clip(rgb, 0.0, 1.0) * 255.0) / 255.0).astype(np.float32))

@@ -44,7 +44,7 @@ LONGEST_FIRST = (
     "optics/test_pose.py",
     "app/test_rounds.py",
     "optics/test_lens.py",
-    "reconstruction/test_efforts.py",
+    "reconstruction/test_solver_efforts.py",
     "experiments/test_ablation.py",
     "app/calibrate/test_wizard_killed.py",
     "measurement/test_measure.py",
@@ -115,7 +115,7 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
 
 @pytest.fixture(scope="session")
 def virtual_session(made_once: MadeOnce) -> Path:
-    """Return a session folder of the virtual sensor with its truth, at half the picture's size."""
+    """Return a session folder of the virtual sensor with its truth, at half the image's size."""
     from gelpolight_core.design.sensor_design import SensorDesign
     from gelpolight_core.simulation.session import simulate_session
 

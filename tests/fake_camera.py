@@ -53,9 +53,9 @@ class FakeCamera:
     hangs : Event or None
         Opening hangs until this is set.
     stops_after : int or None
-        After so many pictures none comes, and no error either.
+        After so many images none comes, and no error either.
     frozen : bool
-        Whether it gives the same picture again and again.
+        Whether it gives the same image again and again.
     """
 
     device: Device = C310
@@ -128,11 +128,11 @@ class OpenFake:
         self._noise = np.random.default_rng(1).normal(0.0, 1.0, size)
 
     def read(self) -> tuple[NDArray[np.uint8], float] | None:
-        """Return the next picture: an even grey whose level follows exposure, gain and light."""
+        """Return the next image: an even grey whose level follows exposure, gain and light."""
         camera = self._camera
         time.sleep(camera.period_s)
         if not camera.plugged:
-            raise CameraGone("the camera gives no more pictures", where=camera.device.name,
+            raise CameraGone("the camera gives no more images", where=camera.device.name,
                              advice="Check its cable")  # fmt: skip
         if camera.stops_after is not None and self._number >= camera.stops_after:
             time.sleep(0.02)
@@ -142,9 +142,9 @@ class OpenFake:
             3.0 * camera.settings["exposure_ms"].value if "exposure_ms" in camera.settings else 90
         )
         noise = np.roll(self._noise, self._number, axis=0)
-        picture = np.clip(level * camera.light(self._number) + noise, 0.0, 255.0)
+        image = np.clip(level * camera.light(self._number) + noise, 0.0, 255.0)
         # What the scene has most of is red, then green: an exchange of the channels is seen.
-        return (picture * np.array([1.0, 0.8, 0.6])).astype(np.uint8), time.monotonic()
+        return (image * np.array([1.0, 0.8, 0.6])).astype(np.uint8), time.monotonic()
 
     def controls(self) -> tuple[Setting, ...]:
         """Return the settings; while the camera sets one by itself it cannot be written."""

@@ -1,4 +1,4 @@
-"""Recordings that tests write, of pictures that nobody else made."""
+"""Recordings that tests write, of images that nobody else made."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gelpolight_core.recording.writer import RecordingWriter
 
 
 def noisy(number: int, shape: tuple[int, int] = (24, 32), kind: type = np.uint8) -> Rgb:
-    """Return a shaded picture with noise that tells its number."""
+    """Return a shaded image with noise that tells its number."""
     rng = np.random.default_rng(number)
     rows, columns = np.mgrid[: shape[0], : shape[1]]
     even = 0.3 + 0.4 * rows[..., None] / shape[0] + 0.2 * columns[..., None] / shape[1]
@@ -28,9 +28,9 @@ def write_recording(
     kind: type = np.uint8,
     header: RecordingHeader | None = None,
 ) -> list[Rgb]:
-    """Write a recording; return its pictures."""
-    pictures = [noisy(number, shape, kind) for number in range(frames)]
+    """Write a recording; return its images."""
+    images = [noisy(number, shape, kind) for number in range(frames)]
     with RecordingWriter(path, header or RecordingHeader()) as writer:
-        for number, rgb in enumerate(pictures):
+        for number, rgb in enumerate(images):
             writer.append(rgb, number, 100.0 + number / rate_hz)
-    return pictures
+    return images

@@ -1,4 +1,4 @@
-"""A small sensor whose pictures are shaded from the formula, for tests of single stages.
+"""A small sensor whose images are shaded from the formula, for tests of single stages.
 
 It has no refraction to speak of and no noise unless asked; the virtual sensor is the physical one.
 """
@@ -59,8 +59,8 @@ def calibration() -> Calibration:
     )
 
 
-def raw_picture(slopes: np.ndarray, cal: Calibration) -> np.ndarray:
-    """Return the raw picture (height, width, 3) of a membrane with given slopes, lights frozen.
+def raw_image(slopes: np.ndarray, cal: Calibration) -> np.ndarray:
+    """Return the raw image (height, width, 3) of a membrane with given slopes, lights frozen.
 
     Parameters
     ----------

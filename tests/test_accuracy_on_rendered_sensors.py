@@ -19,7 +19,7 @@ from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_sessi
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 
 
@@ -34,7 +34,7 @@ class Sensor:
 
 @pytest.fixture(scope="module", params=["sensor-A", "sensor-B"])
 def sensor(request: pytest.FixtureRequest, shared_data: Path) -> Sensor:
-    """Calibrate a rendered session from its pictures alone."""
+    """Calibrate a rendered session from its images alone."""
     folder = shared_data / request.param
     truth = json.loads((folder / "truth.json").read_text())
     return Sensor(folder, truth, calibrate_session(read_session(folder), model="full"))
@@ -102,10 +102,10 @@ def test_depth_maps_and_measured_sizes_are_within_their_bars(sensor: Sensor, mod
     with (sensor.folder / "presses" / "truth.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     for row in rows:
-        picture = read_picture(sensor.folder / "presses" / row["file"])
-        health = reconstruct.health(picture.rgb)
+        image = read_image(sensor.folder / "presses" / row["file"])
+        health = reconstruct.health(image.rgb)
         assert not health.findings, row["file"]
-        heightmap = reconstruct.depth(picture.rgb, name=picture.name, health=health)
+        heightmap = reconstruct.depth(image.rgb, name=image.name, health=health)
         height_mm = float(row["height_mm"])
         truth = sensor.folder / "truth" / f"{Path(row['file']).stem}.npz"
         measured = measure_object(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from app.live.image_checks import Rgb, end_of_scale
 from app.live.overlay import Overlay
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.optics.checkerboard import BoardView
 from gelpolight_core.quality import Figure, QualityTable, Verdict
@@ -72,10 +72,10 @@ def read_raw(path: Path) -> Rgb:
     return np.ascontiguousarray(read_raw_image(path)[0])
 
 
-def as_picture(rgb: Rgb, name: str = "") -> Picture:
-    """Return a frame (rows, columns, 3) as a core Picture: float32, 0..1."""
+def as_image(rgb: Rgb, name: str = "") -> LinearImage:
+    """Return a frame (rows, columns, 3) as a core LinearImage: float32, 0..1."""
     values = rgb.astype(np.float32) / np.float32(end_of_scale(rgb))
-    return Picture(name, values, bit_depth=8 * rgb.dtype.itemsize)
+    return LinearImage(name, values, bit_depth=8 * rgb.dtype.itemsize)
 
 
 def sentence_of(refusal: InputError) -> str:

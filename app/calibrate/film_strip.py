@@ -17,7 +17,7 @@ from app.theme import theme
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import decode_picture
+from gelpolight_core.image.file import decode_image
 from gelpolight_core.translation import tr
 
 THUMB = QSize(104, 78)
@@ -181,7 +181,7 @@ class FilmStrip(QListWidget):
 def thumbnail(path: Path) -> QPixmap:
     """Return a thumbnail of an image file; an empty one if the file cannot be read."""
     try:
-        raw = decode_picture(path, cv2.IMREAD_REDUCED_COLOR_8)
+        raw = decode_image(path, cv2.IMREAD_REDUCED_COLOR_8)
     except InputError:  # reported where the image is used
         raw = None
     if raw is None:

@@ -42,7 +42,7 @@ class ImageArea(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        named(self, "calibrate.pictures", tr("Images of this step"))
+        named(self, "calibrate.images", tr("Images of this step"))
         self.view = LiveView()
         self.maps = MapsView()
         self.strip = FilmStrip()

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import as_picture, read_raw
+from app.calibrate.detection import as_image, read_raw
 from app.live.image_checks import Rgb
 from app.live.overlay import Mask
 from gelpolight_core.factors.bare_membrane import SHRINK
@@ -41,7 +41,7 @@ class KnownImage:
 
 def refuse_grey(rgb: Rgb) -> None:
     """Raise InputError if the image has no colours."""
-    require_colour(as_picture(rgb[::SHRINK, ::SHRINK]), where=tr("Image"))
+    require_colour(as_image(rgb[::SHRINK, ::SHRINK]), where=tr("Image"))
 
 
 def enlarged(mask: Mask2, rgb: Rgb) -> Mask2:

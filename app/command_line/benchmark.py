@@ -12,7 +12,7 @@ from app.command_line.reconstructing import add_effort, add_model, load_reconstr
 from app.command_line.terminal import say
 from gelpolight_core.experiments.benchmark import benchmark_frame
 from gelpolight_core.io.atomic import refuse_unwritable
-from gelpolight_core.session.images import read_picture, require_colour
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -35,9 +35,9 @@ def run(options: argparse.Namespace) -> int:
     reconstructor = load_reconstructor(
         options.calibration, model=options.model, effort=options.effort
     )
-    picture = read_picture(options.image)
-    require_colour(picture, where=str(options.image))
-    frame = np.round(picture.rgb * (2**picture.bit_depth - 1)).astype(f"u{picture.bit_depth // 8}")
+    image = read_image(options.image)
+    require_colour(image, where=str(options.image))
+    frame = np.round(image.rgb * (2**image.bit_depth - 1)).astype(f"u{image.bit_depth // 8}")
     result = benchmark_frame(reconstructor, frame, repeats=max(options.repeats, 1))
     rows = [*result.steps, result.total, result.plain]
     step, median, p95, size = tr("step"), tr("median ms"), tr("p95 ms"), tr("MB")

@@ -73,7 +73,7 @@ def reflection_lines(reflections: Sequence[Reflection]) -> list[str]:
     lines = [tr("pixels where a face would mirror an LED if there were air behind it:")]
     for r in reflections:
         position = tr("pixel ({u:.0f}, {v:.0f})").format(u=r.pixel[0], v=r.pixel[1])
-        seen = tr("inside the image") if r.in_picture else tr("outside the image")
+        seen = tr("inside the image") if r.in_image else tr("outside the image")
         lines.append(f"  {r.led}  {r.face:<18} {position:<22} {seen}, {100 * r.reflectance:.1f} %")
     return lines
 

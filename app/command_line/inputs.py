@@ -14,12 +14,12 @@ from tqdm import tqdm
 
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture, linear_image
+from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.recording.matching import recording_notes, require_match
 from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture, require_colour
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -42,7 +42,7 @@ class Input:
     name: str
     stem: str
     where: str
-    read: Callable[[CameraResponse | None], Picture]
+    read: Callable[[CameraResponse | None], LinearImage]
 
 
 class Inputs:
@@ -157,13 +157,13 @@ def _of_file(path: Path) -> Input:
     return Input(path.name, path.stem, str(path), partial(_read_file, path))
 
 
-def _read_file(path: Path, response: CameraResponse | None) -> Picture:
-    picture = read_picture(path, response=response)
-    require_colour(picture, where=str(path))
-    return picture
+def _read_file(path: Path, response: CameraResponse | None) -> LinearImage:
+    image = read_image(path, response=response)
+    require_colour(image, where=str(path))
+    return image
 
 
 def _read_frame(
     recording: Recording, index: int, name: str, response: CameraResponse | None
-) -> Picture:
+) -> LinearImage:
     return linear_image(recording.frame(index).rgb, name, response=response)

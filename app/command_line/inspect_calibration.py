@@ -78,7 +78,7 @@ def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
         (tr("made"), f"{c.provenance.created} {c.provenance.operator}".strip()),
         (tr("program"), c.provenance.program_version),
         (tr("session"), f"{c.provenance.session} ({len(c.provenance.sources)} files)"),
-        (tr("picture"), f"{c.camera.width}x{c.camera.height} px"),
+        (tr("image"), f"{c.camera.width}x{c.camera.height} px"),
         (tr("camera response"), response_text(c.response)),
         (tr("scale"), tr("{s:.5f} mm per px, sd {sd:.2g} %").format(
             s=grid.mm_per_px, sd=100.0 * model.scale_sd)),

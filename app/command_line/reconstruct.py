@@ -91,15 +91,15 @@ def run(options: argparse.Namespace) -> int:
         make_folder(options.output)
         refused = 0
         for item in inputs:
-            picture = item.read(reconstructor.calibration.response)
-            health = reconstructor.health(picture.rgb, name=item.name)
+            image = item.read(reconstructor.calibration.response)
+            health = reconstructor.health(image.rgb, name=item.name)
             fault = health.meaningless
             if fault is not None and not options.despite_faults:
                 refused += 1
                 say(f"gelpolight: {item.where}: {fault.line}", file=sys.stderr)
                 continue
             heightmap = reconstructor.depth(
-                picture.rgb, name=item.name, uncertainty=options.uncertainty, health=health
+                image.rgb, name=item.name, uncertainty=options.uncertainty, health=health
             )
             write_heightmap(heightmap, options.output, formats=formats)
             if options.explain and heightmap.trace is not None:
@@ -107,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
             for note in heightmap.notes:
                 tqdm.write(f"{item.where}: {note}", file=sys.stderr)
             if options.pictures:
-                write_preview(heightmap, picture.rgb, options.output / f"{item.stem}.png")
+                write_preview(heightmap, image.rgb, options.output / f"{item.stem}.png")
     saved = len(inputs.items) - refused
     say(tr("{n} depth maps saved to {folder}").format(n=saved, folder=options.output))
     if refused:

@@ -13,7 +13,7 @@ from gelpolight_core.reconstruction.in_place.calibration import MODEL as IN_PLAC
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS, Trace
 from gelpolight_core.sensor_calibration import MODELS
-from gelpolight_core.session.images import read_picture, require_colour
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -66,9 +66,9 @@ def load_reconstructor(
 
 def read_frame(path: Path, reconstructor: Reconstructor) -> NDArray[np.float32]:
     """Read a colour image as linear light, for a reconstructor's camera."""
-    picture = read_picture(path, response=reconstructor.calibration.response)
-    require_colour(picture, where=str(path))
-    return picture.rgb
+    image = read_image(path, response=reconstructor.calibration.response)
+    require_colour(image, where=str(path))
+    return image.rgb
 
 
 def trace_lines(trace: Trace) -> list[str]:

@@ -15,7 +15,7 @@ from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.io.user import user_name
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.session.closed import ClosedSession, read_any_session
-from gelpolight_core.session.images import average, read_picture, require_colour
+from gelpolight_core.session.images import average, read_image, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -72,7 +72,7 @@ def _refreshed(calibration: InPlaceCalibration, options: argparse.Namespace) -> 
                 advice=tr("Name a session whose session.toml has a table [in_place]"),
             )
         return repaired(calibration, session).calibration
-    images = [read_picture(path, response=calibration.response) for path in options.background]
+    images = [read_image(path, response=calibration.response) for path in options.background]
     for path, image in zip(options.background, images, strict=True):
         require_colour(image, where=str(path))
     made = datetime.now(UTC).isoformat(timespec="seconds")

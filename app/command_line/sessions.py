@@ -17,5 +17,5 @@ def session_files(session: Session | ClosedSession) -> tuple[Path, ...]:
         stages = session.stages
     else:
         stages = (*session.optional_stages, *STAGES)
-    pictures = (path for stage in stages for path in session.captured(stage))
-    return (session.folder / DESCRIPTION, session.folder / DECISIONS, *pictures)
+    images = (path for stage in stages for path in session.captured(stage))
+    return (session.folder / DESCRIPTION, session.folder / DECISIONS, *images)

@@ -15,14 +15,14 @@ from app.services.jobs import Job, Jobs
 from app.widgets.inputs import ComboBox
 from app.widgets.label import plain_tip
 from app.widgets.naming import named
-from gelpolight_core.reconstruction.efforts import (
-    CLOSED_WAYS,
+from gelpolight_core.reconstruction.modes import (
+    CLOSED_MODES,
     FOUND,
     FULL,
     IN_PLACE,
+    MODES,
     PAPER,
-    WAYS,
-    Way,
+    Mode,
 )
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.translation import tr
@@ -52,7 +52,7 @@ class ModeBox(ComboBox):
         self.setMinimumContentsLength(WIDTH_CHARACTERS)
         self.setEnabled(False)
 
-    def show_modes(self, modes: tuple[Way, ...], chosen: Way | None) -> None:
+    def show_modes(self, modes: tuple[Mode, ...], chosen: Mode | None) -> None:
         """Offer these modes. None: there is no calibration."""
         with QSignalBlocker(self):
             self.clear()
@@ -62,7 +62,7 @@ class ModeBox(ComboBox):
         self.setEnabled(len(modes) > 1)
         self.show_times({})
 
-    def show_times(self, times_ms: Mapping[Way, float]) -> None:
+    def show_times(self, times_ms: Mapping[Mode, float]) -> None:
         """Write the measured times next to the modes."""
         for index in range(self.count()):
             text = mode_text(self.itemData(index), times_ms.get(self.itemData(index)))
@@ -101,25 +101,25 @@ class ModeChoice(QObject):
         self._live: Reconstructor | None = None
         self._best: Reconstructor | None = None
         self._paper: Reconstructor | None = None
-        self._times: dict[Way, deque[float]] = {}
+        self._times: dict[Mode, deque[float]] = {}
         self._last: Shown | None = None
 
     @property
-    def mode(self) -> Way:
+    def mode(self) -> Mode:
         """The mode in the settings, or the default if that one is not available."""
-        kept = Way(*self._context.settings.reconstruction)
-        return kept if kept in WAYS else Way()
+        kept = Mode(*self._context.settings.reconstruction)
+        return kept if kept in MODES else Mode()
 
     def offer(self, live: Reconstructor | None, best: Reconstructor | None) -> None:
         """Offer the modes of a calibration, and continue with the mode selected before."""
         self._live, self._best = live, best
         self._paper = live if live is not None and live.model == PAPER else None
         self._times.clear()
-        modes = () if live is None else WAYS
+        modes = () if live is None else MODES
         if self._paper is not None:
-            modes = tuple(mode for mode in WAYS if mode.model == PAPER)
+            modes = tuple(mode for mode in MODES if mode.model == PAPER)
         if live is not None and live.model == IN_PLACE:
-            modes = CLOSED_WAYS
+            modes = CLOSED_MODES
         self.box.show_modes(modes, self.mode if self.mode in modes else next(reversed(modes), None))
         self._choose()
 
@@ -130,7 +130,7 @@ class ModeChoice(QObject):
             return
         self._last = shown
         if heightmap.depth_sd_mm is None:  # a frame with other, longer work
-            mode = Way(
+            mode = Mode(
                 heightmap.model, heightmap.trace.effort if heightmap.model == FULL else "best"
             )
             self._times.setdefault(mode, deque(maxlen=TIMED)).append(shown.depth_ms)
@@ -175,7 +175,7 @@ class ModeChoice(QObject):
         self._jobs.submit(Job(tr("Preparing the paper's model"), work, done))
 
 
-def mode_text(mode: Way, milliseconds: float | None) -> str:
+def mode_text(mode: Mode, milliseconds: float | None) -> str:
     """Return the label of a mode with its errors, and its time if that is known."""
     found = FOUND.get(mode)
     if found is None:  # the calibration's quality table states them

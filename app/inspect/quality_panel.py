@@ -14,9 +14,9 @@ from app.view2d.quantities import FLAG_COLOURS
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
-from gelpolight_core.reconstruction.efforts import PAPER
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.misfit import Misfit
+from gelpolight_core.reconstruction.modes import PAPER
 from gelpolight_core.translation import tr
 
 TELL_EVERY = 10

@@ -259,7 +259,7 @@ class Views(QMainWindow):
     def show_pixel(self, pixel: tuple[float, float] | None) -> None:
         """Mark a pixel in the camera image."""
         markers = () if pixel is None else (Marker(*pixel, "cross", "info"),)
-        width, height = self.camera.picture_size
+        width, height = self.camera.image_size
         self.camera.overlay.set_overlay(Overlay(markers=markers), (max(width, 1), max(height, 1)))
 
     def follow_source(self) -> None:

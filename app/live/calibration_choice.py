@@ -46,7 +46,7 @@ class CalibrationBox(ComboBox):
             self.addItem(tr("No calibration"), None)
             for entry in entries:
                 if entry.summary is not None:
-                    size = "x".join(map(str, entry.summary.picture_size))
+                    size = "x".join(map(str, entry.summary.image_size))
                     self.addItem(entry.name, str(entry.path))
                     tip = plain_tip(f"{entry.serial}, {entry.summary.identity}, {size}")
                     self.setItemData(self.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
@@ -123,9 +123,7 @@ class CalibrationChoice(QObject):
         """Put the newest calibration that fits such images into use. Empty and None fit all."""
         for entry in self.entries:
             summary = entry.summary
-            if summary is not None and Known(summary.serial, summary.picture_size).fits(
-                serial, size
-            ):
+            if summary is not None and Known(summary.serial, summary.image_size).fits(serial, size):
                 self._use(entry.path)
                 return
 

@@ -156,7 +156,7 @@ class LiveDepth(QObject):
             serial=self.live.serial,
             size=self._size,
             used=used,
-            calibrations=tuple(Known(s.serial, s.picture_size) for s in summaries if s is not None),
+            calibrations=tuple(Known(s.serial, s.image_size) for s in summaries if s is not None),
             trouble=self._lost or self._failure,
             fault=self._fault,
             reading=self.calibrations.is_reading,

@@ -101,7 +101,7 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
         self._placeholder.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
     @property
-    def picture_size(self) -> tuple[int, int]:
+    def image_size(self) -> tuple[int, int]:
         """(width, height) in pixels; (0, 0) without an image."""
         return self._size
 

@@ -300,7 +300,7 @@ class LiveView(QWidget):
         self._image.overlay.set_overlay(shown, self._drawing_size())
 
     def _drawing_size(self) -> tuple[int, int]:
-        width, height = self._image.picture_size
+        width, height = self._image.image_size
         return max(width, 1), max(height, 1)
 
     # Tools

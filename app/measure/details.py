@@ -217,7 +217,7 @@ class Details(QTabWidget):
         self._show_held()
 
     def _mark_camera(self) -> None:
-        width, height = self.camera.picture_size
+        width, height = self.camera.image_size
         lines = [
             Line(pixels, ROLES[self._state(tool)])
             for tool in self._drawn

@@ -20,7 +20,7 @@ from app.measure.sheet import Sheet
 from app.sources.source import Frame
 from app.view2d.display import Display
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.proposal import Proposal, propose
@@ -29,7 +29,7 @@ from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture, require_colour
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 _LOG = logging.getLogger(__name__)
@@ -56,7 +56,7 @@ class MeasuredImage:
     frame: Frame | None = None
     serial: str = ""
 
-    def picture(self, response: CameraResponse | None) -> Picture:
+    def image(self, response: CameraResponse | None) -> LinearImage:
         """Return it as linear light.
 
         Raises
@@ -65,12 +65,12 @@ class MeasuredImage:
             If the file cannot be used, or the image is greyscale.
         """
         if self.path is not None:
-            picture = read_picture(self.path, response=response)
+            image = read_image(self.path, response=response)
         else:
             assert self.frame is not None
-            picture = Picture(self.name, _linear(self.frame.rgb, response))
-        require_colour(picture, where=self.name)
-        return picture
+            image = LinearImage(self.name, _linear(self.frame.rgb, response))
+        require_colour(image, where=self.name)
+        return image
 
 
 def _linear(
@@ -172,10 +172,10 @@ class Measuring:
         if question.image is not self._image or self._shown is None:
             self._image = None
             _require_sensor(question.image, question.calibration)
-            picture = question.image.picture(question.calibration.response)
+            image = question.image.image(question.calibration.response)
             name = question.image.name
-            heightmap = measurable_depth(reconstructor, picture.rgb, name=name)
-            self._shown = heightmap, map_image(heightmap, Display()), picture.rgb
+            heightmap = measurable_depth(reconstructor, image.rgb, name=name)
+            self._shown = heightmap, map_image(heightmap, Display()), image.rgb
             self._image, self._results = question.image, {}
         return self._shown
 

@@ -219,11 +219,11 @@ class ProtocolWork(QObject):
             self.gone.emit()
 
     def _measure(self, press: PressWanted) -> None:
-        picture, shape, ledger = self.run.picture(press), press.truth.shape, self._equipped.ledger
+        image, shape, ledger = self.run.image(press), press.truth.shape, self._equipped.ledger
 
         def work(tell: Callable[[float], None]) -> Measurement | str:
             tell(0.0)
-            return measure_press(picture, shape, self._measure_press, ledger)
+            return measure_press(image, shape, self._measure_press, ledger)
 
         def done(outcome: Measurement | str) -> None:
             # It may have been discarded meanwhile.

@@ -114,7 +114,7 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
 
 def facts(entry: Entry, summary: CalibrationSummary) -> str:
     """Return the origin of a calibration, and its validation."""
-    width, height = summary.picture_size
+    width, height = summary.image_size
     lines = [
         tr("Sensor {serial}, model {model}, images of {w} x {h} px").format(
             serial=summary.serial, model=summary.model, w=width, h=height

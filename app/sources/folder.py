@@ -11,7 +11,7 @@ import numpy as np
 
 from app.sources.source import Frame, Rgb, Setting, SourceLost
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.images import SUFFIXES, read_picture
+from gelpolight_core.session.images import SUFFIXES, read_image
 from gelpolight_core.translation import tr
 
 # Decoding takes longer than a frame at 30 Hz; images within this limit are decoded only once.
@@ -57,7 +57,7 @@ class FolderSource:
                 where=str(self.folder),
                 advice=tr("Choose a folder that contains images"),
             )
-        self.size = read_picture(files[0]).size
+        self.size = read_image(files[0]).size
         self._files = files
 
     def frame(self, timeout_s: float) -> Frame | None:
@@ -80,7 +80,7 @@ class FolderSource:
                 where=str(self.folder),
                 advice=tr("Open the folder again to restart"),
             )
-        rgb = self._picture(self._number % len(self._files))
+        rgb = self._image(self._number % len(self._files))
         # A folder waits for its reader, so no frame is ever lost.
         now = time.monotonic()
         self._due_s = max(due_s + 1.0 / self._rate_hz, now)
@@ -109,21 +109,21 @@ class FolderSource:
         self._files = ()
         self._kept.clear()
 
-    def _picture(self, index: int) -> Rgb:
+    def _image(self, index: int) -> Rgb:
         if index in self._kept:
             return self._kept[index]
-        picture = read_picture(self._files[index])
-        if picture.size != self.size:
+        image = read_image(self._files[index])
+        if image.size != self.size:
             raise InputError(
                 tr("the image has {a} pixels, but the first image of the folder has {b}").format(
-                    a="x".join(map(str, picture.size)), b="x".join(map(str, self.size))
+                    a="x".join(map(str, image.size)), b="x".join(map(str, self.size))
                 ),
                 where=str(self._files[index]),
                 advice=tr("Use a folder with images of one size"),
             )
-        full = 2**picture.bit_depth - 1
-        kind = np.uint8 if picture.bit_depth == 8 else np.uint16
-        rgb: Rgb = np.rint(picture.rgb * np.float32(full)).astype(kind)
+        full = 2**image.bit_depth - 1
+        kind = np.uint8 if image.bit_depth == 8 else np.uint16
+        rgb: Rgb = np.rint(image.rgb * np.float32(full)).astype(kind)
         rgb.flags.writeable = False
         if rgb.nbytes + sum(kept.nbytes for kept in self._kept.values()) <= _KEPT_BYTES:
             self._kept[index] = rgb

@@ -1,4 +1,4 @@
-"""A large button with a picture, a title, and lines of text."""
+"""A large button with an image, a title, and lines of text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
 
-PICTURE = QSize(96, 64)
+IMAGE = QSize(96, 64)
 SIGN = QSize(28, 28)
 
 
@@ -33,7 +33,7 @@ class Card(QAbstractButton):
     title : str
         What a click does.
     sign : str
-        Name of the icon that is shown while there is no picture.
+        Name of the icon that is shown while there is no image.
     parent : QWidget
         Parent widget.
     """
@@ -46,15 +46,15 @@ class Card(QAbstractButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
         self._sign = sign
-        self._picture = PlainLabel(parent=self)
-        self._picture.setFixedSize(PICTURE)
-        self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._image = PlainLabel(parent=self)
+        self._image.setFixedSize(IMAGE)
+        self._image.setAlignment(Qt.AlignmentFlag.AlignCenter)
         heading = PlainLabel(title.replace("&", ""), self)
         make_bold(heading)
         self._lines = PlainLabel(parent=self)
         self._lines.setWordWrap(True)
         self._lines.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
-        for label in (self._picture, heading, self._lines):
+        for label in (self._image, heading, self._lines):
             label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         words = QVBoxLayout()
         words.setSpacing(2)
@@ -64,10 +64,10 @@ class Card(QAbstractButton):
         words.addStretch(1)
         row = QHBoxLayout(self)
         row.setContentsMargins(10, 8, 12, 8)
-        row.addWidget(self._picture)
+        row.addWidget(self._image)
         row.addSpacing(6)
         row.addLayout(words, 1)
-        self.show_picture(None)
+        self.show_image(None)
 
     def say(self, text: str) -> None:
         """Show lines of text below the title."""
@@ -76,14 +76,14 @@ class Card(QAbstractButton):
         self.setAccessibleDescription(text)
         self.updateGeometry()
 
-    def show_picture(self, picture: QPixmap | None) -> None:
-        """Show a picture, or the sign."""
-        if picture is None or picture.isNull():
-            self._picture.setPixmap(icon(self._sign).pixmap(SIGN))
+    def show_image(self, image: QPixmap | None) -> None:
+        """Show an image, or the sign."""
+        if image is None or image.isNull():
+            self._image.setPixmap(icon(self._sign).pixmap(SIGN))
             return
-        self._picture.setPixmap(
-            picture.scaled(
-                PICTURE,
+        self._image.setPixmap(
+            image.scaled(
+                IMAGE,
                 Qt.AspectRatioMode.KeepAspectRatio,
                 Qt.TransformationMode.SmoothTransformation,
             )

@@ -10,7 +10,7 @@ from PySide6.QtGui import QImageReader, QPixmap
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from app.context.context import AppContext
-from app.start.card import PICTURE, Card
+from app.start.card import IMAGE, Card
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
@@ -97,7 +97,7 @@ class StartPage(QWidget):
         self.use.setVisible(self._calibration is not None)
         if self._session is not None:
             self.go_on.say(session_text(self._session))
-            self.go_on.show_picture(_picture(self._session))
+            self.go_on.show_image(_image(self._session))
         if self._calibration is not None:
             self.use.say(calibration_text(self._calibration))
 
@@ -170,7 +170,7 @@ def _when(time: datetime) -> str:
     return f"{local:%Y-%m-%d %H:%M}"
 
 
-def _picture(session: SessionEntry) -> QPixmap | None:
+def _image(session: SessionEntry) -> QPixmap | None:
     """Return the newest image of a session, or None if it is missing, too large or not readable."""
     if session.newest is None:
         return None
@@ -178,5 +178,5 @@ def _picture(session: SessionEntry) -> QPixmap | None:
     size = reader.size()
     if not size.isValid() or 4 * size.width() * size.height() > MOST_BYTES:
         return None
-    reader.setScaledSize(size.scaled(PICTURE * 2, Qt.AspectRatioMode.KeepAspectRatio))
+    reader.setScaledSize(size.scaled(IMAGE * 2, Qt.AspectRatioMode.KeepAspectRatio))
     return QPixmap.fromImageReader(reader)

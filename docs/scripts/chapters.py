@@ -218,7 +218,7 @@ def step_table(figures: Figures) -> str:
     """Return the time of each step by mode."""
     modes = list(figures.steps)
     names = list(dict.fromkeys(r["name"] for rows in figures.steps.values() for r in rows))
-    last = ("picture to depth", "memory copy")
+    last = ("image to depth", "memory copy")
     names = [n for n in names if n not in last] + list(last)
     rows = []
     for name in names:
@@ -226,7 +226,7 @@ def step_table(figures: Figures) -> str:
         for mode in modes:
             found = [r for r in figures.steps[mode] if r["name"] == name]
             cells.append(f"{found[0]['median_ms']:.1f}" if found else "")
-        label = "image to depth" if name == "picture to depth" else name
+        label = "image to depth" if name == "image to depth" else name
         rows.append((f"**{label}**" if name == last[0] else label, *cells))
     return table(("step, ms", *modes), rows)
 
@@ -280,10 +280,10 @@ def write(figures: Figures) -> None:
 
 
 def save(name: str, height_mm: float, paint: Callable[[Any], None]) -> None:
-    """Save a diagram as a small WebP picture."""
+    """Save a diagram as a small WebP image."""
     png = draw("", height_mm, paint).png
-    picture = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
-    done, data = cv2.imencode(".webp", picture, [cv2.IMWRITE_WEBP_QUALITY, 70])
+    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+    done, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, 70])
     assert done
     (DOCS / "diagrams" / f"{name}.webp").write_bytes(data.tobytes())
 

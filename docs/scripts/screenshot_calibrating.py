@@ -148,7 +148,7 @@ def balls(operator: Operator) -> Path:
 
 
 def lay(operator: Operator) -> None:
-    """Put on the bench what the step asks for, and wait until it is found in the picture."""
+    """Put on the bench what the step asks for, and wait until it is found in the image."""
     found: list[bool] = []
 
     def note(item: object) -> None:
@@ -164,7 +164,7 @@ def lay(operator: Operator) -> None:
 
 
 def captures(operator: Operator, step: str, count: int, *, laid: bool = False) -> None:
-    """Capture so many pictures for a step; `laid`: the first one lies on the bench already."""
+    """Capture so many images for a step; `laid`: the first one lies on the bench already."""
     shown = wizard(operator)
     if shown.open.step.key != step:
         shown.go_to(step)

@@ -1,4 +1,4 @@
-"""The scene of a camera's settings; the camera is that of the tests, with a sensor's picture."""
+"""The scene of a camera's settings; the camera is that of the tests, with a sensor's image."""
 
 from __future__ import annotations
 
@@ -34,33 +34,33 @@ class SensorCamera(FakeDriver):
 
     Parameters
     ----------
-    picture : Path
+    image : Path
         What it sees, at the exposure that it is shipped with.
     """
 
-    def __init__(self, picture: Path) -> None:
+    def __init__(self, image: Path) -> None:
         super().__init__(FakeCamera(device=WEBCAM, formats=FORMATS))
-        self._picture = picture
+        self._image = image
 
     def open(self, device: Device, wanted: Format | None) -> OpenFake:
         """Open it at once."""
         super().open(device, wanted)
-        return OpenSensorCamera(self.cameras[0], wanted, self._picture)
+        return OpenSensorCamera(self.cameras[0], wanted, self._image)
 
 
 class OpenSensorCamera(OpenFake):
-    """Gives the picture again and again, with a little noise."""
+    """Gives the image again and again, with a little noise."""
 
-    def __init__(self, camera: FakeCamera, wanted: Format | None, picture: Path) -> None:
+    def __init__(self, camera: FakeCamera, wanted: Format | None, image: Path) -> None:
         super().__init__(camera, wanted)
         size = self.format.width, self.format.height
-        bgr = cv2.resize(cv2.imread(str(picture)), size)
+        bgr = cv2.resize(cv2.imread(str(image)), size)
         self._rgb = np.ascontiguousarray(bgr[..., ::-1]).astype(np.int16)
         self._grain = np.random.default_rng(1).integers(-2, 3, self._rgb.shape, np.int16)
         self._began_s = time.monotonic() + AHEAD_S
 
     def read(self) -> tuple[NDArray[np.uint8], float] | None:
-        """Return the next picture; its time is the promised one, whatever else the machine does."""
+        """Return the next image; its time is the promised one, whatever else the machine does."""
         time.sleep(1.0 / RATE_HZ)
         self._number += 1
         rgb = self._rgb + np.roll(self._grain, self._number, axis=0)

@@ -1,4 +1,4 @@
-"""A person at the window, for the pictures of the documentation: clicks, waits, takes pictures."""
+"""A person at the window, for the images of the documentation: clicks, waits, takes images."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ QUALITY = 82
 
 
 class Operator:
-    """Works the program as a person does, and keeps pictures of it.
+    """Works the program as a person does, and keeps images of it.
 
     Parameters
     ----------
     window : MainWindow
         The program.
     folder : Path
-        Where the pictures go.
+        Where the images go.
     """
 
     def __init__(self, window: MainWindow, folder: Path) -> None:
@@ -85,7 +85,7 @@ class Operator:
         QTest.keyClick(self.window.focusWidget() or self.window, key, held)
 
     def shot(self, name: str, of: QWidget | None = None) -> None:
-        """Keep a picture of the window, or of a dialog.
+        """Keep an image of the window, or of a dialog.
 
         Raises
         ------

@@ -26,14 +26,14 @@ from gelpolight_core.batch.stopping import shall_stop
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.heightmap_files import write_heightmap
-from gelpolight_core.image.picture import Picture, linear_image
+from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
 from gelpolight_core.recording.recording import RecordedFrame
-from gelpolight_core.session.images import read_picture, require_colour
+from gelpolight_core.session.images import read_image, require_colour
 from gelpolight_core.translation import tr
 
 
@@ -140,14 +140,14 @@ class _FrameWorker:
     def _reconstruct(self, job: Job) -> tuple[FrameRow, HeightMap]:
         row = FrameRow(job.output, job.stamp, str(job.path), job.index)
         if job.index is None:
-            picture = read_picture(job.path, response=self._reconstructor.calibration.response)
-            require_colour(picture, where=str(job.path))
+            image = read_image(job.path, response=self._reconstructor.calibration.response)
+            require_colour(image, where=str(job.path))
         else:
-            picture, row = self._recorded(job, job.index, row)
+            image, row = self._recorded(job, job.index, row)
         shape = self._settings.shape
-        health = self._reconstructor.health(picture.rgb, name=job.name)
+        health = self._reconstructor.health(image.rgb, name=job.name)
         heightmap = self._reconstructor.depth(
-            picture.rgb,
+            image.rgb,
             name=job.name,
             normals=shape is None,
             uncertainty=shape is not None,
@@ -155,7 +155,7 @@ class _FrameWorker:
         )
         return _described(row, heightmap, shape), heightmap
 
-    def _recorded(self, job: Job, index: int, row: FrameRow) -> tuple[Picture, FrameRow]:
+    def _recorded(self, job: Job, index: int, row: FrameRow) -> tuple[LinearImage, FrameRow]:
         try:
             frame = self._frame(job, index)
         except InputError:
@@ -163,8 +163,8 @@ class _FrameWorker:
                 raise
             frame = self._frame(job, index)
         response = self._reconstructor.calibration.response
-        picture = linear_image(frame.rgb, job.name, response=response)
-        return picture, replace(row, number=frame.number, time_s=frame.time_s)
+        image = linear_image(frame.rgb, job.name, response=response)
+        return image, replace(row, number=frame.number, time_s=frame.time_s)
 
     def _frame(self, job: Job, index: int) -> RecordedFrame:
         recording = self._opened(job.path)

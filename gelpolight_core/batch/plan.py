@@ -74,7 +74,7 @@ class Selection:
 
 
 @dataclass(frozen=True, slots=True)
-class _Pictures:
+class _Images:
     """Images of one folder."""
 
     folder: Path
@@ -133,7 +133,7 @@ class BatchPlan:
         Notes for the user.
     """
 
-    sources: tuple[_Pictures | _Frames, ...]
+    sources: tuple[_Images | _Frames, ...]
     selection: Selection
     notes: tuple[str, ...] = ()
 
@@ -197,7 +197,7 @@ class _Found:
 
     def __init__(self, out: Path, calibration: Calibration) -> None:
         self._out, self._calibration = out, calibration
-        self.sources: list[_Pictures | _Frames] = []
+        self.sources: list[_Images | _Frames] = []
         self.notes: list[str] = []
 
     def take(self, path: Path) -> None:
@@ -221,14 +221,14 @@ class _Found:
             self._take_recording(path, "")
         elif self.sources and _goes_on(self.sources[-1], path):
             before = self.sources.pop()
-            assert isinstance(before, _Pictures)
-            self.sources.append(_Pictures(path.parent, (*before.names, path.name), ""))
+            assert isinstance(before, _Images)
+            self.sources.append(_Images(path.parent, (*before.names, path.name), ""))
         else:
-            self.sources.append(_Pictures(path.parent, (path.name,), ""))
+            self.sources.append(_Images(path.parent, (path.name,), ""))
 
     def _take_folder(self, folder: Path, output: str) -> None:
         """Add a folder and its subfolders; hidden ones are left out."""
-        pictures, recordings, folders, others = [], [], [], 0
+        images, recordings, folders, others = [], [], [], 0
         with os.scandir(folder) as entries:
             for entry in entries:
                 if entry.name.startswith("."):
@@ -236,13 +236,13 @@ class _Found:
                 if entry.is_dir(follow_symlinks=False):
                     folders.append(entry.name)
                 elif entry.name.lower().endswith(SUFFIXES):
-                    pictures.append(entry.name)
+                    images.append(entry.name)
                 elif entry.name.lower().endswith(ENDING):
                     recordings.append(entry.name)
                 else:
                     others += 1
-        if pictures:
-            self.sources.append(_Pictures(folder, tuple(sorted(pictures)), output))
+        if images:
+            self.sources.append(_Images(folder, tuple(sorted(images)), output))
         for name in sorted(recordings):
             self._take_recording(folder / name, output)
         if others:
@@ -277,9 +277,9 @@ def _seems_recording(path: Path) -> bool:
     return path.suffix.lower() == ENDING or is_recording(path)
 
 
-def _goes_on(source: _Pictures | _Frames, path: Path) -> bool:
+def _goes_on(source: _Images | _Frames, path: Path) -> bool:
     """Return whether an image is in the same folder as the previous one."""
-    return isinstance(source, _Pictures) and not source.output and source.folder == path.parent
+    return isinstance(source, _Images) and not source.output and source.folder == path.parent
 
 
 def _refuse_twins(plan: BatchPlan) -> None:

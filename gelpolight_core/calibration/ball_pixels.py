@@ -49,7 +49,7 @@ class BallPixels:
 
 def gather_ball_pixels(
     press: BallPress,
-    picture: Map,
+    image: Map,
     background: Map,
     table: ResamplingTable,
     usable: NDArray[np.bool_],
@@ -61,7 +61,7 @@ def gather_ball_pixels(
     ----------
     press : BallPress
         The detected ball.
-    picture, background : (rows, columns, 3) float32
+    image, background : (rows, columns, 3) float32
         Resampled, crosstalk removed.
     table : ResamplingTable
         The grid and its rays.
@@ -72,7 +72,7 @@ def gather_ball_pixels(
     """
     grid = table.grid
     base = np.maximum(background, LEAST_VALUE)
-    ratio = np.asarray(picture / base, np.float32)
+    ratio = np.asarray(image / base, np.float32)
     around = neighbourhood(ratio, usable, grid.pitch_mm, BOUNCE_REACH_MM)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.drift[row, column].astype(np.float64))
@@ -89,7 +89,7 @@ def gather_ball_pixels(
         chosen.append(random.permutation(indices)[:PIXELS_PER_PART])
         trust.append(np.full((chosen[-1].size, 1), part))
     rows, columns = np.unravel_index(np.concatenate(chosen), away.shape)
-    value = picture[rows, columns].astype(np.float64)
+    value = image[rows, columns].astype(np.float64)
     below = base[rows, columns].astype(np.float64)
     known = (value > LEAST_VALUE) & (value < SATURATED) & (background[rows, columns] > LEAST_VALUE)
     sd = np.hypot(np.hypot(noise / np.sqrt(2.0), MODEL_ERROR * value) / below, MODEL_ERROR)

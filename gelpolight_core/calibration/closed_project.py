@@ -95,7 +95,7 @@ class ClosedProject(EditableSession[ClosedSession]):
             inputs = self._inputs()
         found = []
         for stage in STAGES[:1] if upto is Stage.BACKGROUND else STAGES:
-            if not inputs[stage].pictures:
+            if not inputs[stage].images:
                 break
             outcome = self._outcomes.get(stage)
             if outcome is None or outcome.inputs != inputs[stage]:

@@ -30,7 +30,12 @@ from gelpolight_core.reconstruction.near_light.maps import (
     sensor_scale,
 )
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
-from gelpolight_core.reconstruction.near_light.structures import Picture, Scale, Steps, slopes_like
+from gelpolight_core.reconstruction.near_light.structures import (
+    RatioImage,
+    Scale,
+    Steps,
+    slopes_like,
+)
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.membrane import bounce_weight
 from gelpolight_core.reflectance.surroundings import neighbourhood, view_directions
@@ -139,7 +144,7 @@ class SyntheticPress(NamedTuple):
 
     Attributes
     ----------
-    picture : Picture
+    image : RatioImage
         Press over background.
     x_mm, y_mm : (columns,), (rows,)
         Nodes.
@@ -149,7 +154,7 @@ class SyntheticPress(NamedTuple):
         Visible nodes.
     """
 
-    picture: Picture
+    image: RatioImage
     x_mm: Array
     y_mm: Array
     ray_slope: Map
@@ -195,7 +200,7 @@ def synthetic_press(
     )
     planes = [np.ascontiguousarray(np.moveaxis(m, -1, 0)) for m in (ratio, around)]
     noise = np.full_like(planes[0], NOISE)
-    image = Picture(planes[0], noise, planes[1], np.zeros(shape, np.uint8))
+    image = RatioImage(planes[0], noise, planes[1], np.zeros(shape, np.uint8))
     field = SyntheticPress(image, x, y, np.moveaxis(drift, -1, 0), usable)
     return field, depth.reshape(shape).astype(np.float32), (r < radius).reshape(shape) & usable
 
@@ -259,7 +264,7 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     for _ in range(ROUNDS):
         slopes = slopes_like(depth_mm)
         rows = len(depth_mm)
-        solve_rows(0, rows, field.picture, depth_mm, scale, (0, 0), membrane, steps, slopes)
+        solve_rows(0, rows, field.image, depth_mm, scale, (0, 0), membrane, steps, slopes)
         depth_mm = integrate_weighted(
             slopes.slope_x,
             slopes.slope_y,

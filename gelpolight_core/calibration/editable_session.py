@@ -21,7 +21,7 @@ from gelpolight_core.calibration.inputs import FOLDERS, Stage
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import NameTakenError, make_folder, write_atomically
 from gelpolight_core.session.camera_settings import CameraSettings
-from gelpolight_core.session.capture import average_frames, write_picture
+from gelpolight_core.session.capture import average_frames, write_image
 from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS
 from gelpolight_core.session.decisions import (
@@ -45,7 +45,7 @@ Write = Callable[[Path, Path], None]
 class _Replaced:
     """What a new view has replaced: images, and the spots set in them."""
 
-    pictures: frozenset[str] = frozenset()
+    images: frozenset[str] = frozenset()
     spots_px: Mapping[int, Point] = field(default_factory=dict)
 
 
@@ -126,8 +126,8 @@ class EditableSession(Generic[Described]):
             If a file is not an image that fits into the session; then none is added.
         """
         refuse_unfit(self._session, stage, files)
-        pictures = [(path.suffix.lower(), partial(_copy, path)) for path in files]
-        return self._keep_all(FOLDERS[stage], pictures, radius_mm)
+        images = [(path.suffix.lower(), partial(_copy, path)) for path in files]
+        return self._keep_all(FOLDERS[stage], images, radius_mm)
 
     def take_back(self, stage: Stage, names: Sequence[str]) -> None:
         """Undo adding images: exclude those that were added together.
@@ -144,7 +144,7 @@ class EditableSession(Generic[Described]):
         with self._lock:
             files, former = self._files_and_replaced(stage, names)
             now = self._session.decisions
-            excluded = (now.excluded | files) - former.pictures
+            excluded = (now.excluded | files) - former.images
             spots = {**now.spots_px, **former.spots_px}
             self.decide(replace(now, excluded=excluded, spots_px=spots))
             self._dropped += 1
@@ -160,7 +160,7 @@ class EditableSession(Generic[Described]):
         with self._lock:
             files, former = self._files_and_replaced(stage, names)
             now = self._session.decisions
-            excluded = (now.excluded - files) | former.pictures
+            excluded = (now.excluded - files) | former.images
             spots = {led: p for led, p in now.spots_px.items() if led not in former.spots_px}
             self.decide(replace(now, excluded=excluded, spots_px=spots))
 
@@ -169,13 +169,13 @@ class EditableSession(Generic[Described]):
         return files, self._replaced.get(min(files), _Replaced())
 
     def _keep_all(
-        self, folder: str, pictures: Sequence[tuple[str, Write]], radius_mm: float | None
+        self, folder: str, images: Sequence[tuple[str, Write]], radius_mm: float | None
     ) -> tuple[str, ...]:
         """Write images that belong together, all or none, and return their names."""
         names: list[str] = []
         with self._lock:
             try:
-                for suffix, write in pictures:
+                for suffix, write in images:
                     names.append(self._keep(folder, suffix, radius_mm, write))
                 self._replace_views(folder, set(names))
             except InputError:
@@ -410,7 +410,7 @@ def _copy(source: Path, session: Path, target: Path) -> None:
 
 
 def _write(rgb: Frame, session: Path, target: Path) -> None:
-    write_picture(rgb, target, new=True, inside=session)
+    write_image(rgb, target, new=True, inside=session)
 
 
 def _with(mapping: Mapping[Any, Any], key: Any, value: Any) -> dict[Any, Any]:

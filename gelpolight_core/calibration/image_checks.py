@@ -10,7 +10,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import FILE_LIMIT
 from gelpolight_core.io.reading import read_file
 from gelpolight_core.session.file_hashes import file_hash, refuse_copies
-from gelpolight_core.session.images import SessionImages, read_picture, require_colour
+from gelpolight_core.session.images import SessionImages, read_image, require_colour
 from gelpolight_core.translation import tr
 
 COLOUR_STAGES = (Stage.LIGHTS, Stage.RADIANCE, Stage.BACKGROUND, Stage.BALLS)
@@ -34,13 +34,13 @@ def refuse_unfit(session: SessionImages, stage: Stage, files: Sequence[Path]) ->
         If a file is not an image, differs in size from the session's images, is grey where the LEDs
         are identified by colour, or is already in the session.
     """
-    size = picture_size(session)
+    size = image_size(session)
     for path in files:
-        picture = read_picture(path)
-        size = size or picture.size
-        _refuse_size(picture.size, size, where=str(path))
+        image = read_image(path)
+        size = size or image.size
+        _refuse_size(image.size, size, where=str(path))
         if stage in COLOUR_STAGES:
-            require_colour(picture, where=str(path))
+            require_colour(image, where=str(path))
     refuse_copies(files)
     known = {file_hash(path): path for path in _captured(session)}
     for path in files:
@@ -63,17 +63,17 @@ def refuse_other_size(session: SessionImages, size: tuple[int, int]) -> None:
     InputError
         If there are images and their size is different.
     """
-    wanted = picture_size(session)
+    wanted = image_size(session)
     if wanted is not None:
         _refuse_size(size, wanted, where=tr("camera"))
 
 
-def picture_size(session: SessionImages) -> tuple[int, int] | None:
+def image_size(session: SessionImages) -> tuple[int, int] | None:
     """Return width and height of the session's images; None if there are none yet."""
     for folder in FOLDERS.values():
         for path in session.found(folder):
             try:
-                return read_picture(path).size
+                return read_image(path).size
             except InputError:
                 continue  # a damaged image is refused by its own stage
     return None

@@ -12,7 +12,7 @@ from dataclasses import replace
 from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.sensor_calibration import HandEdit
@@ -21,7 +21,7 @@ from gelpolight_core.translation import tr
 
 
 def with_background(
-    calibration: InPlaceCalibration, background: Picture, *, operator: str, made: str
+    calibration: InPlaceCalibration, background: LinearImage, *, operator: str, made: str
 ) -> InPlaceCalibration:
     """Return the calibration with another gel's background; slopes stay as they are.
 
@@ -31,7 +31,7 @@ def with_background(
     ----------
     calibration : InPlaceCalibration
         Of the sensor with the gel before.
-    background : Picture
+    background : LinearImage
         The new gel, untouched.
     operator, made : str
         Who did it and when, ISO 8601.
@@ -76,7 +76,7 @@ def repaired(calibration: InPlaceCalibration, session: ClosedSession) -> InPlace
     return calibrate_closed_session(session, towards=calibration.in_place.coefficients)
 
 
-def _require_size(calibration: InPlaceCalibration, background: Picture) -> None:
+def _require_size(calibration: InPlaceCalibration, background: LinearImage) -> None:
     size = (calibration.camera.width, calibration.camera.height)
     if background.size != size:
         raise InputError(

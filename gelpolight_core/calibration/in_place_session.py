@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.provenance import provenance_of
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.in_place.ball import Ball
 from gelpolight_core.in_place.calibrate import (
     LEAST_PRESSES,
@@ -128,9 +128,9 @@ def _refuse_missing(session: ClosedSession) -> None:
         )
 
 
-def _measured_scale(session: ClosedSession, background: Picture) -> MeasuredScale:
+def _measured_scale(session: ClosedSession, background: LinearImage) -> MeasuredScale:
     """Return the scale by the images of ``scale/``."""
-    images = [image.rgb for image in session.pictures("scale")]
+    images = [image.rgb for image in session.images("scale")]
     where, pressed = str(session.folder / "scale"), session.pressed_scale
     if images[0].shape != background.rgb.shape:
         raise InputError(
@@ -158,10 +158,10 @@ def _scale(session: ClosedSession, measured: MeasuredScale | None) -> tuple[floa
 
 
 def _presses(
-    session: ClosedSession, background: Picture
+    session: ClosedSession, background: LinearImage
 ) -> tuple[list[PressImage], dict[str, InputError]]:
     """Return the ball images of the background's size, and why others cannot be used."""
-    images, unreadable = session.usable_pictures("balls")
+    images, unreadable = session.usable_images("balls")
     presses = []
     for image in images:
         if image.size != background.size:

@@ -65,7 +65,7 @@ class StageInputs:
 
     Attributes
     ----------
-    pictures : tuple of (name, SHA-256)
+    images : tuple of (name, SHA-256)
         Its own images, without excluded ones.
     stated : str
         Stated values and decisions that it uses.
@@ -73,14 +73,14 @@ class StageInputs:
         Fingerprints of the stages that it needs.
     """
 
-    pictures: tuple[tuple[str, str], ...]
+    images: tuple[tuple[str, str], ...]
     stated: str
     earlier: tuple[str, ...]
 
     @property
     def fingerprint(self) -> str:
         """A text that changes with any of the inputs."""
-        return hashlib.sha256(repr((self.pictures, self.stated, self.earlier)).encode()).hexdigest()
+        return hashlib.sha256(repr((self.images, self.stated, self.earlier)).encode()).hexdigest()
 
 
 def inputs_of(
@@ -123,7 +123,7 @@ def all_inputs(session: Session, hashes: Callable[[Path], str] = file_hash) -> s
 
 def changes_between(before: StageInputs, now: StageInputs) -> tuple[str, ...]:
     """Describe what has changed since a result was computed."""
-    old, new = dict(before.pictures), dict(now.pictures)
+    old, new = dict(before.images), dict(now.images)
     changes = []
     added = [name for name in new if name not in old]
     gone = [name for name in old if name not in new]

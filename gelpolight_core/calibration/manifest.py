@@ -63,7 +63,7 @@ class CalibrationSummary:
         Short name of the calibration, its sensor and its model.
     created, operator, program_version, session, inputs : str
         As in its provenance.
-    picture_size : tuple of int
+    image_size : tuple of int
         Width and height of the camera images, px.
     quality : mapping
         Quality table of every stage, in order.
@@ -77,7 +77,7 @@ class CalibrationSummary:
     program_version: str
     session: str
     inputs: str
-    picture_size: tuple[int, int]
+    image_size: tuple[int, int]
     quality: Mapping[str, QualityTable]
 
     @property
@@ -143,7 +143,7 @@ def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
     }
     return CalibrationSummary(
         **{key: written_text(text) for key, text in texts.items()},
-        picture_size=(int(camera["width"]), int(camera["height"])),
+        image_size=(int(camera["width"]), int(camera["height"])),
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
     )
 

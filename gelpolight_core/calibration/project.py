@@ -102,7 +102,7 @@ class CalibrationProject(EditableSession[Session]):
         for stage in stages_of(model):
             if stage not in wanted or not all(need in ready for need in NEEDS[stage]):
                 continue
-            if stage in FOLDERS and not inputs[stage].pictures:
+            if stage in FOLDERS and not inputs[stage].images:
                 continue
             outcome = self._outcomes.get(stage)
             current = outcome is not None and outcome.inputs == inputs[stage]
@@ -175,7 +175,7 @@ class CalibrationProject(EditableSession[Session]):
     def _status(self, stage: Stage, inputs: Mapping[Stage, StageInputs]) -> StageStatus:
         outcome = self._outcomes.get(stage)
         nothing = QualityTable()
-        if stage in FOLDERS and not inputs[stage].pictures:
+        if stage in FOLDERS and not inputs[stage].images:
             return StageStatus(stage, StageState.EMPTY, tr("No images captured yet"), nothing)
         if outcome is None:
             missing = [need for need in NEEDS[stage] if need not in self._outcomes]

@@ -67,10 +67,8 @@ def refine_with(
     background = unmix(bare, crosstalk)
     noise = press_noise(results.presses)
     pixels = [
-        gather_ball_pixels(
-            press, unmix(picture, crosstalk), background, table, factors.usable, noise
-        )
-        for press, picture in zip(results.presses, results.pictures, strict=True)
+        gather_ball_pixels(press, unmix(image, crosstalk), background, table, factors.usable, noise)
+        for press, image in zip(results.presses, results.images, strict=True)
     ]
     joint = refine_jointly(results.presses, pixels, lights.led_positions_mm, terms=terms)
     full = FullModel(
@@ -104,7 +102,7 @@ def _scale_sd(
     some = np.unique(np.linspace(0, len(files) - 1, CHECKED_BALLS).round().astype(int)).tolist()
     unexplained = ball_height_error(
         calibration,
-        [session.picture(session.folder / "balls" / files[i]).rgb for i in some],
+        [session.image(session.folder / "balls" / files[i]).rgb for i in some],
         [joint.balls[i] for i in some],
     )
     lateral = lateral_scale_sd(

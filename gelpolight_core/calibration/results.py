@@ -39,7 +39,7 @@ class SeenBall:
         Its name in ``balls``.
     key : str
         Changes with any input of the result.
-    picture : (rows, columns, 3) float32 or None
+    image : (rows, columns, 3) float32 or None
         Resampled onto the grid; None if no ball was found.
     press : BallPress or None
         The ball; None if none was found.
@@ -49,7 +49,7 @@ class SeenBall:
 
     file: str
     key: str
-    picture: Map | None
+    image: Map | None
     press: BallPress | None
     fault: InputError | None
 
@@ -80,9 +80,9 @@ class StageResults:
         return tuple(ball.press for ball in self.balls if ball.press is not None)
 
     @property
-    def pictures(self) -> tuple[Map, ...]:
+    def images(self) -> tuple[Map, ...]:
         """Their images, resampled."""
-        return tuple(ball.picture for ball in self.balls if ball.picture is not None)
+        return tuple(ball.image for ball in self.balls if ball.image is not None)
 
 
 def require_balls(results: StageResults) -> None:

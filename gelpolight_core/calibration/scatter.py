@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.reflectance.stage import ball_scatter
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 
 Array = NDArray[np.float64]
@@ -65,12 +65,12 @@ def gather_scatter(
     parts: list[list[tuple[Array, Array, NDArray[np.intp]]]] = [[], [], []]
     for index, press in enumerate(presses):
         tell(press.name, index / len(presses))
-        picture = table.apply(
-            read_picture(session.folder / press.name, response=run.calibration.response).rgb
+        image = table.apply(
+            read_image(session.folder / press.name, response=run.calibration.response).rgb
         )
         scatter = ball_scatter(
             [press],
-            [picture],
+            [image],
             table,
             run.lights.led_positions_mm,
             run.radiance,

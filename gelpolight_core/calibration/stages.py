@@ -28,7 +28,7 @@ from gelpolight_core.calibration.results import (
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import calibrate_factors
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import find_crosstalk, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import locate_leds
@@ -100,17 +100,17 @@ def _run_response(session: Session, results: StageResults, _tell: Progress) -> S
 
 
 def _run_lens(session: Session, results: StageResults, _tell: Progress) -> StageResults:
-    pictures, refused = session.usable_pictures("checkerboard")
-    lens = calibrate_lens(pictures, session.checkerboard, refused=refused)
+    images, refused = session.usable_images("checkerboard")
+    lens = calibrate_lens(images, session.checkerboard, refused=refused)
     return replace(results, lens=lens)
 
 
 def _run_top_pose(session: Session, results: StageResults, _tell: Progress) -> StageResults:
     lens = need(results.lens, "top_pose")
-    pictures, refused = session.usable_pictures("top_pose")
-    _same_size(pictures[0], lens, "top_pose")
+    images, refused = session.usable_images("top_pose")
+    _same_size(images[0], lens, "top_pose")
     pose = estimate_top_pose(
-        pictures,
+        images,
         session.top_pose,
         lens.camera,
         focal_sd_px=lens.focal_sd_px[0],
@@ -142,14 +142,14 @@ def _run_lights(session: Session, results: StageResults, _tell: Progress) -> Sta
     return replace(results, lights=lights, crosstalk=crosstalk)
 
 
-def _single_led(session: Session, lens: LensResult) -> tuple[Picture, ...]:
+def _single_led(session: Session, lens: LensResult) -> tuple[LinearImage, ...]:
     if "single_led" not in session.optional_stages:
         return ()
-    pictures = session.single_led()
-    for picture in pictures:
-        require_colour(picture, where=f"single_led/{picture.name}")
-    _same_size(pictures[0], lens, "single_led")
-    return pictures
+    images = session.single_led()
+    for image in images:
+        require_colour(image, where=f"single_led/{image.name}")
+    _same_size(images[0], lens, "single_led")
+    return images
 
 
 def _run_radiance(session: Session, results: StageResults, _tell: Progress) -> StageResults:
@@ -183,7 +183,7 @@ def _run_balls(session: Session, results: StageResults, tell: Progress) -> Stage
     known = {ball.key: ball for ball in results.balls}
     inputs = inputs_of(session)
     rests_on = tuple(inputs[need].fingerprint for need in NEEDS[Stage.BALLS])
-    hashes = dict(inputs[Stage.BALLS].pictures)
+    hashes = dict(inputs[Stage.BALLS].images)
     # A press captured at this moment belongs to the next computation.
     files = [path for path in session.files("balls") if path.name in hashes]
     bare = unmix(need(results.background, "balls"), need(results.crosstalk, "balls").matrix)
@@ -215,10 +215,10 @@ def _find_ball(
     stack = sensor_stack(session.sensor, pose.plane)
     placed = session.decisions.balls.get(path.name)
     try:
-        picture = session.picture(path)
-        require_colour(picture, where=str(path))
-        _same_size(picture, lens, "balls")
-        seen = table.apply(need(results.bad, "balls").left_out(picture.rgb))
+        image = session.image(path)
+        require_colour(image, where=str(path))
+        _same_size(image, lens, "balls")
+        seen = table.apply(need(results.bad, "balls").left_out(image.rgb))
         contact = None
         if placed is not None:
             contact = placed_contact(placed, lens.camera, pose.plane, stack)
@@ -267,10 +267,10 @@ def _run_reflectance(session: Session, results: StageResults, _tell: Progress) -
     del session
     table, lights = need(results.table, "balls"), need(results.lights, "balls")
     radiance, bare = need(results.radiance, "balls"), need(results.background, "balls")
-    leds, presses, pictures = lights.led_positions_mm, results.presses, results.pictures
-    first = calibrate_reflectance(presses, pictures, table, leds, radiance)
+    leds, presses, images = lights.led_positions_mm, results.presses, results.images
+    first = calibrate_reflectance(presses, images, table, leds, radiance)
     factors = calibrate_factors(bare, table, leds, radiance, first.table)
-    second = calibrate_reflectance(presses, pictures, table, leds, radiance, factors.factors)
+    second = calibrate_reflectance(presses, images, table, leds, radiance, factors.factors)
     factors = calibrate_factors(bare, table, leds, radiance, second.table)
     return replace(results, reflectance=second, factors=factors)
 
@@ -290,37 +290,37 @@ _RUNS: Mapping[Stage, Callable[[Session, StageResults, Progress], StageResults]]
 )
 
 
-def _stage_image(session: Session, stage: str, lens: LensResult) -> Picture:
-    picture = session.averaged(stage)
-    require_colour(picture, where=f"{stage}/{picture.name}")
-    _same_size(picture, lens, stage)
-    return picture
+def _stage_image(session: Session, stage: str, lens: LensResult) -> LinearImage:
+    image = session.averaged(stage)
+    require_colour(image, where=f"{stage}/{image.name}")
+    _same_size(image, lens, stage)
+    return image
 
 
-def _same_size(picture: Picture, lens: LensResult, stage: str) -> None:
+def _same_size(image: LinearImage, lens: LensResult, stage: str) -> None:
     width, height = lens.camera.width, lens.camera.height
-    if picture.size != (width, height):
+    if image.size != (width, height):
         raise InputError(
             tr("The image has {w}x{h} pixels, but the checkerboard images have {cw}x{ch}").format(
-                w=picture.size[0], h=picture.size[1], cw=width, ch=height
+                w=image.size[0], h=image.size[1], cw=width, ch=height
             ),
-            where=f"{stage}/{picture.name}",
+            where=f"{stage}/{image.name}",
             advice=tr("Capture all stages at the same image size"),
         )
 
 
-def _refuse_unlit(picture: Picture) -> None:
-    brightest = np.percentile(picture.rgb, 99.5, axis=(0, 1))
+def _refuse_unlit(image: LinearImage) -> None:
+    brightest = np.percentile(image.rgb, 99.5, axis=(0, 1))
     if brightest.min() < 0.05:
         raise InputError(
             tr("The image is dark (a channel only reaches {v:.1%})").format(v=brightest.min()),
-            where=f"background/{picture.name}",
+            where=f"background/{image.name}",
             advice=tr("Switch all three LEDs on, or use a longer exposure"),
         )
-    share = float(saturated(picture.rgb).any(axis=2).mean())
+    share = float(saturated(image.rgb).any(axis=2).mean())
     if share > 0.2:
         raise InputError(
             tr("{share:.0%} of the image is saturated").format(share=share),
-            where=f"background/{picture.name}",
+            where=f"background/{image.name}",
             advice=tr("Use a shorter exposure"),
         )

@@ -226,7 +226,7 @@ def veil_share(design: SensorDesign) -> float:
 
 
 def _lower_face_figure(reflections: tuple[Reflection, ...]) -> Figure:
-    seen = [r for r in reflections if r.face == "lower face" and r.in_picture]
+    seen = [r for r in reflections if r.face == "lower face" and r.in_image]
     where = ", ".join(f"{r.led} ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})" for r in seen)
     return judge(
         "lower_face_reflections",
@@ -244,7 +244,7 @@ def _gloss_figure(design: SensorDesign, reflections: tuple[Reflection, ...]) -> 
     shares, positions = [0.0], [""]
     for number, lamp in enumerate(lamps_of(design)):
         for r in reflections:
-            if r.led == LED_NAMES[number] and r.face == "top surface" and r.in_picture:
+            if r.led == LED_NAMES[number] and r.face == "top surface" and r.in_image:
                 shares.append(gloss_share(design, lamp, r.at_mm))
                 positions.append(f"{r.led} ({r.pixel[0]:.0f}, {r.pixel[1]:.0f})")
     worst = int(np.argmax(shares))
@@ -289,7 +289,7 @@ def gloss_share(design: SensorDesign, lamp: PointLamp, at_mm: tuple[float, float
 
 
 def _bare_figure(reflections: tuple[Reflection, ...]) -> Figure:
-    seen = [r for r in reflections if r.face != "lower face" and r.in_picture]
+    seen = [r for r in reflections if r.face != "lower face" and r.in_image]
     return judge(
         "air_film_images",
         tr("LED reflections that an air film under the whiteboard would show"),

@@ -41,7 +41,7 @@ class Reflection:
         Last point of reflection on the face, sensor frame.
     reflectance : float
         Product of the Fresnel reflectances along the path with air behind each face.
-    in_picture : bool
+    in_image : bool
         Whether the pixel lies in the image and, for the top surface, in the working circle.
     """
 
@@ -50,7 +50,7 @@ class Reflection:
     pixel: tuple[float, float]
     at_mm: tuple[float, float]
     reflectance: float
-    in_picture: bool
+    in_image: bool
 
 
 def led_reflections(design: SensorDesign) -> tuple[Reflection, ...]:

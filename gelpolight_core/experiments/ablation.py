@@ -198,7 +198,7 @@ def ablate(
     Parameters
     ----------
     session : Session
-        With ``presses/truth.csv`` and ``truth/*.npz`` beside the pictures of the stages.
+        With ``presses/truth.csv`` and ``truth/*.npz`` beside the images of the stages.
     variants : sequence of Variant, optional
         To be compared with all terms on.
     repeats : int, optional
@@ -211,7 +211,7 @@ def ablate(
     Raises
     ------
     InputError
-        If the session cannot be calibrated, or a press has no picture or no truth.
+        If the session cannot be calibrated, or a press has no image or no truth.
     """
     tell = progress or (lambda _what, _share: None)
     radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
@@ -257,10 +257,10 @@ def read_presses(session: Session, radius_mm: float) -> list[TruePress]:
     folder = session.folder / "presses"
     presses = []
     for row in read_truth(folder / "truth.csv").rows:
-        picture = session.picture(folder / row.file)
-        require_colour(picture, where=str(folder / row.file))
+        image = session.image(folder / row.file)
+        require_colour(image, where=str(folder / row.file))
         truth = read_true_depth((session.folder / "truth" / row.file).with_suffix(".npz"))
-        press = TruePress(row, picture.rgb, truth)
+        press = TruePress(row, image.rgb, truth)
         _score(press, truth, radius_mm)
         presses.append(press)
     return presses

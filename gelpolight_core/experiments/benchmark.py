@@ -58,7 +58,7 @@ class BenchmarkResult:
     Attributes
     ----------
     total : Timing
-        Picture to depth.
+        Image to depth.
     steps : tuple of Timing
         Its parts.
     plain : Timing
@@ -92,7 +92,7 @@ def benchmark_frame(
     reconstructor : Reconstructor
         Ready for the frame's sensor.
     frame : (height, width, 3)
-        Raw picture.
+        Raw image.
     repeats, plain_repeats : int, optional
         Counted runs after one warm-up.
     """
@@ -116,7 +116,7 @@ def benchmark_frame(
         traces.append(trace)
 
     fast: dict[str, Callable[[], object]] = {
-        "picture to depth": whole,
+        "image to depth": whole,
         # Reading one half and writing the other touches as many bytes as the frame must.
         "copy of the bytes": lambda: np.copyto(target, source),
     }
@@ -131,7 +131,7 @@ def benchmark_frame(
     times = _time_in_turn(fast, repeats)
     slow = _time_in_turn({"plain": plain}, plain_repeats)["plain"]
     return BenchmarkResult(
-        _timing("picture to depth", times["picture to depth"], must),
+        _timing("image to depth", times["image to depth"], must),
         _traced_steps(traces[-repeats:]),
         _timing(
             "in-place, plain NumPy and SciPy" if closed else "paper's model, plain NumPy and SciPy",

@@ -254,11 +254,11 @@ def _light_at(full: FullModel, truth: TrueDepth, solved: Solved) -> Array:
     Every second node along both axes, where it is tilted.
     """
     view, ray_slope = _view(solved, truth)
-    picture, scale, leds = solved.compared.coarse, solved.scale, full.led_positions_mm
+    image, scale, leds = solved.compared.coarse, solved.scale, full.led_positions_mm
     slope = np.degrees(np.arccos(np.clip(-view.normals[..., 2], 0.0, 1.0)))
     usable = scale.kind == 2
-    seen = np.moveaxis(picture.ratio, 0, -1).astype(np.float64)
-    around = np.moveaxis(np.broadcast_to(picture.around, picture.ratio.shape), 0, -1)
+    seen = np.moveaxis(image.ratio, 0, -1).astype(np.float64)
+    around = np.moveaxis(np.broadcast_to(image.around, image.ratio.shape), 0, -1)
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     towards_camera = view_directions(ray_slope)
     facets = Surface(view.points_mm, view.normals, towards_camera, seen * flat * usable[..., None])

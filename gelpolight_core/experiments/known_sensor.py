@@ -1,6 +1,6 @@
 """A virtual sensor with the calibration that it would have if every stage were exact.
 
-Nothing is calibrated from pictures: lens, pose, LEDs, crosstalk and light are the design's own, so
+Nothing is calibrated from images: lens, pose, LEDs, crosstalk and light are the design's own, so
 that what a reconstruction gets wrong is the reconstruction's.
 """
 
@@ -37,7 +37,7 @@ LEAST_COSINE = 0.02
 
 @dataclass(frozen=True, slots=True)
 class KnownPress:
-    """A press with its picture and its truth.
+    """A press with its image and its truth.
 
     Attributes
     ----------
@@ -61,23 +61,23 @@ class KnownSensor:
     def pressed(
         self, indenter: Indenter, *, x_mm: float = 0.0, y_mm: float = 0.0, samples: int = 3
     ) -> KnownPress:
-        """Return the picture of something pressed into the sensor, and the true depth."""
+        """Return the image of something pressed into the sensor, and the true depth."""
         decay_mm = self.sensor.design.membrane.decay_length_mm
         return self.showing(press(indenter, x_mm=x_mm, y_mm=y_mm, decay_mm=decay_mm), samples)
 
     def showing(self, surface: PressedSurface, samples: int = 3) -> KnownPress:
-        """Return the picture of a membrane of any shape, and the true depth."""
+        """Return the image of a membrane of any shape, and the true depth."""
         frame = self.sensor.brightness(PressedMembrane(surface), samples=samples)
         truth = TrueDepth(surface.depth_mm, surface.x_mm, surface.y_mm)
         return KnownPress(frame.astype(np.float32), truth)
 
     def noisy(self, frame: Map, *, seed: int = 0) -> NDArray[np.unsignedinteger[Any]]:
-        """Return what the camera makes of a linear picture: noise, and its own whole numbers."""
+        """Return what the camera makes of a linear image: noise, and its own whole numbers."""
         camera = self.sensor.design.camera
         return exposed(frame.astype(np.float64), camera, np.random.default_rng(seed), averaged=1)
 
     def bare(self) -> Map:
-        """Return the picture of the membrane that nothing touches."""
+        """Return the image of the membrane that nothing touches."""
         return self.sensor.brightness(BareMembrane()).astype(np.float32)
 
 
@@ -123,7 +123,7 @@ def exact_calibration(
     sensor : VirtualSensor
         To be calibrated.
     camera, plane, stated, leds_mm, crosstalk : optional
-        In place of the exact ones; background and light are then what the sensor's pictures show
+        In place of the exact ones; background and light are then what the sensor's images show
         by them.
     """
     design = sensor.design

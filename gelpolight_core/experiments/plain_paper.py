@@ -25,7 +25,7 @@ def plain_slopes(frame: NDArray[Any], calibration: Calibration) -> tuple[Array, 
     Parameters
     ----------
     frame : (height, width, 3)
-        Raw picture, RGB; whole numbers or 0..1.
+        Raw image, RGB; whole numbers or 0..1.
     calibration : Calibration
         Of the sensor.
     """

@@ -26,7 +26,7 @@ from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.result import Measurement, Truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.capture import write_picture
+from gelpolight_core.session.capture import write_image
 from gelpolight_core.simulation.indenters import Cuboid, Cylinder, Settled
 from gelpolight_core.simulation.session import pressed_membrane, settled_membrane
 from gelpolight_core.simulation.virtual_sensor import VirtualSensor
@@ -59,25 +59,25 @@ class Equipment:
 
 @dataclass(frozen=True, slots=True)
 class PressTask:
-    """A picture to be measured, and what to press for it where it has still to be made.
+    """An image to be measured, and what to press for it where it has still to be made.
 
     Attributes
     ----------
-    picture : Path
+    image : Path
         Where it is or shall be.
     shape : str
         What is measured.
     press : PressWanted or None
-        What to press; None where the picture is there.
+        What to press; None where the image is there.
     """
 
-    picture: Path
+    image: Path
     shape: str
     press: PressWanted | None = None
 
 
 class PressWorker:
-    """Makes presses on the virtual sensor, and measures pictures.
+    """Makes presses on the virtual sensor, and measures images.
 
     Parameters
     ----------
@@ -90,13 +90,13 @@ class PressWorker:
         self._settled: dict[Cuboid, Settled] = {}
 
     def work(self, task: PressTask) -> Measurement | str:
-        """Make the picture where it has still to be made; measure it."""
+        """Make the image where it has still to be made; measure it."""
         if task.press is not None:
-            self.make(task.press, task.picture)
-        return measure_press(task.picture, task.shape, self._measure_press)
+            self.make(task.press, task.image)
+        return measure_press(task.image, task.shape, self._measure_press)
 
-    def make(self, press: PressWanted, picture: Path) -> None:
-        """Press an object into the virtual sensor as a hand would, and write the picture."""
+    def make(self, press: PressWanted, image: Path) -> None:
+        """Press an object into the virtual sensor as a hand would, and write the image."""
         design = self._sensor.design
         indenter = _indenter(press.truth)
         settled = self._settled_on(indenter) if isinstance(indenter, Cuboid) else None
@@ -104,7 +104,7 @@ class PressWorker:
         state = pressed_membrane(
             design, indenter, x_mm=x_mm, y_mm=y_mm, yaw_deg=yaw_deg, settled=settled
         )
-        write_picture(self._sensor.frame(state, stream=f"protocol/{press.file}"), picture)
+        write_image(self._sensor.frame(state, stream=f"protocol/{press.file}"), image)
 
     @cached_property
     def _sensor(self) -> VirtualSensor:
@@ -157,7 +157,7 @@ def work_through(
     Raises
     ------
     InputError
-        If the calibration cannot be read, or a picture cannot be written.
+        If the calibration cannot be read, or an image cannot be written.
     """
     if workers == 1 or len(tasks) < 2:
         worker = PressWorker(equipment)

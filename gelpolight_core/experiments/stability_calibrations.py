@@ -152,7 +152,7 @@ def _mixed(calibration: Calibration) -> Calibration:
 
 
 def _beyond() -> Seen:
-    """Take a table whose brightest value is below what the picture shows."""
+    """Take a table whose brightest value is below what the image shows."""
     calibration = standard_sensor().calibration
     table = calibration.reflectance
     red, green, blue = (0.5 * values for values in table.values)

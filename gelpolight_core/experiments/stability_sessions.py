@@ -30,7 +30,7 @@ from gelpolight_core.measurement.trust import judged
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 from gelpolight_core.translation import tr
@@ -291,7 +291,7 @@ def _mode_seen(
 def _press_frame(run: CalibrationRun, folder: Path) -> NDArray[np.float32]:
     """Return the image of the press as linear light."""
     path = next((folder / "presses").glob("*.png"))
-    return read_picture(path, response=run.calibration.response).rgb
+    return read_image(path, response=run.calibration.response).rgb
 
 
 def _best_size(run: CalibrationRun, folder: Path) -> tuple[float, float]:

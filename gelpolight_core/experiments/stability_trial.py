@@ -1,4 +1,4 @@
-"""What the cases on whole pictures share: a sensor made once, both models, and what they say."""
+"""What the cases on whole images share: a sensor made once, both models, and what they say."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ BALL_AT_MM = (1.2, -0.8)
 
 @lru_cache(maxsize=1)
 def standard_sensor() -> KnownSensor:
-    """Return the sensor of all cases on pictures, at a quarter of the default's size."""
+    """Return the sensor of all cases on images, at a quarter of the default's size."""
     return known_sensor(matt_design(SCALE))
 
 
@@ -141,7 +141,7 @@ def judged(
     bound_um : float
         Largest error of the full model that is right (root mean square).
     frame : array, optional
-        In place of the press's own picture.
+        In place of the press's own image.
     spare : (rows, columns) bool, optional
         Nodes that are not compared, because nothing can be known there.
     needs : sequence of Flag, optional
@@ -152,16 +152,16 @@ def judged(
     radius_mm : float, optional
         Of the compared area; by default the working circle less its rim.
     """
-    picture = press.frame if frame is None else frame
+    image = press.frame if frame is None else frame
     calibration = known.calibration
     radius = radius_mm or 0.5 * calibration.sensor.working_diameter_mm - RIM_MM
     by = {m: Reconstructor(calibration, model=m) for m in models}
-    found = {m: reconstructor.depth(picture) for m, reconstructor in by.items()}
+    found = {m: reconstructor.depth(image) for m, reconstructor in by.items()}
     best = found["full"] if "full" in found else found[models[0]]
-    ways = {"best" if m == "full" else m: h for m, h in found.items()}
+    maps = {"best" if m == "full" else m: h for m, h in found.items()}
     if "full" in found:
         others = [effort for effort in EFFORTS if effort != "best"]
-        ways |= {effort: by["full"].at_effort(effort).depth(picture) for effort in others}
+        maps |= {effort: by["full"].at_effort(effort).depth(image) for effort in others}
 
     def error_of(heightmap: HeightMap) -> float:
         return rms_um(depth_error(heightmap, press.truth, radius_mm=radius, spare=spare))
@@ -174,7 +174,7 @@ def judged(
             bound_um + (0.0 if mode == "best" else own_share(heightmap) * peak_um),
             "; ".join([*doubts_of(heightmap), *_raised(heightmap, needs)]),
         )
-        for mode, heightmap in ways.items()
+        for mode, heightmap in maps.items()
     )
     error = error_of(best)
     missing = [str(f.name) for f in needs for h in found.values() if not flagged(h, f).any()]
@@ -186,12 +186,12 @@ def judged(
     return Seen(
         right=not missing,
         said=said,
-        finite=all(is_finite(h) for h in ways.values()),
+        finite=all(is_finite(h) for h in maps.values()),
         error_um=error,
         bound_um=bound_um,
         flags=flag_shares(best),
         condition=condition_of(calibration),
-        rounds=rounds_of(by["full"], picture) if "full" in found else None,
+        rounds=rounds_of(by["full"], image) if "full" in found else None,
         # A note counts for the mode that gives it, and for no other.
         doubt="",
         modes=modes,

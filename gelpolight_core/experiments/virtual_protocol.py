@@ -116,7 +116,7 @@ def press_protocol(
         for task, outcome in results:
             if task.press is not None:
                 run.record(task.press)
-            key = ledger.key(task.picture, task.shape)
+            key = ledger.key(task.image, task.shape)
             if key is not None:
                 ledger.keep(key, outcome)
             measured += 1
@@ -132,7 +132,7 @@ def measure_folder(
     workers: int = 2,
     progress: Progress | None = None,
 ) -> None:
-    """Measure the pictures of a folder with ``truth.csv``, several at a time, into a ledger.
+    """Measure the images of a folder with ``truth.csv``, several at a time, into a ledger.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def measure_folder(
     ledger : Ledger
         Keeps what is measured.
     workers : int, optional
-        Pictures that are worked on at a time.
+        Images that are worked on at a time.
     progress : callable, optional
         Told the file's name and the share done, 0..1.
 
@@ -154,14 +154,14 @@ def measure_folder(
     """
     rows = read_truth(presses).rows
     tasks = [PressTask(presses / row.file, row.truth.shape) for row in rows]
-    tasks = [task for task in tasks if task.picture.is_file() and not _is_measured(task, ledger)]
+    tasks = [task for task in tasks if task.image.is_file() and not _is_measured(task, ledger)]
     with closing(work_through(tasks, equipment, workers=workers)) as results:
         for number, (task, outcome) in enumerate(results, start=1):
-            key = ledger.key(task.picture, task.shape)
+            key = ledger.key(task.image, task.shape)
             if key is not None:
                 ledger.keep(key, outcome)
             if progress is not None:
-                progress(task.picture.name, number / len(tasks))
+                progress(task.image.name, number / len(tasks))
 
 
 def evaluate_run(run: ProtocolRun, reconstructor: Reconstructor, ledger: Ledger) -> Evaluation:
@@ -195,11 +195,11 @@ def run_ledger(run: ProtocolRun, reconstructor: Reconstructor) -> Ledger:
 
 
 def _task(run: ProtocolRun, press: PressWanted, *, make: bool) -> PressTask:
-    return PressTask(run.picture(press), press.truth.shape, press if make else None)
+    return PressTask(run.image(press), press.truth.shape, press if make else None)
 
 
 def _is_measured(task: PressTask, ledger: Ledger) -> bool:
-    key = ledger.key(task.picture, task.shape)
+    key = ledger.key(task.image, task.shape)
     return key is not None and ledger.find(key) is not None
 
 

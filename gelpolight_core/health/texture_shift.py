@@ -1,4 +1,4 @@
-"""How far the membrane has moved in the picture, seen by its own grain and specks."""
+"""How far the membrane has moved in the image, seen by its own grain and specks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LEAST_PEAK = 8.0
 def texture_shift_px(
     seen: Map, base: Map, usable: Mask, table: ResamplingTable
 ) -> tuple[float, float] | None:
-    """Return how far the membrane's texture has moved in the camera's picture.
+    """Return how far the membrane's texture has moved in the camera's image.
 
     By phase correlation of the grain, which neither the brightness nor the fall of the light moves.
 
@@ -36,7 +36,7 @@ def texture_shift_px(
     usable : (rows, columns) bool
         Nodes that are lit in both.
     table : ResamplingTable
-        The grid and where its nodes are in the picture.
+        The grid and where its nodes are in the image.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def texture_shift_px(
 
 
 def _texture(light: Map, inside: Mask, sigma: float) -> Map:
-    """Return the grain of a picture: brightness over its own surroundings, less 1."""
+    """Return the grain of an image: brightness over its own surroundings, less 1."""
     grey = np.where(inside, light.sum(axis=2), 0.0).astype(np.float32)
     share = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), sigma)
     around = cv2.GaussianBlur(grey, (0, 0), sigma) / np.maximum(share, 1e-6)

@@ -44,7 +44,7 @@ def is_complete_image(data: bytes) -> bool:
     return False
 
 
-def decode_picture(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[Any, Any] | None:
+def decode_image(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> np.ndarray[Any, Any] | None:
     """Return the values of an image file in OpenCV's order; None if the file is not complete.
 
     Parameters

@@ -1,7 +1,7 @@
-"""Noise-scaled difference between a press and the picture without contact.
+"""Noise-scaled difference between a press and the image without contact.
 
-A difference means something only against the noise and the drift of the light that two pictures
-of the same membrane always show, so both are measured on the pictures themselves.
+A difference means something only against the noise and the drift of the light that two images
+of the same membrane always show, so both are measured on the images themselves.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from gelpolight_core.translation import tr
 Array = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
-# Two pictures taken one after the other repeat to about this share of their brightness (flicker of
+# Two images taken one after the other repeat to about this share of their brightness (flicker of
 # the light, settling of the membrane); smaller differences are no indentation even without noise.
 REPEATABILITY = 0.01
-# Rounding two 8-bit pictures leaves this much, however quiet the camera is.
+# Rounding two 8-bit images leaves this much, however quiet the camera is.
 ROUNDING = float(np.sqrt(2.0 / 12.0) / 255.0)
-# Below this brightness a ratio of two pictures is mostly rounding.
+# Below this brightness a ratio of two images is mostly rounding.
 DARK = 4.0 / 255.0
 # Beyond a quarter, the exposure or a light was changed and not merely warm.
 LARGEST_GAIN_CHANGE = 0.25
@@ -34,7 +34,7 @@ _ENOUGH = 60_000
 
 @dataclass(frozen=True, slots=True)
 class ScaledDifference:
-    """What changed between two pictures, in units of what changes without a press.
+    """What changed between two images, in units of what changes without a press.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class ScaledDifference:
     valid_small : (small rows, small columns) bool
         The working area on that grid.
     factor : int
-        How many pixels of the picture make one of `scaled`.
+        How many pixels of the image make one of `scaled`.
     gain : tuple of 3 floats
         Brightness of the press over that of the background where nothing touches, per channel.
     noise : tuple of 3 floats
@@ -75,28 +75,28 @@ def prepare_pair(
     name: str = "press",
     background_name: str = "background",
 ) -> tuple[Array, Array, Mask]:
-    """Return two pictures without holes, and the area in which they can be compared.
+    """Return two images without holes, and the area in which they can be compared.
 
     Parameters
     ----------
     press, background : (rows, columns, 3)
-        Pictures; pixels that are not finite are left out of the area and set to 0.
+        Images; pixels that are not finite are left out of the area and set to 0.
     valid : (rows, columns) bool or None
         The working area; without it, the lit part of `background`.
     name, background_name : str, optional
-        What to call the pictures in messages.
+        What to call the images in messages.
 
     Returns
     -------
     press, background : (rows, columns, 3) float32
-        Finite pictures.
+        Finite images.
     area : (rows, columns) bool
         Where they count.
 
     Raises
     ------
     InputError
-        If the shapes do not fit or a picture is black or saturated.
+        If the shapes do not fit or an image is black or saturated.
     """
     _check_shapes(press, background, valid, name, background_name)
     # One sum is finite only where all six values are.
@@ -110,12 +110,12 @@ def prepare_pair(
 
 
 def lit_area(background: Array, name: str = "background") -> Mask:
-    """Return the lit part of a picture without contact: its largest bright region, holes filled.
+    """Return the lit part of an image without contact: its largest bright region, holes filled.
 
     Parameters
     ----------
     background : (rows, columns, 3)
-        Picture without contact, finite.
+        Image without contact, finite.
     name : str, optional
         What to call it in messages.
 
@@ -131,7 +131,7 @@ def lit_area(background: Array, name: str = "background") -> Mask:
     regions, _ = cv2.findContours(bright.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not regions:
         raise InputError(
-            tr("the picture is all black"),
+            tr("the image is all black"),
             where=name,
             advice=tr("Switch the lights on and check the exposure"),
         )
@@ -143,17 +143,17 @@ def lit_area(background: Array, name: str = "background") -> Mask:
 def _check_shapes(
     press: Array, background: Array, valid: Mask | None, name: str, background_name: str
 ) -> None:
-    for picture, what in ((press, name), (background, background_name)):
-        if picture.ndim != 3 or picture.shape[2] != 3 or min(picture.shape[:2]) < 32:
+    for image, what in ((press, name), (background, background_name)):
+        if image.ndim != 3 or image.shape[2] != 3 or min(image.shape[:2]) < 32:
             raise InputError(
-                tr("the array has shape {shape}").format(shape=picture.shape),
+                tr("the array has shape {shape}").format(shape=image.shape),
                 where=what,
-                advice=tr("Give a colour picture of at least 32x32 pixels"),
+                advice=tr("Give a colour image of at least 32x32 pixels"),
             )
     for other, what in ((background, background_name), (valid, tr("working area"))):
         if other is not None and other.shape[:2] != press.shape[:2]:
             raise InputError(
-                tr("the picture is {w}x{h} pixels and {other} is {ow}x{oh}").format(
+                tr("the image is {w}x{h} pixels and {other} is {ow}x{oh}").format(
                     w=press.shape[1],
                     h=press.shape[0],
                     other=what,
@@ -165,35 +165,35 @@ def _check_shapes(
             )
 
 
-def _check_exposure(picture: Array, area: Mask, name: str) -> None:
-    step = max(1, min(picture.shape[:2]) // 256)
-    inside = picture[::step, ::step][area[::step, ::step]]
+def _check_exposure(image: Array, area: Mask, name: str) -> None:
+    step = max(1, min(image.shape[:2]) // 256)
+    inside = image[::step, ::step][area[::step, ::step]]
     if len(inside) == 0:
         raise InputError(
             tr("the working area is empty"),
             where=name,
-            advice=tr("Check the working area and the pictures"),
+            advice=tr("Check the working area and the images"),
         )
     brightest = inside.max(axis=1)
     if float(np.median(brightest)) < DARK:
         raise InputError(
-            tr("the picture is all black"),
+            tr("the image is all black"),
             where=name,
             advice=tr("Switch the lights on and check the exposure"),
         )
     share = float(np.mean(brightest >= SATURATED))
     if share > 0.5:
         raise InputError(
-            tr("{share:.0f} % of the picture is saturated").format(share=100.0 * share),
+            tr("{share:.0f} % of the image is saturated").format(share=100.0 * share),
             where=name,
             advice=tr("Shorten the exposure and capture it again"),
         )
 
 
-def _without_holes(picture: Array, finite: Mask) -> Array:
+def _without_holes(image: Array, finite: Mask) -> Array:
     if not finite.all():
-        picture = np.where(finite[..., None], picture, np.float32(0.0))
-    return picture.astype(np.float32, copy=False)
+        image = np.where(finite[..., None], image, np.float32(0.0))
+    return image.astype(np.float32, copy=False)
 
 
 def pixel_noise(difference: Array, inside: Mask) -> Array:
@@ -205,7 +205,7 @@ def pixel_noise(difference: Array, inside: Mask) -> Array:
     Parameters
     ----------
     difference : (rows, columns, 3)
-        Any picture.
+        Any image.
     inside : (rows, columns) bool
         Which pixels count.
     """
@@ -226,7 +226,7 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
     Parameters
     ----------
     press, background : (rows, columns, 3)
-        Pictures of equal size, already averaged over a few pixels.
+        Images of equal size, already averaged over a few pixels.
     inside : (rows, columns) bool
         Which pixels count.
     """
@@ -237,7 +237,7 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
     )
     for k in range(3):
         total = before[..., k] + after[..., k]
-        # Chosen by the sum: choosing by one picture's noise would bias the ratio.
+        # Chosen by the sum: choosing by one image's noise would bias the ratio.
         lit = inside & (total > max(2.0 * DARK, 0.2 * float(total[inside].max(initial=0.0))))
         if np.count_nonzero(lit) >= 16:
             below = np.maximum(thin_out(before[..., k][lit]), np.float32(0.25 * DARK))
@@ -248,7 +248,7 @@ def match_gain(press: Array, background: Array, inside: Mask) -> Array:
 def _densest(ratio: Array) -> float:
     """Return where values crowd most: the shortest fifth, polished by Tukey's biweight.
 
-    The undisturbed membrane is a narrow peak, whatever share of the picture it is; an indentation
+    The undisturbed membrane is a narrow peak, whatever share of the image it is; an indentation
     spreads over all brightnesses.
     """
     ordered = np.sort(ratio)
@@ -268,12 +268,12 @@ def _densest(ratio: Array) -> float:
 def scale_difference(
     press: Array, background: Array, valid: Mask, *, widest_px: int = 640
 ) -> ScaledDifference:
-    """Return the difference of two pictures in units of its own noise.
+    """Return the difference of two images in units of its own noise.
 
     Parameters
     ----------
     press, background : (rows, columns, 3)
-        Pictures of equal size, finite.
+        Images of equal size, finite.
     valid : (rows, columns) bool
         The working area.
     widest_px : int, optional
@@ -321,9 +321,9 @@ def change_where(change: ScaledDifference, background: Array, where: Mask) -> fl
     Parameters
     ----------
     change : ScaledDifference
-        Of these pictures.
+        Of these images.
     background : (rows, columns, 3)
-        Picture without contact.
+        Image without contact.
     where : (rows, columns) bool
         Which pixels count.
     """
@@ -360,12 +360,12 @@ def thin_out(values: Array) -> Array:
     return values[:: max(1, len(values) // _ENOUGH)]
 
 
-def _shrink(picture: Array, factor: int) -> Array:
+def _shrink(image: Array, factor: int) -> Array:
     """Return block means; rows and columns that do not fill a block are left out."""
     if factor == 1:
-        return picture
-    rows, columns = picture.shape[0] // factor, picture.shape[1] // factor
-    cropped = picture[: rows * factor, : columns * factor]
+        return image
+    rows, columns = image.shape[0] // factor, image.shape[1] // factor
+    cropped = image[: rows * factor, : columns * factor]
     return np.asarray(cv2.resize(cropped, (columns, rows), interpolation=cv2.INTER_AREA))
 
 
@@ -374,7 +374,7 @@ def _smooth_noise(smooth: Array, inside: Mask) -> Array:
 
     Second differences over a few pixels, so that noise which was already correlated (resampling,
     demosaicing) is seen in full; the lower quartile, so that an indentation over half of the
-    picture does not count as noise.
+    image does not count as noise.
     """
     lag = 4
     if inside.shape[1] <= 2 * lag:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.mirror import MirrorSpots
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.quality import QualityTable, judge
@@ -54,14 +54,14 @@ class CrosstalkResult:
     quality: QualityTable
 
 
-def find_crosstalk(spots: MirrorSpots, single_led: Sequence[Picture] = ()) -> CrosstalkResult:
+def find_crosstalk(spots: MirrorSpots, single_led: Sequence[LinearImage] = ()) -> CrosstalkResult:
     """Find the crosstalk, from single-LED images if there are any, otherwise from mirror spots.
 
     Parameters
     ----------
     spots : MirrorSpots
         Spots of the three LEDs.
-    single_led : sequence of 3 Picture, optional
+    single_led : sequence of 3 LinearImage, optional
         The whiteboard or bare membrane with only the red, the green or the blue LED on.
 
     Raises
@@ -72,7 +72,7 @@ def find_crosstalk(spots: MirrorSpots, single_led: Sequence[Picture] = ()) -> Cr
     mirror, measured = crosstalk_from_spots(spots)
     if not single_led:
         return CrosstalkResult(mirror, "mirror", _judge_mirror(mirror, measured))
-    columns = [_column(picture, k) for k, picture in enumerate(single_led)]
+    columns = [_column(image, k) for k, image in enumerate(single_led)]
     matrix = np.stack([column for column, _ in columns], axis=1)
     figures = [
         judge(
@@ -159,11 +159,11 @@ def crosstalk_from_spots(spots: MirrorSpots) -> tuple[Array, NDArray[np.bool_]]:
     return matrix, measured
 
 
-def _column(picture: Picture, led: int) -> tuple[Array, float]:
+def _column(image: LinearImage, led: int) -> tuple[Array, float]:
     """Return the response of each channel to one LED, and its scatter over the image."""
-    blocks = _block_means(picture.rgb.astype(np.float64))
+    blocks = _block_means(image.rgb.astype(np.float64))
     own = blocks[:, led]
-    _refuse_unfit(blocks, led, f"single_led/{picture.name}")
+    _refuse_unfit(blocks, led, f"single_led/{image.name}")
     brightest = float(np.quantile(own, 0.99))
     good = (own > WELL_EXPOSED * brightest) & (blocks.max(axis=1) < SATURATED)
     column, scatter = np.eye(3)[led], 0.0

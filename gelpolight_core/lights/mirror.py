@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.quality import QualityTable, judge
 from gelpolight_core.session.images import require_colour
@@ -93,13 +93,13 @@ class MirrorSpots:
 
 
 def find_mirror_spots(
-    picture: Picture, *, placed: Mapping[int, tuple[float, float]] | None = None
+    image: LinearImage, *, placed: Mapping[int, tuple[float, float]] | None = None
 ) -> MirrorSpots:
     """Find the reflections of the three LEDs in the mirror image.
 
     Parameters
     ----------
-    picture : Picture
+    image : LinearImage
         The mirror on the top surface, all three LEDs on, room dark.
     placed : mapping of int to (u, v), optional
         Spots set by the user, by LED, in pixels. A position on the centroid of a detected spot
@@ -111,9 +111,9 @@ def find_mirror_spots(
         If the image is grey, black or flooded with light, or if a spot is missing, merged with
         another, cut by the border, or has a rival of similar brightness in its own colour.
     """
-    where = f"mirror/{picture.name}"
-    require_colour(picture, where=where)
-    rgb = picture.rgb.astype(np.float64)
+    where = f"mirror/{image.name}"
+    require_colour(image, where=where)
+    rgb = image.rgb.astype(np.float64)
     brightest = rgb.max(axis=2)
     _refuse_hopeless(brightest, where)
     noise = _noise(rgb)
@@ -137,20 +137,20 @@ def find_mirror_spots(
 
 
 def spot_near(
-    picture: Picture, place_px: tuple[float, float], *, reach_px: float = 8.0
+    image: LinearImage, place_px: tuple[float, float], *, reach_px: float = 8.0
 ) -> tuple[float, float] | None:
     """Return the centroid of the spot near a position, of any colour, or None if there is none.
 
     Parameters
     ----------
-    picture : Picture
+    image : LinearImage
         The mirror.
     place_px : (u, v)
         Position set by the user.
     reach_px : float, optional
         Largest distance of the centroid.
     """
-    rgb = picture.rgb.astype(np.float64)
+    rgb = image.rgb.astype(np.float64)
     centres = [spot.centre_px for spot in _find_candidates(rgb, _noise(rgb))]
     near = min(centres, key=lambda centre: math.dist(centre, place_px), default=None)
     return near if near is not None and math.dist(near, place_px) <= reach_px else None

@@ -213,7 +213,7 @@ def evaluate_presses(
     Parameters
     ----------
     folder : Path
-        Pictures and ``truth.csv``.
+        Images and ``truth.csv``.
     measure : callable (image's path, shape) -> Measurement
         From :func:`~gelpolight_core.measurement.presses.press_measurement`.
     progress : callable, optional
@@ -226,18 +226,18 @@ def evaluate_presses(
     Raises
     ------
     InputError
-        ``truth.csv`` cannot be used, or a file it names is missing. A picture that cannot be
+        ``truth.csv`` cannot be used, or a file it names is missing. An image that cannot be
         reconstructed or measured is a result with its reason instead.
     """
     table = read_truth(folder)
     missing = [row.file for row in table.rows if not (folder / row.file).is_file()]
     if missing:
         raise InputError(
-            tr("{count} of {all} pictures are missing, first {file}").format(
+            tr("{count} of {all} images are missing, first {file}").format(
                 count=len(missing), all=len(table.rows), file=missing[0]
             ),
             where=str(folder / "truth.csv"),
-            advice=tr("Put the pictures beside truth.csv or take their rows out"),
+            advice=tr("Put the images beside truth.csv or take their rows out"),
         )
     outcomes: list[Measurement | str] = []
     for k, row in enumerate(table.rows):
@@ -280,12 +280,12 @@ def measure_press(
     measure: Callable[[Path, str], Measurement],
     ledger: Ledger | None = None,
 ) -> Measurement | str:
-    """Measure the object in a picture, or return as a sentence why it cannot be measured.
+    """Measure the object in an image, or return as a sentence why it cannot be measured.
 
     Parameters
     ----------
     path : Path
-        The picture.
+        The image.
     shape : str
         What is pressed.
     measure : callable (image's path, shape) -> Measurement

@@ -176,15 +176,15 @@ def write_evaluation(evaluation: Evaluation, folder: Path) -> tuple[Path, ...]:
     InputError
         A file cannot be written.
     """
-    picture = io.BytesIO()
-    evaluation_figure(evaluation).savefig(picture, format="png", dpi=150)
+    image = io.BytesIO()
+    evaluation_figure(evaluation).savefig(image, format="png", dpi=150)
     contents = {
         "evaluation.txt": (evaluation_table(evaluation) + "\n").encode(),
         "evaluation.csv": _csv_text(evaluation).encode(),
         "evaluation.json": (
             json.dumps(evaluation_json(evaluation), indent=2, allow_nan=False) + "\n"
         ).encode(),
-        "evaluation.png": picture.getvalue(),
+        "evaluation.png": image.getvalue(),
     }
     for name, content in contents.items():
         write_atomically(folder / name, partial(_write, content))

@@ -1,7 +1,7 @@
 """Measurements that were made already, one line each, so that nothing is measured twice.
 
-A line is found by what its result depends on: the picture's bytes, the shape, and the name that
-the ledger was opened for (the calibration, the model, the program's version). So a picture that
+A line is found by what its result depends on: the image's bytes, the shape, and the name that
+the ledger was opened for (the calibration, the model, the program's version). So an image that
 was taken again, or another calibration, never meets an old result.
 """
 
@@ -60,10 +60,10 @@ class Ledger:
         for line in lines:
             self._take_in(line)
 
-    def key(self, picture: Path, shape: str) -> str | None:
-        """Return what a picture's result is found by; None where the picture cannot be read."""
+    def key(self, image: Path, shape: str) -> str | None:
+        """Return what an image's result is found by; None where the image cannot be read."""
         try:
-            content = picture.read_bytes()
+            content = image.read_bytes()
         except OSError:  # the measurement itself says so in its own words
             return None
         digest = hashlib.sha256(content)

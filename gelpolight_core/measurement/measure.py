@@ -232,7 +232,7 @@ def _checked(
         raise InputError(
             tr("no pixel is usable"),
             where=tr("depth map"),
-            advice=tr("Check the picture and the working area"),
+            advice=tr("Check the image and the working area"),
         )
     if depth_sd_mm is not None:
         usable = (weight > 0.0) & np.isfinite(depth_sd_mm) & (depth_sd_mm > 0.0)
@@ -251,7 +251,7 @@ def _chosen_region(
         raise InputError(
             tr("no object is pressed"),
             where=tr("depth map"),
-            advice=tr("Press the object into the membrane and take the picture again"),
+            advice=tr("Press the object into the membrane and take the image again"),
         )
     if seed_mm is not None:
         return _region_at(regions, x_mm, y_mm, seed_mm)

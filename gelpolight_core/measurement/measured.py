@@ -33,7 +33,7 @@ class Measured:
     value : float
         In `unit`.
     sd : float or None
-        Standard deviation: the picture's noise, the model and the calibration together. None
+        Standard deviation: the image's noise, the model and the calibration together. None
         where the height map states none. Points that a person placed count as known to one node;
         how well lines, rectangles and rims were placed is no part of it.
     unit : str

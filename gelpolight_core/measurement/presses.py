@@ -12,7 +12,7 @@ from gelpolight_core.measurement.measurable import measurable_depth
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.trust import judged
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_picture, require_colour
+from gelpolight_core.session.images import read_image, require_colour
 
 
 def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, str], Measurement]:
@@ -26,9 +26,9 @@ def press_measurement(reconstructor: Reconstructor) -> Callable[[Path, str], Mea
     calibration = reconstructor.calibration
 
     def measure(path: Path, shape: str) -> Measurement:
-        picture = read_picture(path, response=calibration.response)
-        require_colour(picture, where=str(path))
-        heightmap = measurable_depth(reconstructor, picture.rgb, name=path.name, where=str(path))
+        image = read_image(path, response=calibration.response)
+        require_colour(image, where=str(path))
+        heightmap = measurable_depth(reconstructor, image.rgb, name=path.name, where=str(path))
         return judged(measure_heightmap(heightmap, shape=shape), heightmap)
 
     return measure

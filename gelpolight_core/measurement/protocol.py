@@ -55,7 +55,7 @@ class PressWanted:
 
     @property
     def file(self) -> str:
-        """The picture's name, which no other press of a protocol has."""
+        """The image's name, which no other press of a protocol has."""
         t = self.truth
         return (
             f"{t.shape}_s{round(100 * t.size_mm):03d}_h{round(100 * t.height_mm):03d}"
@@ -236,7 +236,7 @@ def _check_lengths(protocol: Protocol, refusal: Callable[[str, str], InputError]
                     tr("{name} holds {length:g}").format(name=name, length=length),
                     tr("Give lengths from 0.05 to 200 mm"),
                 )
-        # The names of the pictures hold hundredths of a millimetre.
+        # The names of the images hold hundredths of a millimetre.
         if len({round(100 * length) for length in lengths}) < len(lengths):
             raise refusal(
                 tr("{name} holds a length twice").format(name=name), tr("Name each length once")

@@ -2,7 +2,7 @@
 
     protocol.toml   presses/*.png   presses/truth.csv   refused.csv   discarded/*.png
 
-A press counts once its row stands in ``truth.csv``; its picture is on the disk before. Nothing
+A press counts once its row stands in ``truth.csv``; its image is on the disk before. Nothing
 else is kept of where a run stands, so a run that was killed goes on with the press it was at.
 """
 
@@ -31,7 +31,7 @@ from gelpolight_core.measurement.protocol_file import (
     read_protocol_file,
     write_protocol_file,
 )
-from gelpolight_core.session.capture import average_frames, write_picture
+from gelpolight_core.session.capture import average_frames, write_image
 from gelpolight_core.translation import tr
 
 PRESSES, DISCARDED, REFUSED = "presses", "discarded", "refused.csv"
@@ -101,7 +101,7 @@ class ProtocolRun:
 
     @property
     def presses(self) -> Path:
-        """The folder of the pictures and ``truth.csv``."""
+        """The folder of the images and ``truth.csv``."""
         return self.folder / PRESSES
 
     @property
@@ -126,12 +126,12 @@ class ProtocolRun:
         """Return what to press next; None at the end."""
         return next((press for press in self.wanted if press.file not in self._rows), None)
 
-    def picture(self, press: PressWanted) -> Path:
-        """Return where a press's picture is, or shall be."""
+    def image(self, press: PressWanted) -> Path:
+        """Return where a press's image is, or shall be."""
         return self.presses / press.file
 
     def accept(self, press: PressWanted, frames: Sequence[NDArray[Any]]) -> Path:
-        """Keep a press: its frames averaged in one picture, and its row in ``truth.csv``.
+        """Keep a press: its frames averaged in one image, and its row in ``truth.csv``.
 
         Parameters
         ----------
@@ -145,12 +145,12 @@ class ProtocolRun:
         InputError
             If the disk refuses it; the press is then asked for again.
         """
-        write_picture(average_frames(frames), self.picture(press))
+        write_image(average_frames(frames), self.image(press))
         self.record(press)
-        return self.picture(press)
+        return self.image(press)
 
     def record(self, press: PressWanted) -> None:
-        """Count a press whose picture is in its place already.
+        """Count a press whose image is in its place already.
 
         Raises
         ------
@@ -182,7 +182,7 @@ class ProtocolRun:
         self._refused += 1
 
     def take_back(self, press: PressWanted) -> Path | None:
-        """Make a press again: its picture goes to ``discarded``; return its place there.
+        """Make a press again: its image goes to ``discarded``; return its place there.
 
         Raises
         ------
@@ -195,18 +195,18 @@ class ProtocolRun:
                 where=press.file,
                 advice=tr("Choose one that is done"),
             )
-        # The row first: without it the picture is only a picture, and nothing is lost.
+        # The row first: without it the image is only an image, and nothing is lost.
         rows = {file: row for file, row in self._rows.items() if file != press.file}
         _write_rows(list(rows.values()), self.presses)
         self._rows = rows
-        picture = self.picture(press)
-        if not picture.is_file():
+        image = self.image(press)
+        if not image.is_file():
             return None
         make_folder(self.folder / DISCARDED)
         stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")
-        kept = self.folder / DISCARDED / f"{picture.stem}_{stamp}.png"
+        kept = self.folder / DISCARDED / f"{image.stem}_{stamp}.png"
         try:
-            os.replace(picture, kept)
+            os.replace(image, kept)
         except OSError as error:
             raise cannot_write(error, kept) from error
         return kept
@@ -267,14 +267,14 @@ def open_run(folder: Path) -> ProtocolRun:
                 where=str(presses / TRUTH),
                 advice=tr("Put protocol.toml and truth.csv back as they were written"),
             )
-        # A picture that was taken away is asked for again.
+        # An image that was taken away is asked for again.
         if (presses / row[0]).is_file():
             rows[row[0]] = row
     return ProtocolRun(folder, content, rows)
 
 
 def presses_folder(folder: Path) -> Path:
-    """Return the folder of pictures and ``truth.csv`` that a run's or a session's folder holds."""
+    """Return the folder of images and ``truth.csv`` that a run's or a session's folder holds."""
     inner = folder / PRESSES
     return inner if not (folder / TRUTH).is_file() and (inner / TRUTH).is_file() else folder
 
@@ -285,7 +285,7 @@ def crossing_of(presses: Path) -> Crossing | None:
     Parameters
     ----------
     presses : Path
-        The folder of the pictures, in that of the run.
+        The folder of the images, in that of the run.
 
     Raises
     ------
@@ -337,7 +337,7 @@ def _read_rows(path: Path) -> list[list[str]]:
         raise InputError(
             tr("The file cannot be read ({reason})").format(reason=error),
             where=str(path),
-            advice=tr("Mend it; the pictures beside it are whole"),
+            advice=tr("Mend it; the images beside it are whole"),
         ) from error
     if not lines or tuple(lines[0]) != COLUMNS:
         raise InputError(

@@ -53,7 +53,7 @@ class Measurement:
     reason : str
         Why doubtful; empty when ok.
     noise_sd : dict or None
-        The part that repeats of the picture scatter by; None where the map's noise is not known.
+        The part that repeats of the image scatter by; None where the map's noise is not known.
     calibration_sd : dict or None
         The part that is common to all measurements with this calibration; None where it is not
         known.

@@ -23,19 +23,19 @@ Frame = NDArray[Any]
 CONTACT_CHANGE = 0.06
 """The walls of a press change the light by tens of percent, warming LEDs by one or two."""
 PRESSED_SHARE = 0.004
-"""A cylinder of 3 mm and 0.5 mm height changes a hundredth of a picture 30 mm wide."""
+"""A cylinder of 3 mm and 0.5 mm height changes a hundredth of an image 30 mm wide."""
 LIFTED_SHARE = 0.001
 LEAST_FRAMES = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """What a picture shows that the bare membrane does not.
+    """What an image shows that the bare membrane does not.
 
     Attributes
     ----------
     share : float
-        Share of the picture that is changed.
+        Share of the image that is changed.
     centre_px : (float, float)
         Its middle, (u, v) in pixels; NaN where nothing is changed.
     """
@@ -65,7 +65,7 @@ class PressJudgement:
     reason : str
         Why not, and what to do; empty when accepted.
     moving_share : float
-        Largest share of the picture that changed between two of the frames.
+        Largest share of the image that changed between two of the frames.
     contact : Contact
         What is pressed.
     """
@@ -126,7 +126,7 @@ def judge_press(
     if len(frames) < LEAST_FRAMES:
         return PressJudgement(False, tr("One frame cannot show stillness."), math.nan, nowhere)
     if any(f.shape != bare.shape or f.dtype != bare.dtype for f in frames):
-        reason = tr("The camera's picture has another size than that of the bare membrane.")
+        reason = tr("The camera's image has another size than that of the bare membrane.")
         return PressJudgement(False, reason, math.nan, nowhere)
     # The first and the last too: a slow creep is no movement from one frame to the next.
     pairs = [*pairwise(frames), (frames[0], frames[-1])]
@@ -143,7 +143,7 @@ def _reason(
     if not contact.pressed:
         return tr("Nothing is pressed: press the object in until its base touches.")
     if moving > MOVING_SHARE:
-        return tr("It moved ({share:.1f} % of the picture changed): hold it still.").format(
+        return tr("It moved ({share:.1f} % of the image changed): hold it still.").format(
             share=100.0 * moving
         )
     if place_px is not None:

@@ -24,7 +24,7 @@ class PressTruth:
     Attributes
     ----------
     file : str
-        Picture, without its folder.
+        Image, without its folder.
     truth : Truth
         Nominal sizes.
     region, repeat : str
@@ -77,19 +77,19 @@ def read_truth(path: Path) -> TruthTable:
         file, shape = record.get("file", ""), record.get("shape", "").lower()
         if not file:
             raise InputError(
-                tr("a row names no file"), where=where, advice=tr("Name the picture of the press")
+                tr("a row names no file"), where=where, advice=tr("Name the image of the press")
             )
         if not is_file_name(file):
             raise InputError(
-                tr("'{file}' is not the name of a picture in this folder").format(file=brief(file)),
+                tr("'{file}' is not the name of an image in this folder").format(file=brief(file)),
                 where=where,
-                advice=tr("Put the picture beside truth.csv, and name it without a folder"),
+                advice=tr("Put the image beside truth.csv, and name it without a folder"),
             )
         if file in seen:
             raise InputError(
                 tr("{file} stands here a second time").format(file=file),
                 where=where,
-                advice=tr("Keep one row for each picture"),
+                advice=tr("Keep one row for each image"),
             )
         seen.add(file)
         if shape in MODELS:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.translation import tr
 
@@ -64,12 +64,12 @@ def check_exposure(grey: NDArray[np.float32], name: str) -> None:
     raise InputError(found, where=name, advice=advice)
 
 
-def saturated_share(picture: Picture, corners: Array) -> float:
+def saturated_share(image: LinearImage, corners: Array) -> float:
     """Return the saturated share of the lighter half of the board.
 
     Parameters
     ----------
-    picture : Picture
+    image : LinearImage
         In colour: one saturated channel is enough.
     corners : (rows, columns, 2)
         (u, v) of the board's corners.
@@ -84,7 +84,7 @@ def saturated_share(picture: Picture, corners: Array) -> float:
     )
     left, top = np.maximum(np.floor(outline.min(axis=0)).astype(int), 0)
     right, bottom = np.ceil(outline.max(axis=0)).astype(int)
-    cut = picture.rgb[top : bottom + 1, left : right + 1]
+    cut = image.rgb[top : bottom + 1, left : right + 1]
     mask = np.zeros(cut.shape[:2], dtype=np.uint8)
     cv2.fillPoly(mask, [np.round(outline - [left, top]).astype(np.int32)], (1.0,))
     full: NDArray[np.bool_] = np.asarray((cut >= SATURATED).any(axis=2))

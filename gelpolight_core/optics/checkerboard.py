@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
     EDGE_OF_SIGMA,
     MIN_CONTRAST,
@@ -64,7 +64,7 @@ class BoardView:
         Name of the image.
     board : BoardSpec
         The board.
-    picture_size : (width, height)
+    image_size : (width, height)
         Size of the image, in pixels.
     corners_px : (N, 2)
         (u, v) of the inner corners, row by row, in the order of ``board.points_mm``; in the image,
@@ -89,7 +89,7 @@ class BoardView:
 
     name: str
     board: BoardSpec
-    picture_size: tuple[int, int]
+    image_size: tuple[int, int]
     corners_px: Array
     homography_rms_px: float
     homography_max_px: float
@@ -103,12 +103,12 @@ class BoardView:
     tilt_deg: float
 
 
-def find_board(picture: Picture, board: BoardSpec, *, rough: Array | None = None) -> BoardView:
+def find_board(image: LinearImage, board: BoardSpec, *, rough: Array | None = None) -> BoardView:
     """Find the inner corners of a checkerboard, and verify that it is the stated one.
 
     Parameters
     ----------
-    picture : Picture
+    image : LinearImage
         Any size; colours are averaged.
     board : BoardSpec
         The expected board.
@@ -127,46 +127,46 @@ def find_board(picture: Picture, board: BoardSpec, *, rough: Array | None = None
         If the image is black, uniform, saturated or blurred, shows no board, or shows a board with
         another number of squares.
     """
-    grey = _average_of_channels(picture)
-    check_exposure(grey, picture.name)
+    grey = _average_of_channels(image)
+    check_exposure(grey, image.name)
     if rough is None:
         rough = find_rough_corners(grey, board.inner_corners)
     if rough is None:
-        _refuse_other_size(grey, board, picture.name)
+        _refuse_other_size(grey, board, image.name)
         rough = search_rough_corners(grey, board.inner_corners)
     if rough is None:
-        raise _absent(grey, board, picture.name)
+        raise _absent(grey, board, image.name)
     grid = fit_grid(grey, rough)
     if not is_checkered(grey, grid):
-        _refuse_other_size(grey, board, picture.name)
-        raise _absent(grey, board, picture.name)
+        _refuse_other_size(grey, board, image.name)
+        raise _absent(grey, board, image.name)
     if goes_on(grey, grid):
-        _refuse_other_size(grey, board, picture.name)
-        raise _larger(board, picture.name)
-    view = _describe(picture, grey, board, grid)
+        _refuse_other_size(grey, board, image.name)
+        raise _larger(board, image.name)
+    view = _describe(image, grey, board, grid)
     _check_view(view)
     return view
 
 
-def _average_of_channels(picture: Picture) -> NDArray[np.float32]:
-    red, green, blue = (picture.rgb[..., k] for k in range(3))
+def _average_of_channels(image: LinearImage) -> NDArray[np.float32]:
+    red, green, blue = (image.rgb[..., k] for k in range(3))
     return np.asarray((red + green + blue) / np.float32(3.0), dtype=np.float32)
 
 
 def _describe(
-    picture: Picture, grey: NDArray[np.float32], board: BoardSpec, grid: Crossings
+    image: LinearImage, grey: NDArray[np.float32], board: BoardSpec, grid: Crossings
 ) -> BoardView:
     corners = np.ascontiguousarray(grid.corners_px.reshape(-1, 2))
     flat = board.points_mm[:, :2]
     matrix, _ = cv2.findHomography(flat, corners)
     off = np.linalg.norm(apply_homography(matrix, flat[:, 0], flat[:, 1]) - corners, axis=1)
-    rest = grid_misfit_px(flat, corners, matrix, picture.size)
+    rest = grid_misfit_px(flat, corners, matrix, image.size)
     steps = [np.linalg.norm(np.diff(grid.corners_px, axis=axis), axis=-1) for axis in (0, 1)]
     low, high = corners.min(axis=0), corners.max(axis=0)
     return BoardView(
-        name=picture.name,
+        name=image.name,
         board=board,
-        picture_size=picture.size,
+        image_size=image.size,
         corners_px=corners,
         homography_rms_px=float(np.sqrt(np.mean(off**2))),
         homography_max_px=float(off.max()),
@@ -175,7 +175,7 @@ def _describe(
         square_px=float(np.median(np.concatenate([s.ravel() for s in steps]))),
         edge_width_px=float(EDGE_OF_SIGMA * np.median(grid.sigma_px)),
         contrast=float(2.0 * np.median(np.abs(grid.amplitude))),
-        saturated_share=saturated_share(picture, grid.corners_px),
+        saturated_share=saturated_share(image, grid.corners_px),
         bounding_box_px=(float(low[0]), float(low[1]), float(high[0]), float(high[1])),
         tilt_deg=foreshortening_tilt_deg(matrix, flat.mean(axis=0)),
     )
@@ -195,7 +195,7 @@ def _check_view(view: BoardView) -> None:
             ),
             advice=tr("Use more light on the board, or a longer exposure"),
         )
-    limit_px = min(edge_limit_px(view.picture_size[0]), MAX_EDGE_OF_SQUARE * view.square_px)
+    limit_px = min(edge_limit_px(view.image_size[0]), MAX_EDGE_OF_SQUARE * view.square_px)
     if view.edge_width_px > limit_px:
         raise blur_error(view.edge_width_px, limit_px, view.name)
     if (

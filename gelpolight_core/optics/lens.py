@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.lens_fit import (
     HeldOutViews,
@@ -101,7 +101,7 @@ class LensResult:
 
 
 def calibrate_lens(
-    pictures: Sequence[Picture],
+    images: Sequence[LinearImage],
     board: BoardSpec,
     *,
     refused: Mapping[str, InputError] | None = None,
@@ -110,7 +110,7 @@ def calibrate_lens(
 
     Parameters
     ----------
-    pictures : sequence of Picture
+    images : sequence of LinearImage
         At least 4 usable; best are 10 to 20, tilted by 15 to 40 degrees and covering the whole
         image.
     board : BoardSpec
@@ -130,10 +130,8 @@ def calibrate_lens(
         If images differ in size, fewer than 4 views are left, the views are too nearly parallel to
         give a focal length, or the intrinsics cannot be those of a camera.
     """
-    size = _common_size(pictures)
-    views = leave_out_duplicates(
-        list(in_parallel(lambda picture: find_view(picture, board), pictures))
-    )
+    size = _common_size(images)
+    views = leave_out_duplicates(list(in_parallel(lambda image: find_view(image, board), images)))
     views += [refused_view(name, fault) for name, fault in (refused or {}).items()]
     try:
         return _solve(views, size)
@@ -211,27 +209,27 @@ def _folding_of(camera: Camera) -> str | None:
     return None
 
 
-def _common_size(pictures: Sequence[Picture]) -> tuple[int, int]:
-    if len(pictures) < MIN_VIEWS:
+def _common_size(images: Sequence[LinearImage]) -> tuple[int, int]:
+    if len(images) < MIN_VIEWS:
         raise InputError(
             tr("There are {n} images, but at least {m} are needed").format(
-                n=len(pictures), m=MIN_VIEWS
+                n=len(images), m=MIN_VIEWS
             ),
             where=tr("checkerboard"),
             advice=more_views_advice(),
         )
-    size = pictures[0].size
-    for picture in pictures:
-        if picture.size != size:
+    size = images[0].size
+    for image in images:
+        if image.size != size:
             raise InputError(
                 tr("The image has {a} x {b} pixels, but {name} has {c} x {d}").format(
-                    a=picture.size[0],
-                    b=picture.size[1],
-                    name=pictures[0].name,
+                    a=image.size[0],
+                    b=image.size[1],
+                    name=images[0].name,
                     c=size[0],
                     d=size[1],
                 ),
-                where=f"checkerboard/{picture.name}",
+                where=f"checkerboard/{image.name}",
                 advice=tr("Capture all images of a session at the same size"),
             )
     return size

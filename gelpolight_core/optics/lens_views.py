@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
@@ -98,12 +98,12 @@ def more_views_advice() -> str:
     )
 
 
-def find_view(picture: Picture, board: BoardSpec) -> LensView:
+def find_view(image: LinearImage, board: BoardSpec) -> LensView:
     """Find the board in an image; an image without it becomes an unused view, not an error.
 
     Parameters
     ----------
-    picture : Picture
+    image : LinearImage
         Any size.
     board : BoardSpec
         The expected board.
@@ -114,9 +114,9 @@ def find_view(picture: Picture, board: BoardSpec) -> LensView:
         Used, with its corners, or unused, with the reason.
     """
     try:
-        return LensView(picture.name, True, "", board=find_board(picture, board))
+        return LensView(image.name, True, "", board=find_board(image, board))
     except InputError as refusal:
-        return refused_view(picture.name, refusal)
+        return refused_view(image.name, refusal)
 
 
 def refused_view(name: str, fault: InputError) -> LensView:

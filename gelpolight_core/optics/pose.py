@@ -16,7 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.optics.frame import TopPlane
@@ -101,7 +101,7 @@ class TopPoseResult:
 
 
 def estimate_top_pose(
-    pictures: Sequence[Picture],
+    images: Sequence[LinearImage],
     board: BoardSpec,
     camera: Camera,
     *,
@@ -112,7 +112,7 @@ def estimate_top_pose(
 
     Parameters
     ----------
-    pictures : sequence of Picture
+    images : sequence of LinearImage
         One or more views; the board may lie differently in each.
     board : BoardSpec
         The board on the surface.
@@ -134,63 +134,63 @@ def estimate_top_pose(
         If there is no image, the size differs from the camera's, none shows the board, or three or
         more boards all lie in different planes.
     """
-    _check_images(pictures, camera)
-    looked = [_find_board(picture, board) for picture in pictures]
+    _check_images(images, camera)
+    looked = [_find_board(image, board) for image in images]
     boards = [board_view for board_view, _ in looked if board_view is not None]
     if not boards:
         first = next(refusal for _, refusal in looked if refusal is not None)
         raise InputError(first.found, where=f"top_pose/{first.where}", advice=first.advice)
     candidates = [find_poses(seen, camera) for seen in boards]
     reference, margin = choose_side(candidates)
-    views = _describe(pictures, looked, candidates, reference)
+    views = _describe(images, looked, candidates, reference)
     views = _leave_out_strays(views)
     views += [TopPoseView(name, False, fault.found) for name, fault in (refused or {}).items()]
     return _assemble(views, camera, margin, focal_sd_px)
 
 
-def _check_images(pictures: Sequence[Picture], camera: Camera) -> None:
-    if not pictures:
+def _check_images(images: Sequence[LinearImage], camera: Camera) -> None:
+    if not images:
         raise InputError(
             tr("There is no image of the board on the top surface"),
             where=tr("top_pose"),
             advice=tr("Lay the board on the top surface and capture an image"),
         )
-    for picture in pictures:
-        if picture.size != (camera.width, camera.height):
+    for image in images:
+        if image.size != (camera.width, camera.height):
             raise InputError(
                 tr(
                     "The image has {a} x {b} pixels, but the images of the calibrated camera "
                     "have {c} x {d}"
-                ).format(a=picture.size[0], b=picture.size[1], c=camera.width, d=camera.height),
-                where=f"top_pose/{picture.name}",
+                ).format(a=image.size[0], b=image.size[1], c=camera.width, d=camera.height),
+                where=f"top_pose/{image.name}",
                 advice=tr("Capture all images of a session at the same size"),
             )
 
 
-def _find_board(picture: Picture, board: BoardSpec) -> tuple[BoardView | None, InputError | None]:
+def _find_board(image: LinearImage, board: BoardSpec) -> tuple[BoardView | None, InputError | None]:
     try:
-        return find_board(picture, board), None
+        return find_board(image, board), None
     except InputError as refusal:
         return None, refusal
 
 
 def _describe(
-    pictures: Sequence[Picture],
+    images: Sequence[LinearImage],
     looked: Sequence[tuple[BoardView | None, InputError | None]],
     candidates: Sequence[Sequence[PlanePose]],
     reference: PlanePose,
 ) -> list[TopPoseView]:
     views = []
     found = iter(candidates)
-    for picture, (seen, refusal) in zip(pictures, looked, strict=True):
+    for image, (seen, refusal) in zip(images, looked, strict=True):
         if seen is None:
             reason = refusal.found if refusal is not None else ""
-            views.append(TopPoseView(picture.name, False, reason))
+            views.append(TopPoseView(image.name, False, reason))
             continue
         poses = next(found)
         pose = nearest_pose(poses, reference)
         mirrored = next((p for p in poses if p is not pose), None)
-        views.append(TopPoseView(picture.name, True, "", seen, pose, mirrored))
+        views.append(TopPoseView(image.name, True, "", seen, pose, mirrored))
     return views
 
 

@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 BLOCK_ROWS = 64
 """Rows of the table computed by one thread at a time: few enough to stay in the cache."""
 FLOAT32_MAX_PIXELS = 32_766
-GRID_PER_PICTURE = 8.0
+GRID_PER_IMAGE = 8.0
 # Just before a lens model folds, a hundredth of a pixel changes a ray by degrees.
 BEFORE_FOLD = 0.9
 # A smaller field cannot contain an indentation with undeformed membrane around it.
@@ -219,7 +219,7 @@ def visible_grid(
             advice=tr("Enter the working diameter in mm: the width of the membrane in use"),
         )
     nodes = float(np.prod((high - low) / pitch_mm + 2.0))
-    if nodes > GRID_PER_PICTURE * camera.width * camera.height:
+    if nodes > GRID_PER_IMAGE * camera.width * camera.height:
         raise InputError(
             tr("The membrane grid would have {n:.1e} nodes").format(n=nodes),
             where=tr("camera"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.channels import channel_name
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
@@ -56,7 +56,7 @@ class RadianceResult:
 
 
 def calibrate_radiance(
-    whiteboard: Picture, table: ResamplingTable, led_positions_mm: Array
+    whiteboard: LinearImage, table: ResamplingTable, led_positions_mm: Array
 ) -> RadianceResult:
     """Measure the light intensity from a white diffuse board pressed on the top surface.
 
@@ -67,7 +67,7 @@ def calibrate_radiance(
 
     Parameters
     ----------
-    whiteboard : Picture
+    whiteboard : LinearImage
         Raw image, elastomer mounted, no membrane.
     table : ResamplingTable
         Raw pixel for every membrane node.

@@ -46,12 +46,12 @@ DIFFERS = 0.03
 
 @dataclass(frozen=True, slots=True)
 class BackgroundDrift:
-    """How far an untouched picture is from the calibration's background.
+    """How far an untouched image is from the calibration's background.
 
     Attributes
     ----------
     shift_px : (float, float) or None
-        How far the membrane's texture has moved in the camera's picture, (u, v); None where the
+        How far the membrane's texture has moved in the camera's image, (u, v); None where the
         membrane shows too little of it.
     brightness_percent : (float, float, float)
         Change of red, green and blue, median over the field.
@@ -71,7 +71,7 @@ class BackgroundDrift:
 
 
 def background_drift(frame: NDArray[Any], calibration: AnyCalibration) -> BackgroundDrift:
-    """Compare a picture of the untouched sensor with the calibration's background.
+    """Compare an image of the untouched sensor with the calibration's background.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def background_drift(frame: NDArray[Any], calibration: AnyCalibration) -> Backgr
     ratio = np.where(usable[..., None], seen / np.maximum(base, LEAST_LIGHT), 1.0)
     if not (usable.any() and float(np.median(ratio[usable])) > 0.05):
         raise InputError(
-            tr("the picture is dark where the sensor's membrane is"),
+            tr("the image is dark where the sensor's membrane is"),
             where=tr("background"),
             advice=tr("Switch all three LEDs on"),
         )
@@ -102,7 +102,7 @@ def background_drift(frame: NDArray[Any], calibration: AnyCalibration) -> Backgr
     middle = np.median(coarse[there], axis=0)
     pitch = COARSE * calibration.table.grid.pitch_mm
     touched = _touched(coarse, there, pitch)
-    # Over a quarter of a millimetre the noise of one picture is below what counts.
+    # Over a quarter of a millimetre the noise of one image is below what counts.
     quiet = cv2.GaussianBlur(np.where(there[..., None], coarse, 1.0), (0, 0), QUIET_MM / pitch)
     differs = 100.0 * float((np.abs(quiet[there] - 1.0) > DIFFERS).any(axis=1).mean())
     change = 100.0 * (middle - 1.0)
@@ -127,7 +127,7 @@ def zeroed(
     calibration : Calibration
         To be changed; the result is another.
     frames : sequence of (height, width, 3)
-        Pictures of the untouched sensor, to be averaged; as for :func:`background_drift`.
+        Images of the untouched sensor, to be averaged; as for :func:`background_drift`.
     operator : str
         Who did it.
     made : str
@@ -141,7 +141,7 @@ def zeroed(
     """
     if not frames:
         raise InputError(
-            tr("there is no picture of the untouched sensor"),
+            tr("there is no image of the untouched sensor"),
             where=tr("zero"),
             advice=tr("Take one, with nothing on the sensor"),
         )
@@ -180,11 +180,11 @@ def _on_grid(frames: Sequence[NDArray[Any]], calibration: AnyCalibration) -> Map
     for frame in frames:
         if frame.shape != total.shape:
             raise InputError(
-                tr("the picture is {shape}, the calibration is for {w}x{h}x3").format(
+                tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
                     shape="x".join(str(n) for n in frame.shape), w=camera.width, h=camera.height
                 ),
                 where=tr("background"),
-                advice=tr("Use the calibration of this sensor at this picture size"),
+                advice=tr("Use the calibration of this sensor at this image size"),
             )
         linear = response is None or frame.dtype.kind == "f"
         total += as_linear(frame if linear or response is None else response.linearise(frame))
@@ -238,7 +238,7 @@ def _judge(
         figures.append(
             judge(
                 "drift_shift_px",
-                tr("Membrane moved in the picture"),
+                tr("Membrane moved in the image"),
                 math.hypot(*shift_px),
                 "px",
                 warn=0.5,
@@ -273,7 +273,7 @@ def _judge(
 
 
 def _refuse_unfit(drift: BackgroundDrift) -> None:
-    """Refuse to take a picture for the background that is none, or that zero cannot mend."""
+    """Refuse to take an image for the background that is none, or that zero cannot mend."""
     for key in ("drift_touched", "drift_shift_px"):
         figures = [f for f in drift.quality.figures if f.key == key]
         if figures and figures[0].verdict is Verdict.FAIL:

@@ -1,4 +1,4 @@
-"""What a reconstruction takes: pictures of the right kind, lights that can be solved."""
+"""What a reconstruction takes: images of the right kind, lights that can be solved."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     kind, size = frame.dtype.kind, frame.dtype.itemsize
     if size not in BYTES_OF_KIND.get(kind, ()):
         raise InputError(
-            tr("the picture holds values of type {kind}").format(kind=frame.dtype),
+            tr("the image holds values of type {kind}").format(kind=frame.dtype),
             where=name or tr("image"),
             advice=tr("Give 8 or 16 bit numbers without sign, or floats of linear light 0..1"),
         )

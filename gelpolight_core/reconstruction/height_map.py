@@ -1,4 +1,4 @@
-"""The depth map of one picture, with all that is needed to use it elsewhere."""
+"""The depth map of one image, with all that is needed to use it elsewhere."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Flag(IntFlag):
     """
 
     OUTSIDE = 1
-    """Outside the working area or the picture."""
+    """Outside the working area or the image."""
     SATURATED = 2
     """A channel at its upper end: it says nothing."""
     DARK = 4
@@ -74,12 +74,12 @@ class HeightMap:
     model : str
         ``paper`` or ``full``.
     source : str
-        Name of the picture, such as ``press_03.png``.
+        Name of the image, such as ``press_03.png``.
     notes : tuple of str
         What is to be said of this map, in sentences for a person.
     slope_sd, depth_sd_mm : (rows, columns) float32 or None
-        What repeats of the picture scatter by: standard deviations of the surface's slopes (root
-        mean square of x and y) and of the depth, from the picture's noise. None where they were
+        What repeats of the image scatter by: standard deviations of the surface's slopes (root
+        mean square of x and y) and of the depth, from the image's noise. None where they were
         not asked for, or by the paper's model.
     slope_model_sd, depth_model_sd_mm : (rows, columns) float32 or None
         The same from what the model does not explain of a press: alike in every repeat, another
@@ -89,7 +89,7 @@ class HeightMap:
         (averages over blocks of 4 x 4).
     depth_scale_sd, lateral_scale_sd : float or None
         Relative standard deviations, from the calibration and the lengths stated for it, of
-        depths and slopes, and of lengths across. They are common to all pixels and all pictures of
+        depths and slopes, and of lengths across. They are common to all pixels and all images of
         a calibration: the standard deviation of a depth is the root of the sum of squares of
         `depth_sd_mm`, `depth_model_sd_mm`, and `depth_scale_sd` times the depth. None where the
         calibration does not say.

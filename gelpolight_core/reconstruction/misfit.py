@@ -1,8 +1,8 @@
-"""How well a solved surface explains the picture that it was solved from.
+"""How well a solved surface explains the image that it was solved from.
 
 Three brightnesses decide two slopes: one is over, and says whether the model holds. The paper's
 model solves for a normal of any length (Eq. 10), and its length less 1 is what is over. The full
-model's normals have length 1; there it is the picture that the surface would give beside the one
+model's normals have length 1; there it is the image that the surface would give beside the one
 that was taken.
 """
 
@@ -50,14 +50,14 @@ class Misfit:
 def solve_misfit(
     reconstructor: Reconstructor, frame: NDArray[Any], heightmap: HeightMap, *, largest: int = 200
 ) -> Misfit:
-    """Return how well a height map explains its picture.
+    """Return how well a height map explains its image.
 
     Parameters
     ----------
     reconstructor : Reconstructor
         Which the height map came from.
     frame : (height, width, 3)
-        The raw picture, as given to :meth:`Reconstructor.depth`.
+        The raw image, as given to :meth:`Reconstructor.depth`.
     heightmap : HeightMap
         With normals, where the model is the full one.
     largest : int, optional
@@ -86,7 +86,7 @@ def solve_misfit(
         seen = np.asarray(cv2.blur(linear, (step, step)), np.float32)
         light = None if heightmap.health is None else heightmap.health.light
         gain = np.ones(3) if light is None else light.share
-        left = _picture_misfit(seen, gain, calibration, full, heightmap, thin, inside)
+        left = _image_misfit(seen, gain, calibration, full, heightmap, thin, inside)
     return Misfit(heightmap.model, np.where(inside, left, np.nan).astype(np.float32))
 
 
@@ -100,7 +100,7 @@ def _slope_misfit(heightmap: HeightMap, thin: tuple[slice, slice]) -> Map:
     return np.asarray(left[thin], np.float32)
 
 
-def _picture_misfit(
+def _image_misfit(
     rgb: Map,
     gain: Array,
     calibration: Calibration,

@@ -1,4 +1,4 @@
-"""From one picture to a height map, with nothing but a calibration."""
+"""From one image to a height map, with nothing but a calibration."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Reconstructor:
     Parameters
     ----------
     calibration : Calibration or InPlaceCalibration
-        Of the sensor that the pictures come from.
+        Of the sensor that the images come from.
     model : str, optional
         ``paper``, ``full`` or ``in-place``; by default the one that the calibration was made for.
     terms : Terms, optional
@@ -246,7 +246,7 @@ class Reconstructor:
         frame : (height, width, 3) uint8, uint16 or float32
             RGB; whole numbers as the camera encodes them, float frames linear light 0..1.
         name : str, optional
-            The picture's name, kept in the result.
+            The image's name, kept in the result.
         normals : bool, optional
             Whether the result holds normals.
         uncertainty : bool, optional
@@ -409,11 +409,11 @@ class Reconstructor:
         if frame.shape != (camera.height, camera.width, 3):
             shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
             raise InputError(
-                tr("the picture is {shape}, the calibration is for {w}x{h}x3").format(
+                tr("the image is {shape}, the calibration is for {w}x{h}x3").format(
                     shape=shape, w=camera.width, h=camera.height
                 ),
                 where=name or tr("image"),
-                advice=tr("Use the calibration of this sensor at this picture size"),
+                advice=tr("Use the calibration of this sensor at this image size"),
             )
         frame = accepted(frame, name=name)
         if isinstance(self.calibration, InPlaceCalibration):

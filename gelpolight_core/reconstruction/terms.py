@@ -32,7 +32,7 @@ class Terms:
     free_rim : bool
         The boundary is free where a contact crosses it; else depth 0 is held all around.
     denoising : bool
-        Even parts of the picture are averaged over a few nodes.
+        Even parts of the image are averaged over a few nodes.
     """
 
     near_light_rounds: int = 2

@@ -1,4 +1,4 @@
-"""A few threads that share the rows of a picture."""
+"""A few threads that share the rows of an image."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any
 
-# More blocks than threads, so that an uneven picture keeps all of them busy.
+# More blocks than threads, so that an uneven image keeps all of them busy.
 BLOCKS = 4
-THREAD_NAME = "picture rows"
+THREAD_NAME = "image rows"
 
 
 class RowWorkers:

@@ -121,7 +121,7 @@ class _PressPixels:
 
 def compare_presses(
     presses: Sequence[BallPress],
-    pictures: Sequence[Map],
+    images: Sequence[Map],
     table: ResamplingTable,
     led_positions_mm: Array,
     radiance: RadianceResult,
@@ -131,7 +131,7 @@ def compare_presses(
 
     Parameters
     ----------
-    presses, pictures, table, led_positions_mm, radiance, factors
+    presses, images, table, led_positions_mm, radiance, factors
         As for :func:`~gelpolight_core.reflectance.stage.ball_scatter`.
 
     Returns
@@ -143,8 +143,8 @@ def compare_presses(
         return ()
     strength = radiance.radiance * factors
     pixels = [
-        _gather(press, picture, table, led_positions_mm, strength, radiance.usable)
-        for press, picture in zip(presses, pictures, strict=True)
+        _gather(press, image, table, led_positions_mm, strength, radiance.usable)
+        for press, image in zip(presses, images, strict=True)
     ]
     curves = np.array([_curve(p, b) for p, b in zip(presses, pixels, strict=True)])
     found = []
@@ -188,7 +188,7 @@ def _sentence(text: str) -> str:
 
 def _gather(
     press: BallPress,
-    picture: Map,
+    image: Map,
     table: ResamplingTable,
     led_positions_mm: Array,
     strength: Map,
@@ -202,7 +202,7 @@ def _gather(
     light, _ = light_directions(led_positions_mm, top)
     drift = table.drift[rows, columns].astype(np.float64)
     centre = press.seen_centre_mm(drift.mean(axis=0)) if rows.size else np.zeros(2)
-    raw = picture[rows, columns].astype(np.float64)
+    raw = image[rows, columns].astype(np.float64)
     level = strength[rows, columns].astype(np.float64)
     known = (raw > LEAST_VALUE) & (raw < SATURATED) & (level > 0.0)
     value = np.divide(raw, level, out=np.zeros_like(raw), where=level > 0.0)

@@ -125,11 +125,11 @@ class ShadedPixels:
 def refine_centre(
     pixels: ShadedPixels, start: BallPose, led_positions_mm: Array
 ) -> tuple[BallPose, float, float]:
-    """Move the ball so that its shading explains the picture.
+    """Move the ball so that its shading explains the image.
 
     The light's direction, inverse square and lobe are those at the ball's surface. The membrane is
     taken as a blend of ``cos^m`` and a glossy lobe about the half vector between light and view:
-    leaving the glossy share out pushes the centre outward, as the picture's shading then leans
+    leaving the glossy share out pushes the centre outward, as the image's shading then leans
     towards the viewer.
 
     Parameters

@@ -24,7 +24,7 @@ _STEPS_PER_RADIUS = 80
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A circle in the picture.
+    """A circle in the image.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class KinkTable:
 
 @dataclass(frozen=True, slots=True)
 class Contour:
-    """The contact's edge in the picture.
+    """The contact's edge in the image.
 
     Attributes
     ----------

@@ -72,7 +72,7 @@ _MODEL_OF_SHADING, _APART_OF_SHADING = 0.09, 0.35
 
 @dataclass(frozen=True, slots=True)
 class Indentation:
-    """One ball's indentation in a image.
+    """One ball's indentation in an image.
 
     The circle is the image of the contact's edge: where the membrane leaves the ball, marked by
     the kink of the shading and not by a threshold. Its centre is the image of the edge's centre,
@@ -426,7 +426,7 @@ def indentation_at(
         raise InputError(
             tr("the contact placed by hand reaches beyond the working area"),
             where=name,
-            advice=tr("Move it inside, or leave this picture out"),
+            advice=tr("Move it inside, or leave this image out"),
         )
     turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
     points = np.stack(

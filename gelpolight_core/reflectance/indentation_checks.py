@@ -1,4 +1,4 @@
-"""Whether what was found in a image is one whole ball's indentation, and how good it is.
+"""Whether what was found in an image is one whole ball's indentation, and how good it is.
 
 Where something can be refused outright it is, by its reason; the rest becomes judged figures with
 the same limits.
@@ -372,7 +372,7 @@ def check_order(
             Reason.SWAPPED,
             tr("the indentation is in the background, not in the press"),
             where=f"{name}, {background_name}",
-            advice=tr("Swap the two pictures, or take the background without contact again"),
+            advice=tr("Swap the two images, or take the background without contact again"),
         )
 
 

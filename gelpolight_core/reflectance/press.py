@@ -1,4 +1,4 @@
-"""One ball press: found in the picture, its centre refined on the shading."""
+"""One ball press: found in the image, its centre refined on the shading."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class BallPress:
     Attributes
     ----------
     name : str
-        The picture's file.
+        The image's file.
     pose : BallPose
         Centre, radius and depth, sensor frame.
     contact_radius_mm : float
@@ -51,7 +51,7 @@ class BallPress:
     shading_misfit : float
         Robust relative misfit of the shading inside the contact.
     indentation : Indentation
-        What was found in the picture before the refinement, in grid nodes, for an overlay.
+        What was found in the image before the refinement, in grid nodes, for an overlay.
     quality : QualityTable
         Figures, limits and advice.
     """
@@ -91,7 +91,7 @@ class PlacedContact:
 
 
 def find_ball(
-    picture: Map,
+    image: Map,
     background: Map,
     table: ResamplingTable,
     led_positions_mm: Array,
@@ -105,7 +105,7 @@ def find_ball(
 
     Parameters
     ----------
-    picture, background : (rows, columns, 3) float32
+    image, background : (rows, columns, 3) float32
         With and without the ball, resampled onto the grid, crosstalk removed.
     table : ResamplingTable
         The grid and its rays.
@@ -114,7 +114,7 @@ def find_ball(
     radius_mm : float
         Of the ball.
     name : str
-        The picture's file, for messages.
+        The image's file, for messages.
     usable : (rows, columns) bool, optional
         Nodes with light; by default all that the camera sees.
     placed : PlacedContact, optional
@@ -129,10 +129,10 @@ def find_ball(
     """
     usable = table.valid if usable is None else usable & table.valid
     if placed is None:
-        found = find_indentation(picture, background, valid=table.valid, name=name)
+        found = find_indentation(image, background, valid=table.valid, name=name)
     else:
         circle = _on_grid(placed, table)
-        found = indentation_at(picture, background, circle, valid=table.valid, name=name)
+        found = indentation_at(image, background, circle, valid=table.valid, name=name)
     pitch = table.grid.pitch_mm
     origin = np.array([table.grid.x_mm[0], table.grid.y_mm[0]])
     seen = origin + pitch * np.asarray(found.centre)
@@ -151,7 +151,7 @@ def find_ball(
     centre = seen + ring * drift
     start = BallPose((float(centre[0]), float(centre[1])), radius_mm, depth)
     inside = usable & _within(table, seen, INSIDE * contact)
-    pixels = _shaded_pixels(picture, background, table, inside)
+    pixels = _shaded_pixels(image, background, table, inside)
     if not pixels.weight.any():
         raise InputError(
             tr("no lit pixel of the contact can be used"),
@@ -194,16 +194,16 @@ def _drift_at(table: ResamplingTable, point_mm: Array) -> Array:
 
 
 def _shaded_pixels(
-    picture: Map, background: Map, table: ResamplingTable, inside: NDArray[np.bool_]
+    image: Map, background: Map, table: ResamplingTable, inside: NDArray[np.bool_]
 ) -> ShadedPixels:
     """Gather press over background inside the contact, evenly thinned, with weights."""
     rows, columns = np.nonzero(inside)
     stride = max(rows.size // MAX_SHADED_PIXELS, 1)
     rows, columns = rows[::stride], columns[::stride]
-    value = picture[rows, columns].astype(np.float64)
+    value = image[rows, columns].astype(np.float64)
     base = background[rows, columns].astype(np.float64)
     known = (value > LEAST_VALUE) & (value < SATURATED) & (base > LEAST_VALUE)
-    # The ratio's noise: the model's own few per cent, and the picture's over the base.
+    # The ratio's noise: the model's own few per cent, and the image's over the base.
     weight = np.where(known, 1.0 / (GAIN_NOISE + VALUE_NOISE / np.maximum(base, LEAST_VALUE)), 0.0)
     points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
     return ShadedPixels(

@@ -57,7 +57,7 @@ class ReflectanceResult:
 
 def ball_scatter(
     presses: Sequence[BallPress],
-    pictures: Sequence[Map],
+    images: Sequence[Map],
     table: ResamplingTable,
     led_positions_mm: Array,
     radiance: RadianceResult,
@@ -70,15 +70,15 @@ def ball_scatter(
 
     Parameters
     ----------
-    presses, pictures : sequences of equal length
-        The balls and their pictures (rows, columns, 3), resampled.
+    presses, images : sequences of equal length
+        The balls and their images (rows, columns, 3), resampled.
     table, led_positions_mm, radiance
         Earlier stages.
     factors : (rows, columns, 3) float32, optional
         rho, fed back from Eq. (9); by default 1.
     """
     scatter: list[list[tuple[Array, Array]]] = [[], [], []]
-    for press, picture in zip(presses, pictures, strict=True):
+    for press, image in zip(presses, images, strict=True):
         inside = contact_mask(press, table) & radiance.usable
         rows, columns = np.nonzero(inside)
         if rows.size == 0:
@@ -92,7 +92,7 @@ def ball_scatter(
         at_top = np.concatenate([points, np.zeros_like(points[:, :1])], axis=1)
         light, _ = light_directions(led_positions_mm, at_top)
         cosines = np.einsum("nkc,nc->nk", light, normals)
-        values = picture[rows, columns].astype(np.float64)
+        values = image[rows, columns].astype(np.float64)
         strength = radiance.radiance[rows, columns].astype(np.float64)
         if factors is not None:
             strength = strength * factors[rows, columns]
@@ -115,7 +115,7 @@ def ball_scatter(
 
 def calibrate_reflectance(
     presses: Sequence[BallPress],
-    pictures: Sequence[Map],
+    images: Sequence[Map],
     table: ResamplingTable,
     led_positions_mm: Array,
     radiance: RadianceResult,
@@ -125,7 +125,7 @@ def calibrate_reflectance(
 
     Parameters
     ----------
-    presses, pictures, table, led_positions_mm, radiance, factors
+    presses, images, table, led_positions_mm, radiance, factors
         As for :func:`ball_scatter`; the presses are compared where the factors are known.
 
     Raises
@@ -139,7 +139,7 @@ def calibrate_reflectance(
             where=tr("balls"),
             advice=tr("Press a ball of known radius at several places"),
         )
-    scatter = ball_scatter(presses, pictures, table, led_positions_mm, radiance, factors)
+    scatter = ball_scatter(presses, images, table, led_positions_mm, radiance, factors)
     fits = [
         fit_channel(cosines, values, name=channel_name(k))
         for k, (cosines, values) in enumerate(scatter)
@@ -152,7 +152,7 @@ def calibrate_reflectance(
     three = (fits[0], fits[1], fits[2])
     agreements: tuple[PressAgreement, ...] = ()
     if factors is not None:
-        agreements = compare_presses(presses, pictures, table, led_positions_mm, radiance, factors)
+        agreements = compare_presses(presses, images, table, led_positions_mm, radiance, factors)
     quality = QualityTable((*_judge(three, presses).figures, *agreement_figures(agreements)))
     return ReflectanceResult(reflectance, three, tuple(presses), quality, agreements)
 

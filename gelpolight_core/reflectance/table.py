@@ -121,7 +121,7 @@ class ChannelFit:
 def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     """Fit one channel's monotone curve to a scatter of ball pixels.
 
-    The cosine is known from the ball's shape and the noise is in the picture, so the value is
+    The cosine is known from the ball's shape and the noise is in the image, so the value is
     averaged at given cosine (robustly, by the median), made monotone and then inverted.
 
     Parameters

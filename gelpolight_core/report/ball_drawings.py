@@ -28,7 +28,7 @@ from gelpolight_core.report.drawing import (
     Map,
     draw,
     grid_extent,
-    show_picture,
+    show_image,
 )
 from gelpolight_core.report.typeface import printable
 from gelpolight_core.translation import tr
@@ -39,13 +39,13 @@ SAMPLES = 400
 
 
 def draw_balls(
-    presses: Sequence[BallPress], pictures: Sequence[Map], table: ResamplingTable
+    presses: Sequence[BallPress], images: Sequence[Map], table: ResamplingTable
 ) -> Drawing:
     """Show every ball press with the detected contour and the fitted circle.
 
     Parameters
     ----------
-    presses, pictures : sequences of equal length
+    presses, images : sequences of equal length
         The balls, and their images resampled onto the grid.
     table : ResamplingTable
         The grid.
@@ -54,8 +54,8 @@ def draw_balls(
 
     def paint(figure: Figure) -> None:
         panels = figure.subplots(rows, BALLS_ACROSS, squeeze=False).ravel()
-        for axes, press, picture in zip(panels, presses, pictures, strict=False):
-            _draw_ball(axes, press, picture, table)
+        for axes, press, image in zip(panels, presses, images, strict=False):
+            _draw_ball(axes, press, image, table)
         for axes in panels[len(presses) :]:
             axes.set_axis_off()
 
@@ -69,10 +69,10 @@ def draw_balls(
     )
 
 
-def _draw_ball(axes: Axes, press: BallPress, picture: Map, table: ResamplingTable) -> None:
+def _draw_ball(axes: Axes, press: BallPress, image: Map, table: ResamplingTable) -> None:
     found, grid = press.indentation, table.grid
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
-    show_picture(axes, picture, width_px=700, extent=grid_extent(grid))
+    show_image(axes, image, width_px=700, extent=grid_extent(grid))
     contour = origin + grid.pitch_mm * found.contour
     axes.plot(contour[:, 0], contour[:, 1], ".", color="white", markersize=1.8, mew=0.0)
     centre = origin + grid.pitch_mm * np.asarray(found.centre)

@@ -39,7 +39,7 @@ from gelpolight_core.report.optics_drawings import (
     draw_top_pose,
 )
 from gelpolight_core.report.stage_facts import stage_facts, stage_intro
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import SensorData, Session
 from gelpolight_core.translation import tr
 
@@ -133,14 +133,14 @@ def in_place_report(run: InPlaceRun, *, validation: Validation | None = None) ->
 
 
 def _named(session: Session, stage: str) -> Mapping[str, Map]:
-    return {picture.name: picture.rgb for picture in session.pictures(stage)}
+    return {image.name: image.rgb for image in session.images(stage)}
 
 
 def _reflectance_parts(run: CalibrationRun, session: Session) -> Parts:
     table, presses = run.calibration.table, run.reflectance.presses
     response = run.calibration.response
-    pictures = [
-        table.apply(read_picture(session.folder / p.name, response=response).rgb) for p in presses
+    images = [
+        table.apply(read_image(session.folder / p.name, response=response).rgb) for p in presses
     ]
     rows = []
     for press in presses:
@@ -173,7 +173,7 @@ def _reflectance_parts(run: CalibrationRun, session: Session) -> Parts:
     )
     return Parts(
         (
-            draw_balls(presses, pictures, table),
+            draw_balls(presses, images, table),
             draw_curves(run.reflectance.table, gather_scatter(run, session)),
         ),
         (listing,),

@@ -67,9 +67,7 @@ def round_to_one_digit(value: float) -> float:
     return max(round(value / power), 1) * power
 
 
-def show_picture(
-    axes: Axes, rgb: Map, *, width_px: int = 900, extent: Sequence[float] = ()
-) -> None:
+def show_image(axes: Axes, rgb: Map, *, width_px: int = 900, extent: Sequence[float] = ()) -> None:
     """Show a linear image with the screen's gamma, in its own pixel coordinates or `extent`."""
     rows, columns = rgb.shape[:2]
     shown = rgb

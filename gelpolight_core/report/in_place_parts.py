@@ -13,7 +13,7 @@ from gelpolight_core.in_place.calibrate import FoundPress, InPlaceResult
 from gelpolight_core.optics.resampling import MembraneGrid
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.report.document import Drawing, Listing, Parts
-from gelpolight_core.report.drawing import ACCENT, draw, grid_extent, show_picture
+from gelpolight_core.report.drawing import ACCENT, draw, grid_extent, show_image
 from gelpolight_core.translation import tr
 
 Facts = list[tuple[str, str]]
@@ -63,7 +63,7 @@ def _draw_places(c: InPlaceCalibration) -> Drawing:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        show_picture(axes, c.in_place.background, extent=grid_extent(whole))
+        show_image(axes, c.in_place.background, extent=grid_extent(whole))
         for _, x, y, contact, _ in c.balls:
             axes.add_patch(Circle((x, y), contact, fill=False, color=ACCENT, lw=0.7))
         axes.set_xlim(*grid_extent(whole)[:2])

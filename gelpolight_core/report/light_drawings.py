@@ -19,7 +19,7 @@ from gelpolight_core.report.drawing import (
     Map,
     draw,
     round_to_one_digit,
-    show_picture,
+    show_image,
     three_maps,
 )
 from gelpolight_core.sensor_calibration import Calibration
@@ -31,22 +31,22 @@ FAINT = 0.4
 """The mirror image is dark on purpose: it is shown brighter, so that glints are visible too."""
 
 
-def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
+def draw_mirror_spots(spots: MirrorSpots, image: Map) -> Drawing:
     """Show the mirror image with the spots of the three LEDs, rejected spots, and close-ups.
 
     Parameters
     ----------
     spots : MirrorSpots
         The detected spots.
-    picture : (rows, columns, 3) float32
+    image : (rows, columns, 3) float32
         The mirror image.
     """
-    reach = 0.035 * picture.shape[1]
+    reach = 0.035 * image.shape[1]
 
     def paint(figure: Figure) -> None:
         grid = figure.add_gridspec(3, 2, width_ratios=(3.4, 1.0))
         whole = figure.add_subplot(grid[:, 0])
-        show_picture(whole, picture**FAINT)
+        show_image(whole, image**FAINT)
         for k, spot in enumerate(spots.spots):
             whole.add_patch(Circle(spot.centre_px, reach, fill=False, color=COLOURS[k], lw=1.2))
             whole.annotate(
@@ -56,7 +56,7 @@ def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
                 color="white",
                 ha="center",
             )
-            _draw_spot(figure.add_subplot(grid[k, 1]), picture, spot, k)
+            _draw_spot(figure.add_subplot(grid[k, 1]), image, spot, k)
         for number, (spot, _) in enumerate(spots.rejected, start=1):
             whole.plot(*spot.centre_px, "x", color="0.75", markersize=6)
             whole.annotate(f" {number}", spot.centre_px, color="0.75", fontsize=7)
@@ -69,16 +69,16 @@ def draw_mirror_spots(spots: MirrorSpots, picture: Map) -> Drawing:
     return draw(caption, 80.0, paint)
 
 
-def _draw_spot(axes: Axes, picture: Map, spot: Spot, channel: int) -> None:
+def _draw_spot(axes: Axes, image: Map, spot: Spot, channel: int) -> None:
     centre_px = spot.centre_px
     u, v = round(float(centre_px[0])), round(float(centre_px[1]))
     half = max(LEAST_CROP_PX, round(2.0 * spot.area_px**0.5))
     rows = slice(max(v - half, 0), v + half + 1)
     columns = slice(max(u - half, 0), u + half + 1)
-    crop = picture[rows, columns]
+    crop = image[rows, columns]
     left, top = columns.start - 0.5, rows.start - 0.5
     extent = (left, left + crop.shape[1], top + crop.shape[0], top)
-    show_picture(axes, crop, extent=extent)
+    show_image(axes, crop, extent=extent)
     axes.axvline(float(centre_px[0]), color="white", lw=0.5, alpha=0.8)
     axes.axhline(float(centre_px[1]), color="white", lw=0.5, alpha=0.8)
     axes.set_title(

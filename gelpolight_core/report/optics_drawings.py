@@ -20,7 +20,7 @@ from gelpolight_core.report.drawing import (
     Map,
     draw,
     round_to_one_digit,
-    show_picture,
+    show_image,
 )
 from gelpolight_core.report.typeface import printable
 from gelpolight_core.translation import tr
@@ -28,14 +28,14 @@ from gelpolight_core.translation import tr
 VIEWS_ACROSS = 4
 
 
-def draw_lens_views(result: LensResult, pictures: Mapping[str, Map]) -> Drawing:
+def draw_lens_views(result: LensResult, images: Mapping[str, Map]) -> Drawing:
     """Show every checkerboard image with its corners; those left out are marked.
 
     Parameters
     ----------
     result : LensResult
         The lens.
-    pictures : mapping
+    images : mapping
         The stage's images by name.
     """
     views = result.views
@@ -44,7 +44,7 @@ def draw_lens_views(result: LensResult, pictures: Mapping[str, Map]) -> Drawing:
     def paint(figure: Figure) -> None:
         panels = figure.subplots(rows, VIEWS_ACROSS, squeeze=False).ravel()
         for axes, view in zip(panels, views, strict=False):
-            _draw_view(axes, view, pictures[view.name])
+            _draw_view(axes, view, images[view.name])
         for axes in panels[len(views) :]:
             axes.set_axis_off()
 
@@ -56,8 +56,8 @@ def draw_lens_views(result: LensResult, pictures: Mapping[str, Map]) -> Drawing:
     )
 
 
-def _draw_view(axes: Axes, view: LensView, picture: Map) -> None:
-    show_picture(axes, picture, width_px=320)
+def _draw_view(axes: Axes, view: LensView, image: Map) -> None:
+    show_image(axes, image, width_px=320)
     if view.board is not None:
         corners = view.board.corners_px
         axes.plot(corners[:, 0], corners[:, 1], "+", color=ACCENT, markersize=2.6, mew=0.6)
@@ -66,7 +66,7 @@ def _draw_view(axes: Axes, view: LensView, picture: Map) -> None:
             f"{printable(view.name)}\n{view.rms_px:.3f} px", fontsize=6.5, fontweight="normal"
         )
         return
-    height, width = picture.shape[:2]
+    height, width = image.shape[:2]
     axes.plot([0, width], [0, height], [0, width], [height, 0], color="#c62828", linewidth=1.2)
     axes.set_title(
         tr("{name}\nleft out").format(name=printable(view.name)), fontsize=6.5, color="#c62828"
@@ -137,30 +137,30 @@ def _draw_arrows(axes: Axes, at: Array, off: Array, length_px: float) -> float:
     return factor
 
 
-def draw_top_pose(result: TopPoseResult, pictures: Mapping[str, Map]) -> tuple[Drawing, ...]:
+def draw_top_pose(result: TopPoseResult, images: Mapping[str, Map]) -> tuple[Drawing, ...]:
     """Show each used image of the board on the top surface, with corners and residuals.
 
     Parameters
     ----------
     result : TopPoseResult
         The top surface.
-    pictures : mapping
+    images : mapping
         The stage's images by name.
     """
     return tuple(
-        _draw_pose(view, pictures[view.name], result)
+        _draw_pose(view, images[view.name], result)
         for view in result.views
         if view.used and view.board is not None and view.pose is not None
     )
 
 
-def _draw_pose(view: TopPoseView, picture: Map, result: TopPoseResult) -> Drawing:
+def _draw_pose(view: TopPoseView, image: Map, result: TopPoseResult) -> Drawing:
     assert view.board is not None and view.pose is not None
     corners, off = view.board.corners_px, view.pose.residuals_px
 
     def paint(figure: Figure) -> None:
         left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
-        show_picture(left, picture)
+        show_image(left, image)
         left.plot(corners[:, 0], corners[:, 1], "+", color=ACCENT, markersize=4.0, mew=0.8)
         left.set_title(printable(view.name))
         factor = _draw_arrows(right, corners, off, 0.4 * view.board.square_px)  # type: ignore[union-attr]

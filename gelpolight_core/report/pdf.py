@@ -106,7 +106,7 @@ class _Pages:
         left = MARGIN_MM / PAGE_MM[0]
         self._figure.add_artist(Line2D([left, 1.0 - left], [y, y], color=colour, linewidth=points))
 
-    def picture(self, drawing: Drawing) -> None:
+    def image(self, drawing: Drawing) -> None:
         """Place a drawing and its caption."""
         lines = wrap(f"{drawing.caption}.", WIDTH_MM, 7.5)
         self.need(drawing.height_mm + len(lines) * 7.5 * POINT_MM * LINE + 3.0)
@@ -281,7 +281,7 @@ def _section(pages: _Pages, section: Section) -> None:
     _quality(pages, section.quality)
     _facts(pages, section.facts)
     for drawing in section.drawings:
-        pages.picture(drawing)
+        pages.image(drawing)
     for listing in section.listings:
         _listing(pages, listing)
 

@@ -47,13 +47,13 @@ class Series:
 
     Attributes
     ----------
-    value : (pictures, blocks)
+    value : (images, blocks)
         Mean encoded value, 0..1.
-    noise : (pictures, blocks)
+    noise : (images, blocks)
         Standard deviation of ln(value) from the pixels' noise and rounding.
-    usable : (pictures, blocks) bool
+    usable : (images, blocks) bool
         Neither dark nor saturated nor uneven, in at least two images.
-    log_time : (pictures,)
+    log_time : (images,)
         Natural logarithm of the exposure times.
     """
 
@@ -62,9 +62,9 @@ class Series:
     usable: Mask
     log_time: Array
 
-    def without(self, picture: int) -> Series:
+    def without(self, image: int) -> Series:
         """Return the series without one of its images."""
-        keep = np.arange(len(self.log_time)) != picture
+        keep = np.arange(len(self.log_time)) != image
         return Series(
             self.value[keep], self.noise[keep], _paired(self.usable[keep]), self.log_time[keep]
         )
@@ -81,9 +81,9 @@ def gather_series(channel: NDArray[np.float32], times_ms: Array, *, step: float)
 
     Parameters
     ----------
-    channel : (pictures, rows, columns)
+    channel : (images, rows, columns)
         Encoded values 0..1.
-    times_ms : (pictures,)
+    times_ms : (images,)
         Exposure times.
     step : float
         Rounding step of the values.
@@ -188,24 +188,24 @@ def disagreement(series: Series, exponents: Array) -> float:
     return _excess(error, noise * np.sqrt(left), weight)
 
 
-def held_out_disagreement(series: Series, picture: int) -> float:
+def held_out_disagreement(series: Series, image: int) -> float:
     """Return by what share of the light an image differs from the prediction of the others.
 
     The root mean square, with the part explained by pixel noise removed, over the values within the
     range of the others; NaN if there are none.
     """
-    others = series.without(picture)
+    others = series.without(image)
     if not others.usable.any():
         return float("nan")
     exponents, (low, high) = fit_exponents(others), others.covered
-    value, (noise, weight) = series.value[picture], _light_noise(series, exponents)
-    own = np.where((value >= low) & (value <= high), weight[picture], 0.0)
-    weight[picture] = 0.0
+    value, (noise, weight) = series.value[image], _light_noise(series, exponents)
+    own = np.where((value >= low) & (value <= high), weight[image], 0.0)
+    weight[image] = 0.0
     total = weight.sum(axis=0)
     own[total == 0.0] = 0.0
     logs = _logs(series, exponents)
     mean = (weight * logs).sum(axis=0) / np.maximum(total, 1e-300)
-    return _excess(logs[picture] - mean, noise[picture], own)
+    return _excess(logs[image] - mean, noise[image], own)
 
 
 def _logs(series: Series, exponents: Array) -> Array:
@@ -265,7 +265,7 @@ def _terms_at_corners() -> Array:
 
 
 def _centred(values: Array, weight: Array) -> Array:
-    """Return values (pictures, blocks, n) less their weighted mean over the images."""
+    """Return values (images, blocks, n) less their weighted mean over the images."""
     total = np.maximum(weight.sum(axis=0), 1e-300)
     mean = (values * weight[..., None]).sum(axis=0) / total[:, None]
     return np.asarray(values - mean)

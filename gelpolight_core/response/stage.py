@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import NODES, CameraResponse, declared_response, distance
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.response.series import (
@@ -31,7 +31,7 @@ from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
-LEAST_PICTURES = 3
+LEAST_IMAGES = 3
 LEAST_SPAN = 4.0
 # An image with fewer blocks between dark and saturated adds only its worst pixels.
 LEAST_SHARE = 0.02
@@ -109,7 +109,7 @@ def declare_response(declared: str | float | None) -> ResponseResult:
 
 
 def measure_response(
-    pictures: Sequence[Picture],
+    images: Sequence[LinearImage],
     exposures_ms: Sequence[float],
     *,
     declared: str | float | None = None,
@@ -118,7 +118,7 @@ def measure_response(
 
     Parameters
     ----------
-    pictures : sequence of Picture
+    images : sequence of LinearImage
         As encoded by the camera, all of the same size.
     exposures_ms : sequence of float
         Exposure time of each.
@@ -134,10 +134,10 @@ def measure_response(
     """
     times = np.asarray(exposures_ms, np.float64)
     _refuse_narrow(times, tr("There are only {n} different exposures over a factor of {r:.3g}"))
-    step = 1.0 / (2.0 ** min(p.bit_depth for p in pictures) - 1.0)
+    step = 1.0 / (2.0 ** min(p.bit_depth for p in images) - 1.0)
     channels = []
     for k in range(3):
-        stack = np.stack([p.rgb[..., k] for p in pictures])
+        stack = np.stack([p.rgb[..., k] for p in images])
         channels.append(_fit_channel(gather_series(stack, times, step=step)))
     measured = CameraResponse(np.stack([c.curve for c in channels]))
     residual = max(c.residual for c in channels)
@@ -181,7 +181,7 @@ def _fit_channel(series: Series) -> _Channel:
     exponents = fit_exponents(series)
     values = np.linspace(*series.covered, PLACES)
     straight = distance(light_of(exponents, values), values)
-    held_out = [held_out_disagreement(series, picture) for picture in range(count)]
+    held_out = [held_out_disagreement(series, image) for image in range(count)]
     known = [value for value in held_out if np.isfinite(value)]
     if not known:
         raise InputError(
@@ -225,8 +225,8 @@ def _lit_images(series: Series) -> Series:
             "saturated or noisy)"
         ),
     )
-    for picture in np.flatnonzero(~lit)[::-1]:
-        series = series.without(int(picture))
+    for image in np.flatnonzero(~lit)[::-1]:
+        series = series.without(int(image))
     return series
 
 
@@ -234,7 +234,7 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
     count = np.unique(times_ms).size
     span = float(times_ms.max() / times_ms.min()) if count else 0.0
     # Stated times are rounded: 0.5 to 2.0 ms is a factor of four.
-    if count < LEAST_PICTURES or span < LEAST_SPAN * (1.0 - 1e-6):
+    if count < LEAST_IMAGES or span < LEAST_SPAN * (1.0 - 1e-6):
         raise InputError(
             found.format(n=count, r=span),
             where="response",
@@ -242,7 +242,7 @@ def _refuse_narrow(times_ms: Array, found: str) -> None:
                 "Capture one still, evenly lit scene at {n} or more exposures. The longest "
                 "must be at least {r:g} times the shortest, and none may be black or "
                 "saturated"
-            ).format(n=LEAST_PICTURES, r=LEAST_SPAN),
+            ).format(n=LEAST_IMAGES, r=LEAST_SPAN),
         )
 
 

@@ -28,7 +28,7 @@ def average_frames(frames: Sequence[Frame]) -> Frame:
     return np.asarray(np.round(total * (scale / len(frames))), np.uint16)
 
 
-def write_picture(rgb: Frame, path: Path, *, new: bool = False, inside: Path | None = None) -> None:
+def write_image(rgb: Frame, path: Path, *, new: bool = False, inside: Path | None = None) -> None:
     """Write a PNG file, whole or not at all.
 
     Parameters

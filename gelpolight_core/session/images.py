@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import decode_picture
-from gelpolight_core.image.picture import Picture, linear_image
+from gelpolight_core.image.file import decode_image
+from gelpolight_core.image.linear import LinearImage, linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.session.decisions import Decisions
@@ -71,7 +71,7 @@ class SessionImages:
             )
         return found
 
-    def pictures(self, stage: str) -> tuple[Picture, ...]:
+    def images(self, stage: str) -> tuple[LinearImage, ...]:
         """Return the images of a stage; all must have the same size.
 
         Parameters
@@ -84,21 +84,21 @@ class SessionImages:
         InputError
             If there are none, one cannot be read, or they have different sizes.
         """
-        pictures = tuple(in_parallel(self.picture, self.files(stage)))
-        for picture in pictures[1:]:
-            if picture.size != pictures[0].size:
+        images = tuple(in_parallel(self.image, self.files(stage)))
+        for image in images[1:]:
+            if image.size != images[0].size:
                 raise InputError(
                     tr("The image has {a} pixels, but {name} has {b}").format(
-                        a="x".join(map(str, picture.size)),
-                        name=pictures[0].name,
-                        b="x".join(map(str, pictures[0].size)),
+                        a="x".join(map(str, image.size)),
+                        name=images[0].name,
+                        b="x".join(map(str, images[0].size)),
                     ),
-                    where=str(self.folder / stage / picture.name),
+                    where=str(self.folder / stage / image.name),
                     advice=tr("Capture all images of a session at the same size"),
                 )
-        return pictures
+        return images
 
-    def usable_pictures(self, stage: str) -> tuple[tuple[Picture, ...], dict[str, InputError]]:
+    def usable_images(self, stage: str) -> tuple[tuple[LinearImage, ...], dict[str, InputError]]:
         """Return the usable images of a stage, and the reasons why the others cannot be used.
 
         Each image is judged separately: an image that cannot be read, or whose size differs from
@@ -111,7 +111,7 @@ class SessionImages:
 
         Returns
         -------
-        pictures : tuple of Picture
+        images : tuple of LinearImage
             In the order of their names, all of one size.
         refused : dict of str to InputError
             By file name.
@@ -122,7 +122,7 @@ class SessionImages:
             If there are none, or none can be used.
         """
         files = self.files(stage)
-        read: list[Picture] = []
+        read: list[LinearImage] = []
         refused: dict[str, InputError] = {}
         for path, found in zip(files, in_parallel(self._image_or_fault, files), strict=True):
             if isinstance(found, InputError):
@@ -131,38 +131,38 @@ class SessionImages:
                 read.append(found)
         if not read:
             raise next(iter(refused.values()))
-        sizes = [picture.size for picture in read]
+        sizes = [image.size for image in read]
         usual = max(sizes, key=sizes.count)
-        for picture in read:
-            if picture.size != usual:
-                refused[picture.name] = InputError(
+        for image in read:
+            if image.size != usual:
+                refused[image.name] = InputError(
                     tr("The image has {a} pixels, but the others have {b}").format(
-                        a="x".join(map(str, picture.size)), b="x".join(map(str, usual))
+                        a="x".join(map(str, image.size)), b="x".join(map(str, usual))
                     ),
-                    where=str(self.folder / stage / picture.name),
+                    where=str(self.folder / stage / image.name),
                     advice=tr("Capture all images of a session at the same size"),
                 )
-        return tuple(picture for picture in read if picture.size == usual), refused
+        return tuple(image for image in read if image.size == usual), refused
 
-    def _image_or_fault(self, path: Path) -> Picture | InputError:
+    def _image_or_fault(self, path: Path) -> LinearImage | InputError:
         try:
-            return self.picture(path)
+            return self.image(path)
         except InputError as fault:
             return fault
 
-    def picture(self, path: Path) -> Picture:
+    def image(self, path: Path) -> LinearImage:
         """Return one image of the session as linear light.
 
         Raises
         ------
         InputError
-            As in :func:`read_picture`.
+            As in :func:`read_image`.
         """
-        return read_picture(path, response=self.response)
+        return read_image(path, response=self.response)
 
-    def averaged(self, stage: str) -> Picture:
+    def averaged(self, stage: str) -> LinearImage:
         """Return the average of the frames of a one-image stage."""
-        return average(self.pictures(stage), name=f"{stage}")
+        return average(self.images(stage), name=f"{stage}")
 
     def ball_radius_mm(self, name: str) -> float:
         """Return the radius of the ball in the image `name`.
@@ -202,29 +202,29 @@ class SessionImages:
         )
 
 
-def average(pictures: Sequence[Picture], *, name: str) -> Picture:
+def average(images: Sequence[LinearImage], *, name: str) -> LinearImage:
     """Average frames of one view; a single frame is returned unchanged.
 
     Parameters
     ----------
-    pictures : sequence of Picture
+    images : sequence of LinearImage
         Of the same size, at least one.
     name : str
         Name of the average.
     """
-    if len(pictures) == 1:
-        return pictures[0]
-    mean = np.asarray(np.mean([p.rgb for p in pictures], axis=0, dtype=np.float64), np.float32)
-    return Picture(
+    if len(images) == 1:
+        return images[0]
+    mean = np.asarray(np.mean([p.rgb for p in images], axis=0, dtype=np.float64), np.float32)
+    return LinearImage(
         name,
         mean,
-        bit_depth=max(p.bit_depth for p in pictures),
-        frame_count=sum(p.frame_count for p in pictures),
-        grey=all(p.grey for p in pictures),
+        bit_depth=max(p.bit_depth for p in images),
+        frame_count=sum(p.frame_count for p in images),
+        grey=all(p.grey for p in images),
     )
 
 
-def read_picture(path: Path, *, response: CameraResponse | None = None) -> Picture:
+def read_image(path: Path, *, response: CameraResponse | None = None) -> LinearImage:
     """Read an image as linear light 0..1 in RGB order.
 
     Parameters
@@ -256,7 +256,7 @@ def read_raw_image(path: Path) -> tuple[NDArray[Any], bool]:
     InputError
         If the file is missing, is not an image, or is neither 8 nor 16 bit.
     """
-    raw = decode_picture(path)
+    raw = decode_image(path)
     if raw is None:
         raise InputError(
             tr("The file is not a complete PNG or TIFF image"),
@@ -274,12 +274,12 @@ def read_raw_image(path: Path) -> tuple[NDArray[Any], bool]:
     return bgr[:, :, ::-1], grey
 
 
-def require_colour(picture: Picture, *, where: str) -> None:
+def require_colour(image: LinearImage, *, where: str) -> None:
     """Refuse a grey image where the colours of the three LEDs are needed.
 
     Parameters
     ----------
-    picture : Picture
+    image : LinearImage
         The image to check.
     where : str
         File or stage named in the message.
@@ -289,14 +289,14 @@ def require_colour(picture: Picture, *, where: str) -> None:
     InputError
         If the channels are equal, because the camera is monochrome or everything is saturated.
     """
-    if float(picture.rgb.min()) >= 1.0:
+    if float(image.rgb.min()) >= 1.0:
         raise InputError(
             tr("The image is saturated everywhere"),
             where=where,
             advice=tr("Use a shorter exposure"),
         )
-    rgb = picture.rgb
-    same = picture.grey or bool(
+    rgb = image.rgb
+    same = image.grey or bool(
         np.array_equal(rgb[..., 0], rgb[..., 1]) and np.array_equal(rgb[..., 1], rgb[..., 2])
     )
     if same and float(rgb.max()) > 0.0:

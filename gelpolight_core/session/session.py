@@ -9,7 +9,7 @@ from typing import Any
 
 from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
 from gelpolight_core.io.reading import brief, parse_toml, read_file
 from gelpolight_core.session.board import BoardSpec
@@ -100,7 +100,7 @@ class Session(SessionImages):
         has_single = bool(self.captured("single_led"))
         return ("response",) * has_series + ("single_led",) * has_single
 
-    def series(self) -> tuple[tuple[Picture, ...], tuple[float, ...]]:
+    def series(self) -> tuple[tuple[LinearImage, ...], tuple[float, ...]]:
         """Return the images of ``response``, as encoded, and their exposure times (ms).
 
         Raises
@@ -108,8 +108,8 @@ class Session(SessionImages):
         InputError
             If an image has no exposure time in ``[response]``, or a time has no image.
         """
-        pictures = replace(self, response=None).pictures("response")
-        names = {picture.name for picture in pictures}
+        images = replace(self, response=None).images("response")
+        names = {image.name for image in images}
         for name in sorted(names ^ set(self.exposures_ms)):
             found = tr("[response] has no exposure time for {name}")
             if name not in names:
@@ -121,9 +121,9 @@ class Session(SessionImages):
                     'Write one line "{name}" = time in ms for each image in the folder'
                 ).format(name=next(iter(sorted(names)))),
             )
-        return pictures, tuple(self.exposures_ms[picture.name] for picture in pictures)
+        return images, tuple(self.exposures_ms[image.name] for image in images)
 
-    def single_led(self) -> tuple[Picture, ...]:
+    def single_led(self) -> tuple[LinearImage, ...]:
         """Return the images of the whiteboard with only the red, green or blue LED on.
 
         Raises
@@ -131,7 +131,7 @@ class Session(SessionImages):
         InputError
             If one of the three is missing, or there are others.
         """
-        by_name = {Path(p.name).stem.casefold(): p for p in self.pictures("single_led")}
+        by_name = {Path(p.name).stem.casefold(): p for p in self.images("single_led")}
         if set(by_name) != set(CHANNEL_KEYS) or len(by_name) != len(self.files("single_led")):
             raise InputError(
                 tr("The folder contains {found} instead of red, green and blue").format(

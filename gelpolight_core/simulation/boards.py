@@ -26,7 +26,7 @@ DARK_ROOM = 2.2 / 255.0
 """Brightness next to the working circle when the board lies on top of the sensor."""
 
 _SAMPLES = 4
-_PICTURE_EDGE_SHARE = 0.02
+_IMAGE_EDGE_SHARE = 0.02
 _POSE_TRIES = 10_000
 
 
@@ -200,7 +200,7 @@ def _in_image(camera: CameraDesign, pose: BoardPose) -> bool:
     corners = pose.corners_mm()
     if corners[:, 2].min() <= 0.0:
         return False
-    room = _PICTURE_EDGE_SHARE * camera.width_px
+    room = _IMAGE_EDGE_SHARE * camera.width_px
     # One square of margin, so that the squares around the outer corners are completely visible.
     middle = corners.mean(axis=0)
     pixels = project_to_pixels(camera, middle + 1.35 * (corners - middle))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import decode_picture
+from gelpolight_core.image.file import decode_image
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
@@ -329,22 +329,22 @@ def relief_from_image(path: Path, *, width_mm: float, relief_mm: float, depth_mm
     InputError
         If the file is not a grey image of 8 or 16 bit, or has only one grey level.
     """
-    picture = decode_picture(path)
-    if picture is None or picture.ndim != 2 or picture.dtype not in (np.uint8, np.uint16):
+    image = decode_image(path)
+    if image is None or image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
         raise InputError(
             tr("The file is not a grey image of 8 or 16 bit"),
             where=str(path),
             advice=tr("Save the heights as a grey PNG or TIFF"),
         )
-    if min(picture.shape) < 2 or picture.min() == picture.max():
+    if min(image.shape) < 2 or image.min() == image.max():
         raise InputError(
             tr("The image has only one grey level"),
             where=str(path),
             advice=tr("Use an image whose grey level represents the height"),
         )
-    full = 255.0 if picture.dtype == np.uint8 else 65535.0
-    height = picture.astype(np.float64) / full * relief_mm
-    return Relief(height, width_mm / (picture.shape[1] - 1), depth_mm)
+    full = 255.0 if image.dtype == np.uint8 else 65535.0
+    height = image.astype(np.float64) / full * relief_mm
+    return Relief(height, width_mm / (image.shape[1] - 1), depth_mm)
 
 
 def _heights(half_mm: float, pitch_mm: float, height: Callable[[Array, Array], Array]) -> Array:

@@ -280,9 +280,9 @@ def _take(sensor: VirtualSensor, shot: _Shot, out: Path) -> None:
     state = shot.make_state()
     averaged = AVERAGED[shot.stage]
     frame = sensor.frame(state, averaged=averaged, stream=f"{shot.stage}/{shot.file}")
-    picture = frame[..., 0] if shot.stage in _BOARD_STAGES else frame[..., ::-1]
+    image = frame[..., 0] if shot.stage in _BOARD_STAGES else frame[..., ::-1]
     path = out / shot.stage / shot.file
-    done, data = cv2.imencode(".png", np.ascontiguousarray(picture))
+    done, data = cv2.imencode(".png", np.ascontiguousarray(image))
     if not done:
         raise RuntimeError(f"OpenCV could not encode {path}")
     write_atomically(path, lambda stream: stream.write(data.tobytes()))

@@ -255,9 +255,9 @@ def _portions(pixels: NDArray[np.intp], interrupt: Interrupt) -> Iterator[NDArra
         yield pixels[start : start + _PIXELS_AT_ONCE]
 
 
-def _is_rough(picture: Array, limit: float) -> NDArray[np.bool_]:
+def _is_rough(image: Array, limit: float) -> NDArray[np.bool_]:
     """Return where one ray per pixel is not enough: at edges of walls, shadows and specks."""
-    spread = np.abs(picture - uniform_filter(picture, size=(3, 3, 1), mode="nearest"))
+    spread = np.abs(image - uniform_filter(image, size=(3, 3, 1), mode="nearest"))
     return np.asarray(maximum_filter((spread > limit).any(axis=2), size=3), dtype=np.bool_)
 
 

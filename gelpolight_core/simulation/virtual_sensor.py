@@ -181,12 +181,12 @@ class VirtualSensor:
             key = [self.seed, 0, self._count]
         else:
             key = [self.seed, 1, zlib.crc32(stream.encode())]
-        picture = self.brightness(state, samples=samples)
+        image = self.brightness(state, samples=samples)
         rng = np.random.default_rng(key)
         if isinstance(state, (Checkerboard, BoardOnTop)):
-            grey = exposed(picture[..., 0], self.design.camera, rng, averaged=averaged)
+            grey = exposed(image[..., 0], self.design.camera, rng, averaged=averaged)
             return np.asarray(np.repeat(grey[..., None], 3, axis=2))
-        return exposed(picture, self.design.camera, rng, averaged=averaged)
+        return exposed(image, self.design.camera, rng, averaged=averaged)
 
     @property
     def top_pose(self) -> BoardPose:

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ROUNDS = 20
 # The first rounds load modules and fill caches.
 SETTLED = 5
-# Of memory that is asked for and not given back; a wizard's frames and pictures alone are 3 MB.
+# Of memory that is asked for and not given back; a wizard's frames and images alone are 3 MB.
 KEPT_MB = 0.1
 # Rounds at the beginning and the end whose medians are compared.
 ENDS = 5

@@ -56,7 +56,7 @@ def test_memory_that_grows_and_a_rate_that_falls_are_told() -> None:
 def test_what_only_refers_to_itself_is_let_go_and_told() -> None:
     class Ring:
         def __init__(self) -> None:
-            self.picture, self.itself = bytearray(40_000_000), self
+            self.image, self.itself = bytearray(40_000_000), self
 
     gc.disable()
     try:

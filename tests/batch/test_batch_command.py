@@ -56,12 +56,12 @@ def test_a_second_call_finds_everything_done(
 def test_a_bad_frame_is_named_and_counted_in_one_line(
     command, day: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    picture = day / "left" / "a.png"
-    cv2.imwrite(str(picture), cv2.imread(str(picture))[:50])
+    image = day / "left" / "a.png"
+    cv2.imwrite(str(image), cv2.imread(str(image))[:50])
     assert command(day) == MENDABLE
     told = capsys.readouterr()
     assert "5 depth maps" in told.out
-    assert "left/a.png: the picture is 320x50x3, the calibration is for" in told.err
+    assert "left/a.png: the image is 320x50x3, the calibration is for" in told.err
     assert "batch.csv: 1 of 6 frames could not be used" in told.err
 
 

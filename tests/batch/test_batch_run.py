@@ -27,7 +27,7 @@ from gelpolight_core.export.heightmap_files import write_heightmap
 from gelpolight_core.io.lock import RunLock
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.recording.reader import Recording
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 
 
 def results(out: Path) -> dict[str, bytes]:
@@ -46,17 +46,17 @@ def lines(out: Path) -> list[str]:
 
 
 FRAMES = [f"day/run/run_{k:06d}" for k in range(4)]
-PICTURES = ["day/left/a", "day/left/b"]
+IMAGES = ["day/left/a", "day/left/b"]
 
 
 def test_every_frame_has_its_files_and_its_row(go, day: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert go(day, out=out).done == 6
     assert sorted(results(out)) == sorted(
-        f"{name}.{ending}" for name in FRAMES + PICTURES for ending in ("npz", "tif")
+        f"{name}.{ending}" for name in FRAMES + IMAGES for ending in ("npz", "tif")
     )
     rows = table(out)
-    assert [row["output"] for row in rows] == PICTURES + FRAMES
+    assert [row["output"] for row in rows] == IMAGES + FRAMES
     assert [row["frame"] for row in rows[2:]] == ["0", "1", "2", "3"]
     assert [row["number"] for row in rows[2:]] == ["10", "11", "12", "13"]
     assert float(rows[3]["time_s"]) == pytest.approx(5.0 + 1 / 30)
@@ -75,8 +75,8 @@ def test_a_frame_comes_out_as_it_does_alone(
     """As made by ``reconstruct``, to the last bit."""
     go(day, out=tmp_path / "out")
     calibration = read_calibration(settings.calibration)
-    picture = read_picture(day / "left" / "a.png", response=calibration.response)
-    heightmap = Reconstructor(calibration, model="paper").depth(picture.rgb, name="a.png")
+    image = read_image(day / "left" / "a.png", response=calibration.response)
+    heightmap = Reconstructor(calibration, model="paper").depth(image.rgb, name="a.png")
     write_heightmap(heightmap, tmp_path / "alone", formats=["npz"])
     made = (tmp_path / "out" / "day" / "left" / "a.npz").read_bytes()
     assert made == (tmp_path / "alone" / "a.npz").read_bytes()
@@ -132,8 +132,8 @@ def test_a_removed_result_is_computed_again(go, day: Path, tmp_path: Path) -> No
 def test_another_image_of_the_same_name_is_another_frame(go, day: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     go(day, out=out)
-    picture = day / "left" / "a.png"
-    cv2.imwrite(str(picture), np.roll(cv2.imread(str(picture)), 5, axis=0))
+    image = day / "left" / "a.png"
+    cv2.imwrite(str(image), np.roll(cv2.imread(str(image)), 5, axis=0))
     assert go(day, out=out).done == 1
     assert len(table(out)) == 6
 

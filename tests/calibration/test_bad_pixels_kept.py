@@ -53,8 +53,8 @@ def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
     balls = run_stage(Stage.BALLS, session, results).balls
     for ball, before in zip(balls, virtual_results.balls, strict=True):
         assert (ball.press is None) == (before.press is None)
-        if ball.picture is not None and before.picture is not None:
-            off = np.abs(ball.picture - before.picture)[inside]
+        if ball.image is not None and before.image is not None:
+            off = np.abs(ball.image - before.image)[inside]
             assert np.quantile(off, 0.9999) < 0.05
 
 

@@ -60,7 +60,7 @@ def test_the_summary_says_what_the_calibration_says(whole: Path) -> None:
     assert summary.created == calibration.provenance.created
     assert summary.quality == calibration.quality
     assert summary.verdict is calibration.verdict
-    assert summary.picture_size == (calibration.camera.width, calibration.camera.height)
+    assert summary.image_size == (calibration.camera.width, calibration.camera.height)
 
 
 def test_a_list_of_calibrations_loads_no_numerical_library() -> None:

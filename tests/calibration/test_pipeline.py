@@ -34,9 +34,9 @@ def test_a_copied_image_is_refused_for_every_caller(session: Path) -> None:
 def test_a_whiteboard_too_dim_for_the_balls_is_named(session: Path) -> None:
     """A tenth of the light: the board is detected, but hardly any ball press."""
     path = session / "whiteboard" / "whiteboard.png"
-    picture = cv2.imread(str(path))
-    assert picture is not None
-    cv2.imwrite(str(path), np.round(0.1 * picture).astype(np.uint8))
+    image = cv2.imread(str(path))
+    assert image is not None
+    cv2.imwrite(str(path), np.round(0.1 * image).astype(np.uint8))
     quality = calibrate_session(read_session(session)).calibration.quality
     assert quality["radiance"].verdict is Verdict.FAIL
     assert "whiteboard" in quality["balls"]["balls_left_out"].advice

@@ -95,15 +95,15 @@ def test_the_full_model_gives_its_uncertainty(
 ) -> None:
     file, name = tmp_path / "full.gplcal", "cylinder_s5_d100"
     write_calibration(virtual_calibration, file)
-    picture = str(virtual_session / "presses" / f"{name}.png")
+    image = str(virtual_session / "presses" / f"{name}.png")
     result = tmp_path / "m.json"
-    assert main(["measure", str(file), picture, "--shape", "cylinder", "--json", str(result)]) == 0
+    assert main(["measure", str(file), image, "--shape", "cylinder", "--json", str(result)]) == 0
     assert "calibration 0.00" in capsys.readouterr().out
     m = json.loads(result.read_text())
     assert set(m["noise_sd"]) == set(m["calibration_sd"]) == set(m["sd"])
     for key in ("height_mm", "diameter_mm"):
         assert m["sd"][key] >= np.hypot(m["noise_sd"][key], m["calibration_sd"][key]) * 0.999
-    assert main(["reconstruct", str(file), picture, "-o", str(tmp_path), "--uncertainty"]) == 0
+    assert main(["reconstruct", str(file), image, "-o", str(tmp_path), "--uncertainty"]) == 0
     with np.load(tmp_path / f"{name}.npz", allow_pickle=False) as data:
         for key in ("depth_sd_mm", "slope_sd", "depth_model_sd_mm", "slope_model_sd"):
             assert data[key].shape == data["depth_mm"].shape

@@ -14,7 +14,7 @@ from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.tools import result_as_dict, tool_from_dict
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 
 
 def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
@@ -28,8 +28,8 @@ def test_a_tool_by_command_agrees_with_the_core_to_the_last_bit_and_is_repeated(
     content = json.loads(file.read_text())
     (stored,) = content["results"]
     made = read_calibration(calibration)
-    picture = read_picture(press, response=made.response)
-    heightmap = Reconstructor(made).depth(picture.rgb, name=press.name, uncertainty=True)
+    image = read_image(press, response=made.response)
+    heightmap = Reconstructor(made).depth(image.rgb, name=press.name, uncertainty=True)
     plain = {k: v for k, v in stored.items() if k not in ("figures", "verdict", "reason")}
     assert result_as_dict(tool_from_dict(plain).apply(heightmap)) == stored
     assert (content["image"], content["calibration_id"]) == (press.name, made.identity)

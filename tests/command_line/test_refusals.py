@@ -30,8 +30,8 @@ def damaged(session: Path, tmp_path: Path, damage: Callable[[Path], None]) -> Pa
 
 def paint(path: Path, change: Callable[[np.ndarray], np.ndarray]) -> None:
     """Rewrite an image after a change of its (rows, columns, 3) uint8 values, BGR."""
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    assert cv2.imwrite(str(path), np.asarray(change(picture), np.uint8))
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    assert cv2.imwrite(str(path), np.asarray(change(image), np.uint8))
 
 
 def replace_text(path: Path, old: str, new: str) -> None:
@@ -89,7 +89,7 @@ DAMAGES: list[tuple[str, Callable[[Path], None], str]] = [
         "Enter the working diameter in mm",
     ),
     (
-        "no picture",
+        "no image",
         lambda f: next((f / "mirror").iterdir()).write_bytes(b"\x89PNG broken"),
         "not a complete",
     ),
@@ -149,27 +149,27 @@ def test_no_result_overwrites_its_input(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A typing error costs a line of text, not the capture or the calibration."""
-    picture, cal = tmp_path / "p.png", tmp_path / "c.gplcal"
-    shutil.copy(press, picture)
+    image, cal = tmp_path / "p.png", tmp_path / "c.gplcal"
+    shutil.copy(press, image)
     shutil.copy(calibration, cal)
     (tmp_path / "link.gplcal").symlink_to(cal)
     (tmp_path / "d.toml").write_text("")
     ball = session / "balls" / "ball_00.png"
-    kept = [path.read_bytes() for path in (picture, cal, ball)]
-    measure = ("measure", str(cal), str(picture), "--shape", "ball", "--json")
+    kept = [path.read_bytes() for path in (image, cal, ball)]
+    measure = ("measure", str(cal), str(image), "--shape", "ball", "--json")
     both = ("-o", str(tmp_path / "x"), "--json", str(tmp_path / "x"))
     for arguments in (
-        ("reconstruct", str(cal), str(picture), "-o", str(tmp_path), "--pictures"),
+        ("reconstruct", str(cal), str(image), "-o", str(tmp_path), "--pictures"),
         (*measure, str(cal)),
-        (*measure, str(picture)),
+        (*measure, str(image)),
         (*measure, str(tmp_path / "link.gplcal")),
-        ("benchmark", str(cal), str(picture), "--json", str(cal)),
+        ("benchmark", str(cal), str(image), "--json", str(cal)),
         ("calibrate", str(session), "-o", str(ball)),
         ("calibrate", str(session), *both),
         ("design", str(tmp_path / "d.toml"), "--shadows", str(tmp_path / "d.toml")),
     ):
         assert "overwrite" in refusal(capsys, *arguments)
-    assert [path.read_bytes() for path in (picture, cal, ball)] == kept
+    assert [path.read_bytes() for path in (image, cal, ball)] == kept
     assert not (tmp_path / "x").exists()
 
 

@@ -58,7 +58,7 @@ def figures(chapters: ModuleType) -> object:
         tuple(integrators),
         (RuleFigure("virtual-matt", "beside", "the field beside", "best", 8.0, 16.0, 3.0, 0.5, 4),),
         (LightingRow("point", 13.75, 12.0, 0.2, 7.9, 165.8, -2.0, 52.0),),
-        {"paper": [{"name": "picture to depth", "median_ms": 4.0}]},
+        {"paper": [{"name": "image to depth", "median_ms": 4.0}]},
         Machine(2, "system", "3.12", 0.0, 4.0, ()),
     )
 

@@ -25,12 +25,12 @@ CHAPTER = (DOCS / "quality-figures.md").read_text("utf-8")
 # Of a development report, not of a sensor: how many of its own cases went wrong.
 ELSEWHERE = {"gelpolight_core/experiments/stability_report.py"}
 HIGHER_IS_BETTER = {"axis_ratio", "coverage", "signal_to_noise"}  # of a ball's contact
-# What the chapter says of limits that depend on the picture or the ball; its numbers are filled in
+# What the chapter says of limits that depend on the image or the ball; its numbers are filled in
 # from the module.
 IN_WORDS = {
     "camera.width / 500.0": "width / 500",
     "camera.width / 50.0": "width / 50",
-    "edge_limit_px(view.picture_size[0])": "width / 200, at least 3 px",
+    "edge_limit_px(view.image_size[0])": "width / 200, at least 3 px",
     "LED_OFF_OF_WIDTH * rgb.shape[1]": "{LED_OFF_OF_WIDTH:g} widths",
     "worst_residual": "{100_LARGEST_RESIDUAL:g} %, or {_ALLOWED_RESIDUAL_PX:g} px",
     "largest_sd": "1 px, or {100_LARGEST_SD:g} % of the radius",

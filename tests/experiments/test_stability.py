@@ -126,7 +126,7 @@ def test_a_case_ends_as_its_worst_mode(modes: list[ModeSeen], outcome: Outcome) 
     assert result.outcome is outcome
 
 
-def test_a_picture_is_tried_in_every_mode() -> None:
+def test_an_image_is_tried_in_every_mode() -> None:
     seen = judged(standard_sensor(), standard_press(), 8.0)
     assert {mode.mode for mode in seen.modes} == {"best", "balanced", "fast", "paper"}
     row = result_rows([run_case(_case(lambda: seen))])[0]

@@ -62,7 +62,7 @@ def test_the_bench_presses_everything_and_the_errors_are_small(
     reconstructor = Reconstructor(read_calibration(calibration))
     evaluation = evaluate_run(run, reconstructor, run_ledger(run, reconstructor))
     assert not evaluation.failed
-    # A quarter of the picture's size has four times the pitch: the bars are the paper's.
+    # A quarter of the image's size has four times the pitch: the bars are the paper's.
     assert evaluation.overall("planar").mean_absolute_percent < 5.0
     assert evaluation.overall("depth").mean_absolute_percent < 8.0
 
@@ -91,7 +91,7 @@ def test_a_run_that_is_stopped_goes_on_with_the_same_bytes(
     )
     assert told == ["press 2 of 2"]
     for press in again.wanted:
-        assert again.picture(press).read_bytes() == (done / "presses" / press.file).read_bytes()
+        assert again.image(press).read_bytes() == (done / "presses" / press.file).read_bytes()
 
 
 def test_what_was_pressed_is_evaluated_alike_by_one_process_or_two(

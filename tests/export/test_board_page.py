@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.export.board_page import A4_MM, RULER_MM, draw_board, write_board
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.checkerboard import find_board
 from gelpolight_core.session.board import BoardSpec
 
@@ -42,7 +42,7 @@ def test_squares_have_their_size_on_the_paper(board: BoardSpec) -> None:
     rows = rows[rows < len(page) - 38.0 * PX_PER_MM]
     columns = np.flatnonzero((page[rows[0] : rows[-1], :, 0] < 0.2).any(axis=0))
     cut = page[rows[0] - around : rows[-1] + around, columns[0] - around : columns[-1] + around]
-    view = find_board(Picture("page", 0.1 + 0.8 * cut, bit_depth=8), board)
+    view = find_board(LinearImage("page", 0.1 + 0.8 * cut, bit_depth=8), board)
     corners = view.corners_px.reshape(board.inner_corners[1], board.inner_corners[0], 2)
     across = np.linalg.norm(corners[:, -1] - corners[:, 0], axis=-1) / PX_PER_MM
     down = np.linalg.norm(corners[-1] - corners[0], axis=-1) / PX_PER_MM

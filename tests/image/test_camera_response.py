@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import (
     NODES,
     CameraResponse,
@@ -45,22 +45,22 @@ def series(
     seed: int = 1,
     flicker: float = 0.0,
     shift: int = 0,
-) -> list[Picture]:
+) -> list[LinearImage]:
     """Return images of a whiteboard with a brightness gradient and the noise of a 50 dB camera."""
     rng = np.random.default_rng(seed)
     v, u = np.mgrid[:240, :320]
     board = 0.058 * fall_off ** -(((u - 160) ** 2 + (v - 120) ** 2) / 200.0**2)
     board = np.stack([board, 0.9 * board, 0.8 * board], axis=-1)
     board[100:140, 30:60] *= 0.4
-    pictures = []
+    images = []
     for number, time in enumerate(times):
         light = np.roll(board, shift * number, axis=1) * time
         light = light * (1.0 + flicker * (-1) ** number)
         light = light + rng.standard_normal(light.shape) * np.sqrt(4e-5 * light + 0.0015**2)
         full = 2**bits - 1
         value = np.rint(full * encode(np.clip(light, 0.0, 1.0))) / full
-        pictures.append(Picture(f"exp_{number}.png", value.astype(np.float32), bit_depth=bits))
-    return pictures
+        images.append(LinearImage(f"exp_{number}.png", value.astype(np.float32), bit_depth=bits))
+    return images
 
 
 ENCODINGS: dict[str, tuple[Encode, np.ndarray]] = {
@@ -110,8 +110,8 @@ def test_a_gamma_that_would_cost_four_percent_of_depth_is_not_called_linear() ->
 def test_any_gamma_is_found_in_any_fall_off_of_light(
     gamma: float, seed: int, fall_off: float
 ) -> None:
-    pictures = series(lambda x: x ** (1 / gamma), seed=seed, fall_off=fall_off)
-    found = measure_response(pictures, TIMES)
+    images = series(lambda x: x ** (1 / gamma), seed=seed, fall_off=fall_off)
+    found = measure_response(images, TIMES)
     curves = np.tile(EVEN, (3, 1)) if found.response is None else found.response.curves
     # A linear camera may deviate by the quarter percent that is neglected.
     assert np.abs(curves - EVEN**gamma).max() < 0.006
@@ -128,21 +128,21 @@ def test_three_exposures_over_a_factor_of_four_are_enough() -> None:
 
 
 def test_what_is_declared_is_held_against_what_is_measured() -> None:
-    pictures = series(lambda x: x ** (1 / 2.2))
-    right = measure_response(pictures, TIMES, declared=2.2)
+    images = series(lambda x: x ** (1 / 2.2))
+    right = measure_response(images, TIMES, declared=2.2)
     assert right.quality["response_declared_difference_percent"].verdict is Verdict.PASS
     for declared in ("linear", 1.8):
-        wrong = measure_response(pictures, TIMES, declared=declared)
+        wrong = measure_response(images, TIMES, declared=declared)
         assert wrong.quality["response_declared_difference_percent"].verdict is Verdict.WARN
         assert right.response is not None
         assert wrong.response is not None
         np.testing.assert_array_equal(wrong.response.curves, right.response.curves)
 
 
-def refused(pictures: list[Picture], times: tuple[float, ...]) -> str:
+def refused(images: list[LinearImage], times: tuple[float, ...]) -> str:
     """Return the message with which a series is refused."""
     with pytest.raises(InputError) as refusal:
-        measure_response(pictures, times)
+        measure_response(images, times)
     return str(refusal.value)
 
 
@@ -162,14 +162,14 @@ def test_series_that_cannot_tell_are_refused() -> None:
 
 def test_exposures_too_far_apart_for_an_even_scene_are_refused() -> None:
     """Both halves of the scene have the same two values: nothing is known between them."""
-    rng, pictures = np.random.default_rng(3), []
+    rng, images = np.random.default_rng(3), []
     for time in (1.0, 8.0, 64.0):
         light = np.full((240, 320, 3), 0.1 * time)
         light[120:] /= 8.0
         light += 0.0025 * rng.standard_normal(light.shape)
         shown = np.rint(255.0 * np.clip(light, 0.0, 1.0)) / 255.0
-        pictures.append(Picture("exp.png", shown.astype(np.float32)))
-    assert "uncertain" in refused(pictures, (1.0, 8.0, 64.0))
+        images.append(LinearImage("exp.png", shown.astype(np.float32)))
+    assert "uncertain" in refused(images, (1.0, 8.0, 64.0))
 
 
 def test_a_scene_that_moved_is_refused() -> None:
@@ -182,8 +182,8 @@ def test_light_that_flickered_is_refused() -> None:
 
 def test_wrong_exposure_times_are_refused() -> None:
     """Like a camera that rounds to its own shutter steps without reporting it."""
-    pictures = series(lambda x: x ** (1 / 2.2))
-    assert "disagree" in refused(pictures, (0.5, 1.0, 2.0, 4.0, 6.0, 12.0, 18.0, 27.0))
+    images = series(lambda x: x ** (1 / 2.2))
+    assert "disagree" in refused(images, (0.5, 1.0, 2.0, 4.0, 6.0, 12.0, 18.0, 27.0))
 
 
 def test_declared_curves_are_the_standards() -> None:

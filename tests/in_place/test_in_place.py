@@ -62,7 +62,7 @@ def test_presses_that_were_not_used_are_measured(
     run, names = held_back_run
     reconstructor = Reconstructor(run.calibration)
     for name in names:
-        image = closed_session.picture(closed_session.folder / "balls" / name)
+        image = closed_session.image(closed_session.folder / "balls" / name)
         found = reconstructor.depth(image.rgb, uncertainty=True)
         ball = measure_object(
             found.depth_mm,
@@ -83,7 +83,7 @@ def test_normals_and_depth_have_the_signs_and_places_that_are_promised(
     closed_run: InPlaceRun, closed_session: ClosedSession
 ) -> None:
     name, x, y, contact, radius = closed_run.calibration.balls[0]
-    image = closed_session.picture(closed_session.folder / "balls" / name)
+    image = closed_session.image(closed_session.folder / "balls" / name)
     found = Reconstructor(closed_run.calibration).depth(image.rgb)
     height, width = image.rgb.shape[:2]
     scale = closed_session.mm_per_px
@@ -123,7 +123,7 @@ def test_the_stated_errors_hold_on_presses_that_were_not_used(
     within = []
     for name in names:
         x, y, contact, radius = places[name]
-        image = closed_session.picture(closed_session.folder / "balls" / name)
+        image = closed_session.image(closed_session.folder / "balls" / name)
         found = Reconstructor(run.calibration).depth(image.rgb, uncertainty=True)
         assert found.normals is not None and found.slope_model_sd is not None
         across, down = np.meshgrid(found.x_mm - x, found.y_mm - y)
@@ -144,7 +144,7 @@ def test_the_file_gives_the_same_depth(
     assert again.identity == closed_run.calibration.identity
     summary = read_summary(path)
     assert (summary.model, summary.serial) == ("in-place", "closed-1")
-    frame = closed_session.pictures("balls")[0].rgb
+    frame = closed_session.images("balls")[0].rgb
     first = Reconstructor(closed_run.calibration).depth(frame).depth_mm
     assert np.array_equal(Reconstructor(again).depth(frame).depth_mm, first)
     assert np.array_equal(Reconstructor(again, workers=1).depth(frame).depth_mm, first)

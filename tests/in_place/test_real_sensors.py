@@ -36,7 +36,7 @@ def test_a_gelsight_mini_is_calibrated_from_its_balls(shared_data: Path) -> None
     assert scale is not None
     errors = []
     for row in kept_back:
-        image = session.picture(session.folder / "balls" / row["file"])
+        image = session.image(session.folder / "balls" / row["file"])
         found = reconstructor.depth(image.rgb)
         height, width = image.rgb.shape[:2]
         x = (float(row["x_px"]) - 0.5 * (width - 1)) * scale
@@ -60,7 +60,7 @@ def test_a_gel_with_printed_markers_runs_from_images_to_depth(shared_data: Path)
     run = calibrate_closed_session(
         replace(session, decisions=replace(session.decisions, excluded=excluded))
     )
-    image = session.picture(session.folder / "balls" / some[1])
+    image = session.image(session.folder / "balls" / some[1])
     found = Reconstructor(run.calibration).depth(image.rgb)
     assert np.isfinite(found.depth_mm).all()
     assert found.depth_mm.max() > 0.2

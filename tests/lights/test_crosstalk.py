@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import find_crosstalk
 from gelpolight_core.lights.mirror import MirrorSpots, Spot
 from gelpolight_core.quality import QualityTable, Verdict
@@ -30,11 +30,11 @@ def spots(matrix: np.ndarray) -> MirrorSpots:
 
 def single_led(
     matrix: np.ndarray, *, offset: float = 0.0, peak: float = 0.8, even: bool = False, seed: int = 1
-) -> list[Picture]:
+) -> list[LinearImage]:
     """Return the whiteboard under each LED in turn, 8 bit, with dust and 50 dB noise."""
     rng = np.random.default_rng(seed)
     v, u = np.mgrid[:240, :320]
-    pictures = []
+    images = []
     for led, name in enumerate(NAMES):
         board = np.exp(-(((u - 90 - 70 * led) / 200.0) ** 2) - ((v - 120) / 200.0) ** 2)
         board = peak * (np.ones_like(board) if even else board)
@@ -42,8 +42,8 @@ def single_led(
         light[60:80, 200:230] = 0.7 * light[60:80, 200:230] + 0.1
         light = light + rng.standard_normal(light.shape) * np.sqrt(4e-5 * light + 0.0015**2)
         shown = np.rint(255.0 * np.clip(light, 0.0, 1.0)) / 255.0
-        pictures.append(Picture(name, shown.astype(np.float32)))
-    return pictures
+        images.append(LinearImage(name, shown.astype(np.float32)))
+    return images
 
 
 @settings(max_examples=15, deadline=None)
@@ -111,18 +111,18 @@ def test_a_whole_set_of_spots_measures_every_leds_crosstalk() -> None:
     assert find_crosstalk(spots(TRUTH)).quality["crosstalk_unmeasured"].verdict is Verdict.PASS
 
 
-def swap(pictures: list[Picture]) -> list[Picture]:
-    return [pictures[1], pictures[0], pictures[2]]
+def swap(images: list[LinearImage]) -> list[LinearImage]:
+    return [images[1], images[0], images[2]]
 
 
-def all_lit(pictures: list[Picture]) -> list[Picture]:
-    light = np.minimum(sum(p.rgb for p in pictures), 1.0).astype(np.float32)
-    return [Picture(p.name, light) for p in pictures]
+def all_lit(images: list[LinearImage]) -> list[LinearImage]:
+    light = np.minimum(sum(p.rgb for p in images), 1.0).astype(np.float32)
+    return [LinearImage(p.name, light) for p in images]
 
 
-def times(factor: float) -> Callable[[list[Picture]], list[Picture]]:
-    return lambda pictures: [
-        Picture(p.name, np.minimum(factor * p.rgb, 1.0).astype(np.float32)) for p in pictures
+def times(factor: float) -> Callable[[list[LinearImage]], list[LinearImage]]:
+    return lambda images: [
+        LinearImage(p.name, np.minimum(factor * p.rgb, 1.0).astype(np.float32)) for p in images
     ]
 
 
@@ -136,7 +136,7 @@ def times(factor: float) -> Callable[[list[Picture]], list[Picture]]:
     ],
 )
 def test_images_of_something_else_are_refused(
-    change: Callable[[list[Picture]], list[Picture]], what: str
+    change: Callable[[list[LinearImage]], list[LinearImage]], what: str
 ) -> None:
     with pytest.raises(InputError, match=what):
         find_crosstalk(spots(TRUTH), change(single_led(TRUTH)))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import crosstalk_from_spots, unmix
 from gelpolight_core.lights.mirror import find_mirror_spots
 from gelpolight_core.lights.positions import direction_condition, light_directions, locate_leds
@@ -22,7 +22,7 @@ from gelpolight_core.session.session import read_session
 CENTRES = np.array([[320.4, 401.7], [180.2, 160.9], [470.6, 150.3]])
 
 
-def mirror_picture(
+def mirror_image(
     centres: np.ndarray = CENTRES,
     *,
     peak: float = 0.8,
@@ -47,13 +47,13 @@ def add_spot(rgb: np.ndarray, centre: tuple[float, float], colour: tuple[float, 
 
 
 def test_each_spot_is_found_in_its_own_colour_to_a_twentieth_of_a_pixel() -> None:
-    spots = find_mirror_spots(Picture("mirror.png", mirror_picture()))
+    spots = find_mirror_spots(LinearImage("mirror.png", mirror_image()))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.05)
 
 
 def test_crosstalk_moves_no_spot_and_is_measured() -> None:
     matrix = np.array([[1.0, 0.05, 0.02], [0.04, 1.0, 0.05], [0.03, 0.06, 1.0]])
-    spots = find_mirror_spots(Picture("m", mirror_picture(crosstalk=matrix, noise=0.0)))
+    spots = find_mirror_spots(LinearImage("m", mirror_image(crosstalk=matrix, noise=0.0)))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.05)
     found, _ = crosstalk_from_spots(spots)
     np.testing.assert_allclose(found, matrix, atol=0.005)
@@ -62,8 +62,8 @@ def test_crosstalk_moves_no_spot_and_is_measured() -> None:
 
 
 def test_a_faint_reflection_of_a_reflection_is_set_aside_with_its_reason() -> None:
-    rgb = add_spot(mirror_picture(), (100.0, 300.0), (0.2, 0.0, 0.0))
-    spots = find_mirror_spots(Picture("m", rgb))
+    rgb = add_spot(mirror_image(), (100.0, 300.0), (0.2, 0.0, 0.0))
+    spots = find_mirror_spots(LinearImage("m", rgb))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.05)
     assert len(spots.rejected) == 1
     assert "red" in spots.rejected[0][1]
@@ -74,27 +74,27 @@ def test_a_faint_reflection_of_a_reflection_is_set_aside_with_its_reason() -> No
     [
         (np.zeros((480, 640, 3), np.float32), "black"),
         (np.full((480, 640, 3), 0.5, np.float32) * np.float32([1, 0.9, 0.8]), "bright"),
-        (mirror_picture() * np.float32([1, 0, 1]), "green LED has no spot"),
-        (add_spot(mirror_picture(), (90.0, 90.0), (0.0, 0.0, 0.7)), "2 blue spots"),
-        (mirror_picture(np.array([[320.0, 400.0], [180.0, 160.0], [181.5, 160.0]])), "merged"),
-        (mirror_picture(np.array([[320.0, 400.0], [180.0, 160.0], [638.0, 150.0]])), "border"),
+        (mirror_image() * np.float32([1, 0, 1]), "green LED has no spot"),
+        (add_spot(mirror_image(), (90.0, 90.0), (0.0, 0.0, 0.7)), "2 blue spots"),
+        (mirror_image(np.array([[320.0, 400.0], [180.0, 160.0], [181.5, 160.0]])), "merged"),
+        (mirror_image(np.array([[320.0, 400.0], [180.0, 160.0], [638.0, 150.0]])), "border"),
     ],
 )
 def test_an_unusable_mirror_image_is_refused_with_the_reason(rgb: np.ndarray, what: str) -> None:
     with pytest.raises(InputError, match=what) as refusal:
-        find_mirror_spots(Picture("mirror_0.png", rgb))
+        find_mirror_spots(LinearImage("mirror_0.png", rgb))
     assert refusal.value.where == "mirror/mirror_0.png"
     assert refusal.value.advice
 
 
 def test_a_grey_mirror_image_is_refused() -> None:
-    grey = np.repeat(mirror_picture().max(axis=2, keepdims=True), 3, axis=2)
+    grey = np.repeat(mirror_image().max(axis=2, keepdims=True), 3, axis=2)
     with pytest.raises(InputError, match="grey"):
-        find_mirror_spots(Picture("m", grey))
+        find_mirror_spots(LinearImage("m", grey))
 
 
 def test_saturated_spots_are_found_and_warned_of() -> None:
-    spots = find_mirror_spots(Picture("m", mirror_picture(peak=3.0)))
+    spots = find_mirror_spots(LinearImage("m", mirror_image(peak=3.0)))
     np.testing.assert_allclose(spots.centres_px, CENTRES, atol=0.1)
     assert spots.quality["spot_peak"].verdict == "warn"
     np.testing.assert_allclose(crosstalk_from_spots(spots)[0], np.eye(3), atol=0.01)
@@ -107,7 +107,7 @@ def test_leds_are_found_from_the_images_of_their_mirror_twins() -> None:
     plane = TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), 39.0)
     leds = np.array([[2.0, 11.0, -13.7], [-10.5, -4.0, -13.7], [9.5, -6.5, -13.7]])
     twins = plane.to_camera(leds * [1, 1, -1])
-    found = find_mirror_spots(Picture("m", mirror_picture(camera.project(twins))))
+    found = find_mirror_spots(LinearImage("m", mirror_image(camera.project(twins))))
     result = locate_leds(found, camera, plane, led_height_mm=13.7)
     np.testing.assert_allclose(result.led_positions_mm, leds, atol=0.02)
     sd = np.sqrt(np.diagonal(result.led_covariance_mm2, axis1=1, axis2=2))
@@ -118,7 +118,7 @@ def test_leds_in_one_direction_are_refused() -> None:
     camera = Camera(640, 480, 690.0, 690.0, 320.0, 240.0)
     plane = TopPlane((0.0, 0.0, 1.0), 39.0)
     close = np.array([[320.0, 400.0], [331.0, 401.0], [342.0, 400.0]])
-    spots = find_mirror_spots(Picture("m", mirror_picture(close)))
+    spots = find_mirror_spots(LinearImage("m", mirror_image(close)))
     with pytest.raises(InputError, match="nearly in one plane"):
         locate_leds(spots, camera, plane, led_height_mm=13.7)
 
@@ -154,24 +154,24 @@ def test_the_rendered_mirror_is_read_to_a_tenth_of_a_pixel(shared_data: Path, se
 
 
 def test_averaged_frames_keep_the_spots() -> None:
-    picture = Picture("m", mirror_picture(noise=0.01))
-    assert find_mirror_spots(replace(picture, frame_count=4)).spots[0].area_px > 10
+    image = LinearImage("m", mirror_image(noise=0.01))
+    assert find_mirror_spots(replace(image, frame_count=4)).spots[0].area_px > 10
 
 
 def test_crosstalk_is_read_off_the_flanks_of_saturated_spots() -> None:
     matrix = np.array([[1.0, 0.05, 0.02], [0.04, 1.0, 0.05], [0.03, 0.06, 1.0]])
-    spots = find_mirror_spots(Picture("m", mirror_picture(peak=1.6, crosstalk=matrix, noise=0.0)))
+    spots = find_mirror_spots(LinearImage("m", mirror_image(peak=1.6, crosstalk=matrix, noise=0.0)))
     assert spots.quality["spot_peak"].verdict == "warn"
     np.testing.assert_allclose(crosstalk_from_spots(spots)[0], matrix, atol=0.02)
 
 
 @pytest.mark.parametrize("where", ["darkness", "another spot"])
 def test_a_spot_dragged_where_its_led_does_not_shine_fails(where: str) -> None:
-    picture = Picture("m", mirror_picture())
-    found = find_mirror_spots(picture)
+    image = LinearImage("m", mirror_image())
+    found = find_mirror_spots(image)
     assert found.quality["spot_light"].verdict is Verdict.PASS
     place = (20.0, 20.0) if where == "darkness" else found.spots[1].centre_px
-    figure = find_mirror_spots(picture, placed={0: place}).quality["spot_light"]
+    figure = find_mirror_spots(image, placed={0: place}).quality["spot_light"]
     assert figure.verdict is Verdict.FAIL
-    kept = find_mirror_spots(picture, placed={0: found.spots[0].centre_px}).quality
+    kept = find_mirror_spots(image, placed={0: found.spots[0].centre_px}).quality
     assert kept["spot_light"] == found.quality["spot_light"]

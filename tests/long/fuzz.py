@@ -30,7 +30,7 @@ from fuzz_kinds import Kind, all_kinds
 from gelpolight_core.errors import InputError
 
 BLOCK = 500
-# Beyond what the program itself takes: one picture of 64 megapixels and its copy as floats.
+# Beyond what the program itself takes: one image of 64 megapixels and its copy as floats.
 MEMORY_BYTES = 1_500_000_000
 TIME_S = 10.0
 SENTENCE = 2000
@@ -69,7 +69,7 @@ def _work(kind: Kind, seed: int, first: int, last: int, folder: Path, out: Conne
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
     null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 2)  # the picture libraries tell of every damage there
+    os.dup2(null, 2)  # the image libraries tell of every damage there
     with open("/proc/self/statm", encoding="ascii") as stream:
         own = int(stream.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY_BYTES,) * 2)

@@ -59,7 +59,7 @@ from gelpolight_core.session.decisions import (
     read_decisions,
     write_decisions,
 )
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import SensorData, read_session
 from gelpolight_core.simulation.session import session_toml
 
@@ -101,8 +101,8 @@ def all_kinds(folder: Path) -> tuple[Kind, ...]:
              (*BYTES, *(spoil.forged_archive,) * 6)),
         Kind("recording", "r.gplrec", _recordings(folder), _use_recording,
              (*BYTES, *(spoil.forged_recording,) * 4)),
-        Kind("PNG picture", "p.png", _pngs(), read_picture, (*BYTES, *(spoil.forged_png,) * 4)),
-        Kind("TIFF picture", "p.tif", _tiffs(), read_picture, (*BYTES, *(spoil.numbered,) * 3)),
+        Kind("PNG image", "p.png", _pngs(), read_image, (*BYTES, *(spoil.forged_png,) * 4)),
+        Kind("TIFF image", "p.tif", _tiffs(), read_image, (*BYTES, *(spoil.numbered,) * 3)),
         Kind("records", "records.sqlite", _records(folder), _use_records,
              (*BYTES, *(partial(_forged_records, folder / "forge.sqlite"),) * 4)),
         Kind("true depth", "t.npz", (_true_depth(),), read_true_depth,
@@ -176,10 +176,10 @@ def _use_recording(path: Path) -> None:
 
 def _pngs() -> tuple[bytes, ...]:
     light = np.random.default_rng(0).integers(0, 255, (10, 12, 4))
-    pictures = (light[..., :3], light[..., :3] * 257, light, light[..., 0])
+    images = (light[..., :3], light[..., :3] * 257, light, light[..., 0])
     kinds = (np.uint8, np.uint16, np.uint8, np.uint16)
     return tuple(
-        cv2.imencode(".png", p.astype(k))[1].tobytes() for p, k in zip(pictures, kinds, strict=True)
+        cv2.imencode(".png", p.astype(k))[1].tobytes() for p, k in zip(images, kinds, strict=True)
     )
 
 

@@ -3,12 +3,12 @@
     xvfb-run -a -s "-screen 0 1920x1200x24" python tests/long/inspect_figures.py \
         --calibration sensor.gplcal --seconds 60
     ... --model paper          another model than the calibration's
-    ... --source FOLDER|FILE   pictures or a recording in place of the virtual sensor
+    ... --source FOLDER|FILE   images or a recording in place of the virtual sensor
     ... --views surface        the views that are shown; all others are hidden
     ... --rounds 30            open and close the page this often; time and memory of each
 
-The calibration has to be one of the virtual sensor, or of the sensor that the pictures are of; its
-picture size is the camera's. On the virtual sensor an object is dragged about for half of the
+The calibration has to be one of the virtual sensor, or of the sensor that the images are of; its
+image size is the camera's. On the virtual sensor an object is dragged about for half of the
 time. Printed are the frames per second made, processed and shown; how often the surface was drawn
 for each shown frame; how late timers of the user interface are; how old a frame is when it is
 painted; and what was computed for views that are hidden.
@@ -195,14 +195,14 @@ def main() -> None:
     parser.add_argument("--calibration", type=Path, required=True)
     parser.add_argument("--model", choices=("paper", "full"))
     parser.add_argument("--effort", default="balanced")
-    parser.add_argument("--source", type=Path, help="folder of pictures, or recording")
+    parser.add_argument("--source", type=Path, help="folder of images, or recording")
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--warm-up", type=float, default=12.0, help="seconds not measured")
     parser.add_argument("--views", default="surface,height,camera,look,bench")
     parser.add_argument("--theme", default="light")
     parser.add_argument("--rounds", type=int, default=0, help="open and close the page so often")
     parser.add_argument("--still", action="store_true", help="nothing is dragged")
-    parser.add_argument("--picture", type=Path, help="file for a picture of the page at the end")
+    parser.add_argument("--picture", type=Path, help="file for an image of the page at the end")
     options = parser.parse_args()
     application: Any = make_application()
     theme.apply(application, options.theme)

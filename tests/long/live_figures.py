@@ -96,8 +96,8 @@ class Measurement:
         seen = WatchedStream(self.stream)
         self._view.set_stream(seen)
         self._paints = PaintWatch(seen.newest)
-        for picture in self._view.findChildren(QGraphicsView):
-            picture.viewport().installEventFilter(self._paints)
+        for image in self._view.findChildren(QGraphicsView):
+            image.viewport().installEventFilter(self._paints)
         self._lateness = Lateness()
         self._memory_mb: list[float] = []
         self._minutes = QTimer()
@@ -108,7 +108,7 @@ class Measurement:
             self._move.start(DRAG_MS)
 
     def start(self) -> None:
-        """Show the window and let pictures come."""
+        """Show the window and let images come."""
         self.window.show()
         self.stream.start()
         if self._processor is not None:
@@ -168,7 +168,7 @@ def main() -> None:
     parser.add_argument("--wizard", type=Path, metavar="SESSION", help="open the wizard on it")
     parser.add_argument("--steps", default="lens,lights,balls", help="of the wizard")
     parser.add_argument("--rounds", type=int, default=0, help="open and close the wizard so often")
-    parser.add_argument("--picture", type=Path, help="file for a picture of the window at the end")
+    parser.add_argument("--picture", type=Path, help="file for an image of the window at the end")
     options = parser.parse_args()
 
     application = QApplication([])

@@ -8,7 +8,7 @@ when it is used first is used once; then a random person comes. Every half minut
 brought to the same state, and when nothing is computed any more it is left in peace for some
 seconds, in which it is measured: memory, threads, open files, objects and timers, frames made,
 processed and shown in a second, how late the user interface is, what the log says, and the room on
-disk. Every fourth time the session, the protocol's run and the picture that is measured are put
+disk. Every fourth time the session, the protocol's run and the image that is measured are put
 away: these times say whether memory grows, apart from what the C library keeps of what was given
 back to it. Every action is written to actions.log in the scratch folder. The exit status is 1 where
 memory grows, the rate drifts, or the log holds an error; the files are kept then.

@@ -46,7 +46,7 @@ class Row:
     """Figures of one rest: rates in frames per second while nothing but the live path runs."""
 
     minutes: float
-    emptied: bool  # sessions, runs and pictures that were open are put away
+    emptied: bool  # sessions, runs and images that were open are put away
     rss_mb: float
     needed_mb: float  # the same, after the allocator has given back what it can
     held_mb: float  # what the program has asked for; the system's allocator keeps more

@@ -314,7 +314,7 @@ class Person:
             self.use(self.random.choice(found))
 
     def _calibrate(self) -> None:
-        """Come nearer to a wizard that takes pictures."""
+        """Come nearer to a wizard that takes images."""
         self.press("navigation.button.calibrate")
         names = ("calibrate.next", "setup.accept", "start.recent.0", "start.demo", "calibrate.lay")
         self._next.extend(lambda name=name: self.press(name) for name in names)
@@ -326,7 +326,7 @@ class Person:
             self.press("navigation.button.calibrate")
 
     def _correct(self) -> None:
-        """Choose a picture, leave it out or take it in, and undo that."""
+        """Choose an image, leave it out or take it in, and undo that."""
         self.press("calibrate.captures")
         for name in ("calibrate.undo", "calibrate.redo", "calibrate.live"):
             if self.random.random() < 0.5:

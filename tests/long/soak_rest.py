@@ -17,7 +17,7 @@ from app.shell.main_window import MainWindow
 from app.view3d.surface import LIVE_NODES
 from app.widgets.qt_tree import below
 
-UNSETTLED = "the pictures do not settle"
+UNSETTLED = "the images do not settle"
 COMPUTES = "something is being computed"
 RATE_HZ = 15.0
 SIZE = 1400, 900
@@ -91,7 +91,7 @@ class Rest:
         press_view.release()
 
     def _draw_largest(self) -> Iterator[None]:
-        """Draw a standing picture with all its nodes; a renderer in software keeps that room."""
+        """Draw a standing image with all its nodes; a renderer in software keeps that room."""
         page = self.window.page("inspect")
         self.window.showFullScreen()
         page.pause_action.trigger()
@@ -186,7 +186,7 @@ class Rest:
         bench.adjust(rate_hz=RATE_HZ, noise=1.0, gain_db=0.0)
 
     def _put_away(self) -> None:
-        """Close the session and the protocol's run, and let go of the picture that is measured."""
+        """Close the session and the protocol's run, and let go of the image that is measured."""
         for action in list(below(self.window, QAction, "calibrate.leave")):
             action.trigger()
         for name in ("protocol.leave", "protocol.leave_result"):

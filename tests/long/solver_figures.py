@@ -21,7 +21,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.score import read_true_depth, score_depth
 from gelpolight_core.measurement.truth import read_truth
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 
 PRESS = "cylinder_s5_d100.png"
 MODES = (("paper", "best"), ("full", "fast"), ("full", "balanced"), ("full", "best"))
@@ -29,7 +29,7 @@ MODES = (("paper", "best"), ("full", "fast"), ("full", "balanced"), ("full", "be
 
 def raw_frame(path: Path) -> np.ndarray:
     """Return an image in 8 bits."""
-    rgb = read_picture(path).rgb
+    rgb = read_image(path).rgb
     return np.asarray(np.round(rgb * 255.0), np.uint8) if rgb.dtype.kind == "f" else rgb
 
 

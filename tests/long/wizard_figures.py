@@ -32,8 +32,8 @@ class Paints(QObject):
     def __init__(self, view: LiveView) -> None:
         super().__init__()
         self._view, self._seen, self.count = view, view.shown_frames, 0
-        for picture in view.findChildren(QGraphicsView):
-            picture.viewport().installEventFilter(self)
+        for image in view.findChildren(QGraphicsView):
+            image.viewport().installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Look at paint events, and let all pass."""
@@ -130,7 +130,7 @@ def open_and_close(page: CalibratePage, session: Path, rounds: int) -> None:
 
 
 def one_round(wizard: Wizard) -> None:
-    """Look until pictures are shown, then leave."""
+    """Look until images are shown, then leave."""
     wizard.go_to("lens")
     wait(lambda: wizard.area.view.shown_frames > 3, 30.0)
     wizard.left.emit()

@@ -154,7 +154,7 @@ def test_a_press_that_could_not_be_measured_stays_with_its_reason(tmp_path: Path
 
 
 def test_an_evaluation_without_a_single_measurement_is_still_reported(tmp_path: Path) -> None:
-    evaluation = evaluate([press("ball", 6.0, 0.8)], ["the picture is all black"])
+    evaluation = evaluate([press("ball", 6.0, 0.8)], ["the image is all black"])
     assert evaluation_json(evaluation)["overall"]["planar"]["mean_absolute_percent"] is None
     assert len(write_evaluation(evaluation, tmp_path)) == 4
 
@@ -206,7 +206,7 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
 
     def measure(path: Path, shape: str) -> Measurement:
         if path.name == "c.png":
-            raise InputError("the picture is all black", where=path.name, advice="Open the shutter")
+            raise InputError("the image is all black", where=path.name, advice="Open the shutter")
         return measure_heightmap(heights({"a.png": 2.0, "b.png": 3.0}[path.name]), shape=shape)
 
     told: list[tuple[str, float]] = []
@@ -215,7 +215,7 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
     )
     assert evaluation.overall("planar").mean_absolute_percent < 0.5
     assert [result.failure for result in evaluation.failed] == [
-        "c.png: the picture is all black. Open the shutter."
+        "c.png: the image is all black. Open the shutter."
     ]
     assert evaluation.skipped == ("coin.png",)
     # What the map knows of its calibration reaches the measurement.
@@ -254,14 +254,14 @@ def test_a_truth_file_that_cannot_be_used_says_where_and_why(
         read_truth(tmp_path)
 
 
-def test_a_missing_truth_file_or_picture_is_refused(tmp_path: Path) -> None:
+def test_a_missing_truth_file_or_image_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         read_truth(tmp_path)
     (tmp_path / "truth.csv").write_bytes(b"file,\xff\xfe")
     with pytest.raises(InputError, match="not text"):
         read_truth(tmp_path)
     (tmp_path / "truth.csv").write_text(HEADER + "a.png,ball,6,,1\n")
-    with pytest.raises(InputError, match=r"1 of 1 pictures are missing, first a\.png"):
+    with pytest.raises(InputError, match=r"1 of 1 images are missing, first a\.png"):
         evaluate_presses(tmp_path, lambda path, shape: measurement(shape, 2.0, 1.0))
 
 
@@ -368,9 +368,9 @@ def test_the_reports_files_are_judged_by_the_limits_that_are_given(tmp_path: Pat
 
 
 def test_a_report_without_regions_or_measurements_says_so(tmp_path: Path) -> None:
-    evaluation = evaluate([press("ball", 6.0, 0.8)], ["the picture is all black"])
+    evaluation = evaluate([press("ball", 6.0, 0.8)], ["the image is all black"])
     written = write_evaluation_files(evaluation, tmp_path)
     assert "gauge.csv" not in {path.name for path in written}
     page = (tmp_path / "evaluation.html").read_text()
     assert "None of 1 presses could be measured" in page
-    assert "the picture is all black" in page
+    assert "the image is all black" in page

@@ -49,7 +49,7 @@ def same(a: Measurement, b: Measurement) -> bool:
 
 
 @pytest.fixture
-def picture(tmp_path: Path) -> Path:
+def image(tmp_path: Path) -> Path:
     path = tmp_path / "press.png"
     path.write_bytes(b"picture")
     return path
@@ -72,14 +72,12 @@ def test_a_measurement_comes_back_to_the_last_bit(
     assert again.find("c") is None
 
 
-def test_another_picture_shape_or_calibration_is_measured_anew(
-    tmp_path: Path, picture: Path
-) -> None:
+def test_another_image_shape_or_calibration_is_measured_anew(tmp_path: Path, image: Path) -> None:
     ledger = Ledger(None, "one")
-    keys = {ledger.key(picture, "cylinder"), ledger.key(picture, "cuboid")}
-    keys.add(Ledger(None, "other").key(picture, "cylinder"))
-    picture.write_bytes(b"taken again")
-    keys.add(ledger.key(picture, "cylinder"))
+    keys = {ledger.key(image, "cylinder"), ledger.key(image, "cuboid")}
+    keys.add(Ledger(None, "other").key(image, "cylinder"))
+    image.write_bytes(b"taken again")
+    keys.add(ledger.key(image, "cylinder"))
     assert len(keys) == 4
     assert ledger.key(tmp_path / "missing.png", "cylinder") is None
 

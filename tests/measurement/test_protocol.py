@@ -148,13 +148,13 @@ def test_the_run_is_the_folder_that_evaluate_reads(tmp_path: Path) -> None:
 
 def test_frames_of_a_press_are_averaged_with_all_their_bits(tmp_path: Path) -> None:
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    picture = run.accept(run.wanted[0], [*frames(10, 3), *frames(11)])
-    kept = cv2.imread(str(picture), cv2.IMREAD_UNCHANGED)
+    image = run.accept(run.wanted[0], [*frames(10, 3), *frames(11)])
+    kept = cv2.imread(str(image), cv2.IMREAD_UNCHANGED)
     assert kept.dtype == np.uint16
     assert kept.mean() == pytest.approx(10.25 * 257, abs=0.5)
 
 
-def test_a_press_taken_back_is_asked_for_again_and_its_picture_is_kept(tmp_path: Path) -> None:
+def test_a_press_taken_back_is_asked_for_again_and_its_image_is_kept(tmp_path: Path) -> None:
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     press = run.wanted[0]
     for value in (10, 20):
@@ -169,11 +169,11 @@ def test_a_press_taken_back_is_asked_for_again_and_its_picture_is_kept(tmp_path:
         run.take_back(press)
 
 
-def test_a_picture_that_was_taken_away_is_asked_for_again(tmp_path: Path) -> None:
+def test_an_image_that_was_taken_away_is_asked_for_again(tmp_path: Path) -> None:
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     for press in run.wanted:
         run.accept(press, frames(10))
-    run.picture(run.wanted[1]).unlink()
+    run.image(run.wanted[1]).unlink()
     again = open_run(run.folder)
     assert again.left == (run.wanted[1],)
 
@@ -252,12 +252,12 @@ def test_a_new_run_does_not_take_the_place_of_another(tmp_path: Path) -> None:
         open_run(tmp_path)
 
 
-def test_of_several_pictures_that_were_taken_away_all_are_asked_for_again(tmp_path: Path) -> None:
+def test_of_several_images_that_were_taken_away_all_are_asked_for_again(tmp_path: Path) -> None:
     run = begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     for press in run.wanted:
         run.accept(press, frames(10))
     for press in run.wanted[1:]:
-        run.picture(press).unlink()
+        run.image(press).unlink()
     again = open_run(run.folder)
     again.accept(run.wanted[1], frames(20))
     assert again.left == (run.wanted[2],)

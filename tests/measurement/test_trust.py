@@ -16,7 +16,7 @@ from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.quality import QualityTable, Verdict, judge
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 
 PRESS = "cylinder_s5_d100.png"
 
@@ -39,7 +39,7 @@ def test_a_failed_calibration_makes_every_measurement_doubtful(
     path = small_session / "presses" / PRESS
     reconstructor = Reconstructor(calibration)
     press = press_measurement(reconstructor)(path, "cylinder")
-    heightmap = reconstructor.depth(read_picture(path).rgb)
+    heightmap = reconstructor.depth(read_image(path).rgb)
     on_page = apply_tool(Cylinder(), heightmap)
     assert isinstance(on_page, ToolResult)
     assert on_page.measurement is not None

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.checkerboard import find_board
 from gelpolight_core.session.board import BoardSpec
 
@@ -26,7 +26,7 @@ def distance_to_nearest(corners: Array, truth: Array) -> Array:
 
 
 @pytest.fixture(scope="module")
-def tilted_board() -> Picture:
+def tilted_board() -> LinearImage:
     """Return a sharp view of the 9 x 6 board, tilted by 20 degrees."""
     return render_board(CAMERA, board_pose(tilt_deg=20.0, towards_deg=30.0))
 
@@ -53,7 +53,7 @@ def test_corners_are_found_in_any_pose(
     assert view.tilt_deg == pytest.approx(tilt_deg, abs=12.0)
 
 
-def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: Picture) -> None:
+def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: LinearImage) -> None:
     """An overlay draws the grid along its rows; no row may be swapped or mirrored."""
     view = find_board(tilted_board, BOARD)
     grid = view.corners_px.reshape(6, 9, 2)
@@ -64,7 +64,7 @@ def test_corners_come_row_by_row_as_seen_from_the_printed_side(tilted_board: Pic
     assert size.max() < 1.6 * size.min()
 
 
-def test_the_result_tells_how_good_the_view_is(tilted_board: Picture) -> None:
+def test_the_result_tells_how_good_the_view_is(tilted_board: LinearImage) -> None:
     """Sharpness, contrast, saturation and misfit are shown next to the image."""
     view = find_board(tilted_board, BOARD)
     assert view.contrast == pytest.approx(0.75, abs=0.02)
@@ -80,7 +80,7 @@ def test_the_result_tells_how_good_the_view_is(tilted_board: Picture) -> None:
 
 @pytest.mark.parametrize("stated", [(8, 5), (7, 7), (9, 7), (10, 7), (5, 4), (12, 9)])
 def test_another_board_size_is_refused_and_the_real_one_named(
-    tilted_board: Picture, stated: tuple[int, int]
+    tilted_board: LinearImage, stated: tuple[int, int]
 ) -> None:
     """A board of another size would give a wrong camera; the message names the mistake."""
     with pytest.raises(InputError, match=r"9 x 6 inner corners, not") as refusal:
@@ -89,28 +89,28 @@ def test_another_board_size_is_refused_and_the_real_one_named(
     assert "inner corners" in refusal.value.advice
 
 
-def test_a_board_may_be_stated_lengthwise_or_crosswise(tilted_board: Picture) -> None:
+def test_a_board_may_be_stated_lengthwise_or_crosswise(tilted_board: LinearImage) -> None:
     """9 x 6 and 6 x 9 are the same board."""
     lengthwise = find_board(tilted_board, BOARD).corners_px
     crosswise = find_board(tilted_board, BoardSpec((6, 9), 3.0)).corners_px
     assert distance_to_nearest(crosswise, lengthwise).max() < 0.01
 
 
-def test_uneven_light_does_not_move_the_corners(tilted_board: Picture) -> None:
+def test_uneven_light_does_not_move_the_corners(tilted_board: LinearImage) -> None:
     """A lamp at one side is not an error of the lens."""
     straight = find_board(tilted_board, BOARD).corners_px
     falloff = np.linspace(0.25, 1.2, 480, dtype=np.float32)[None, :, None]
-    shaded = Picture("shaded.png", np.clip(tilted_board.rgb * falloff, 0.0, 0.99))
+    shaded = LinearImage("shaded.png", np.clip(tilted_board.rgb * falloff, 0.0, 0.99))
     assert distance_to_nearest(find_board(shaded, BOARD).corners_px, straight).max() < 0.1
 
 
-def flat(value: float) -> Picture:
+def flat(value: float) -> LinearImage:
     """Return an image with a single value."""
-    return Picture("flat.png", np.full((360, 480, 3), value, dtype=np.float32))
+    return LinearImage("flat.png", np.full((360, 480, 3), value, dtype=np.float32))
 
 
 @pytest.mark.parametrize(
-    ("picture", "says"),
+    ("image", "says"),
     [
         (flat(0.0), "black"),
         (flat(0.01), "black"),
@@ -119,39 +119,39 @@ def flat(value: float) -> Picture:
         (flat(float("nan")), "no valid value"),
     ],
 )
-def test_an_empty_image_is_refused_with_the_reason(picture: Picture, says: str) -> None:
+def test_an_empty_image_is_refused_with_the_reason(image: LinearImage, says: str) -> None:
     """The advice depends on the kind of exposure error."""
     with pytest.raises(InputError, match=says):
-        find_board(picture, BOARD)
+        find_board(image, BOARD)
 
 
 def test_noise_alone_is_no_board() -> None:
     """A detector that always reports a board is not trusted."""
     noise = np.random.default_rng(3).random((360, 480, 3)).astype(np.float32)
     with pytest.raises(InputError, match="No checkerboard with 9 x 6"):
-        find_board(Picture("noise.png", noise), BOARD)
+        find_board(LinearImage("noise.png", noise), BOARD)
 
 
 @pytest.mark.parametrize("blur_px", [2.5, 5.0, 12.0])
-def test_a_blurred_board_is_refused_as_blurred(tilted_board: Picture, blur_px: float) -> None:
+def test_a_blurred_board_is_refused_as_blurred(tilted_board: LinearImage, blur_px: float) -> None:
     """A defocused or moved image is reported as blurred, not as a missing board."""
     blurred = np.asarray(cv2.GaussianBlur(tilted_board.rgb, (0, 0), blur_px))
     with pytest.raises(InputError, match="blurred: edges are"):
-        find_board(Picture("blurred.png", blurred), BOARD)
+        find_board(LinearImage("blurred.png", blurred), BOARD)
 
 
-def test_light_squares_at_the_end_of_the_scale_are_refused(tilted_board: Picture) -> None:
+def test_light_squares_at_the_end_of_the_scale_are_refused(tilted_board: LinearImage) -> None:
     """Clipped light squares have no level from which an edge can be measured."""
     with pytest.raises(InputError, match="light squares are saturated"):
-        find_board(Picture("bright.png", np.clip(tilted_board.rgb * 1.6, 0.0, 1.0)), BOARD)
+        find_board(LinearImage("bright.png", np.clip(tilted_board.rgb * 1.6, 0.0, 1.0)), BOARD)
 
 
-def test_a_board_that_is_half_covered_is_not_accepted(tilted_board: Picture) -> None:
+def test_a_board_that_is_half_covered_is_not_accepted(tilted_board: LinearImage) -> None:
     """Half a board is not accepted as a whole one."""
     covered = tilted_board.rgb.copy()
     covered[:, :200] = 0.3
     with pytest.raises(InputError):
-        find_board(Picture("covered.png", covered), BOARD)
+        find_board(LinearImage("covered.png", covered), BOARD)
 
 
 @pytest.mark.parametrize(
@@ -168,8 +168,8 @@ def test_wrong_sizes_never_pass_on_rendered_sessions(shared_data: Path, sensor: 
     """The board of the independent renderer is found, and only with its own size."""
     path = shared_data / sensor / "top_pose" / "top_pose.png"
     rgb = cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)
-    picture = Picture(path.name, rgb)
-    assert find_board(picture, BOARD).grid_rms_px < 0.1
+    image = LinearImage(path.name, rgb)
+    assert find_board(image, BOARD).grid_rms_px < 0.1
     for stated in [(8, 5), (7, 7), (5, 4), (3, 3), (10, 6)]:
         with pytest.raises(InputError, match="9 x 6"):
-            find_board(picture, BoardSpec(stated, 3.0))
+            find_board(image, BoardSpec(stated, 3.0))

@@ -12,7 +12,7 @@ import pytest
 from boards import BOARD, CAMERA, board_pose, render_board
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.lens import LensResult, calibrate_lens, find_nonsense
 from gelpolight_core.optics.lens_quality import refuse_unobservable
@@ -33,7 +33,7 @@ HELD = [
 ]
 
 
-def held_view(number: int, camera: Camera = CAMERA, **changes: float) -> Picture:
+def held_view(number: int, camera: Camera = CAMERA, **changes: float) -> LinearImage:
     """Return the numbered view of the board."""
     tilt_deg, towards_deg, distance_mm, centre_mm = HELD[number]
     pose = board_pose(
@@ -47,13 +47,13 @@ def held_view(number: int, camera: Camera = CAMERA, **changes: float) -> Picture
 
 
 @pytest.fixture(scope="module")
-def views() -> list[Picture]:
+def views() -> list[LinearImage]:
     """Return nine good views."""
     return [held_view(number) for number in range(len(HELD))]
 
 
 @pytest.fixture(scope="module")
-def lens(views: list[Picture]) -> LensResult:
+def lens(views: list[LinearImage]) -> LensResult:
     """Return the lens calibrated from the nine views."""
     return calibrate_lens(views, BOARD)
 
@@ -103,11 +103,11 @@ def test_the_result_shows_where_corners_were_seen(lens: LensResult) -> None:
     assert lens.quality["views_left_out"].verdict is Verdict.PASS
 
 
-def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[Picture]) -> None:
+def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[LinearImage]) -> None:
     """One mistake costs one view, not the session."""
-    moved = Picture("moved.png", np.asarray(cv2.GaussianBlur(views[2].rgb, (0, 0), 4.0)))
-    dark = Picture("dark.png", np.zeros_like(views[0].rgb))
-    again = Picture("again.png", views[4].rgb)
+    moved = LinearImage("moved.png", np.asarray(cv2.GaussianBlur(views[2].rgb, (0, 0), 4.0)))
+    dark = LinearImage("dark.png", np.zeros_like(views[0].rgb))
+    again = LinearImage("again.png", views[4].rgb)
     lens = calibrate_lens([*views[:7], moved, dark, again], BOARD)
     reasons = {view.name: view.reason for view in lens.views if not view.used}
     assert reasons.keys() == {"moved.png", "dark.png", "again.png"}
@@ -119,31 +119,33 @@ def test_a_bad_view_among_good_ones_is_left_out_and_named(views: list[Picture]) 
     assert lens.camera.fx == pytest.approx(CAMERA.fx, rel=2e-3)
 
 
-def test_a_bent_board_is_left_out_by_its_error(views: list[Picture]) -> None:
+def test_a_bent_board_is_left_out_by_its_error(views: list[LinearImage]) -> None:
     """A view that fits no camera affects all figures; it is named with its error."""
     rows, columns = np.mgrid[0:360, 0:480].astype(np.float32)
     wavy = (columns + 0.6 * np.sin(rows / 40.0)).astype(np.float32)
-    bent = Picture("bent.png", np.asarray(cv2.remap(views[3].rgb, wavy, rows, cv2.INTER_LINEAR)))
+    bent = LinearImage(
+        "bent.png", np.asarray(cv2.remap(views[3].rgb, wavy, rows, cv2.INTER_LINEAR))
+    )
     lens = calibrate_lens([*views[:3], bent, *views[4:]], BOARD)
     assert [view.name for view in lens.views if not view.used] == ["bent.png"]
     assert "typical view" in lens.views[3].reason
     assert lens.camera.fx == pytest.approx(CAMERA.fx, rel=2e-3)
 
 
-def test_three_views_are_not_enough(views: list[Picture]) -> None:
+def test_three_views_are_not_enough(views: list[LinearImage]) -> None:
     """Any camera fits three views; nothing would check it."""
     with pytest.raises(InputError, match="3 images, but at least 4"):
         calibrate_lens(views[:3], BOARD)
 
 
-def test_one_view_many_times_is_one_view(views: list[Picture]) -> None:
+def test_one_view_many_times_is_one_view(views: list[LinearImage]) -> None:
     """Capturing the same view again adds no information."""
-    copies = [Picture(f"copy_{k}.png", views[1].rgb) for k in range(6)]
+    copies = [LinearImage(f"copy_{k}.png", views[1].rgb) for k in range(6)]
     with pytest.raises(InputError, match=r"1 of 6 views.*same pose as in copy_0\.png"):
         calibrate_lens(copies, BOARD)
 
 
-def test_a_session_of_another_board_says_which(views: list[Picture]) -> None:
+def test_a_session_of_another_board_says_which(views: list[LinearImage]) -> None:
     """The message names the size once, not once per file."""
     smaller = type(BOARD)((8, 6), 3.0)
     with pytest.raises(InputError, match="9 x 6 inner corners, not 8 x 6") as refusal:
@@ -154,13 +156,13 @@ def test_a_session_of_another_board_says_which(views: list[Picture]) -> None:
 
 def test_parallel_views_are_refused_for_want_of_a_focal_length() -> None:
     """Views of an untilted board look the same for any focal length."""
-    pictures = [
+    images = [
         render_board(CAMERA, board_pose(tilt_deg=1.0, towards_deg=90.0 * k, distance_mm=44.0 + k))
         for k in range(4)
     ]
-    blank = Picture("blank.png", np.full((*pictures[0].rgb.shape[:2], 3), 0.5, np.float32))
+    blank = LinearImage("blank.png", np.full((*images[0].rgb.shape[:2], 3), 0.5, np.float32))
     with pytest.raises(LensRefusal, match="nearly parallel") as refusal:
-        calibrate_lens([*pictures, blank], BOARD)
+        calibrate_lens([*images, blank], BOARD)
     assert "blank.png" in refusal.value.found, "left-out views are named with their reason"
     assert [view.used for view in refusal.value.views] == [True] * 4 + [False]
 
@@ -173,9 +175,9 @@ def test_tilted_views_of_a_bent_board_are_not_called_parallel() -> None:
     assert "Print" in refusal.value.advice
 
 
-def test_images_of_two_sizes_are_refused(views: list[Picture]) -> None:
+def test_images_of_two_sizes_are_refused(views: list[LinearImage]) -> None:
     """Two image sizes mean two cameras."""
-    cropped = Picture("cropped.png", views[3].rgb[:300])
+    cropped = LinearImage("cropped.png", views[3].rgb[:300])
     with pytest.raises(InputError, match="480 x 300") as refusal:
         calibrate_lens([*views[:3], cropped], BOARD)
     assert refusal.value.where == "checkerboard/cropped.png"
@@ -211,11 +213,13 @@ def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
 ) -> None:
     """Every length of the sensor depends on this one."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["camera"]
-    pictures = [
-        Picture(path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255))
+    images = [
+        LinearImage(
+            path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255)
+        )
         for path in sorted((shared_data / sensor / "checkerboard").glob("*.png"))
     ]
-    lens = calibrate_lens(pictures, BOARD)
+    lens = calibrate_lens(images, BOARD)
     assert lens.camera.fx == pytest.approx(truth["fx"], rel=1e-3)
     assert lens.camera.fy == pytest.approx(truth["fy"], rel=1e-3)
     # 1 px of the principal point is 0.03 mm on the membrane, and the pose compensates most of it.

@@ -13,7 +13,7 @@ from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.lens import calibrate_lens
@@ -35,7 +35,7 @@ def lying_board(
     name: str = "top.png",
     noise: float = 0.004,
     blur_px: float = 0.6,
-) -> tuple[Picture, TopPlane]:
+) -> tuple[LinearImage, TopPlane]:
     """Return the image of a board and the plane in which it lies."""
     rotation, shift = board_pose(
         tilt_deg=tilt_deg,
@@ -45,11 +45,11 @@ def lying_board(
         centre_mm=centre_mm,
         board=BOARD,
     )
-    picture = render_board(
+    image = render_board(
         camera, (rotation, shift), board=BOARD, name=name, noise=noise, blur_px=blur_px
     )
     x, y, z = (float(n) for n in rotation[:, 2])
-    return picture, TopPlane((x, y, z), float(rotation[:, 2] @ shift))
+    return image, TopPlane((x, y, z), float(rotation[:, 2] @ shift))
 
 
 def angle_deg(plane: TopPlane, other: TopPlane) -> float:
@@ -71,10 +71,10 @@ def test_the_surface_is_found_however_it_is_mounted(
     tilt_deg: float, towards_deg: float, roll_deg: float, distance_mm: float
 ) -> None:
     """Distance to 0.1 %, normal to 0.1 degrees, and both within the stated uncertainty."""
-    picture, truth = lying_board(
+    image, truth = lying_board(
         tilt_deg=tilt_deg, towards_deg=towards_deg, roll_deg=roll_deg, distance_mm=distance_mm
     )
-    result = estimate_top_pose([picture], BOARD, CAMERA)
+    result = estimate_top_pose([image], BOARD, CAMERA)
     assert result.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
     # Squares of 19 px at 55 mm give a third of the accuracy of the rendered sessions.
     assert angle_deg(result.plane, truth) < 0.2
@@ -88,8 +88,8 @@ def test_the_surface_is_found_however_it_is_mounted(
 
 def test_the_mirrored_pose_is_rejected_and_shown() -> None:
     """Both poses of a flat board are reported, with the evidence against the wrong one."""
-    picture, truth = lying_board(tilt_deg=6.0)
-    result = estimate_top_pose([picture], BOARD, CAMERA)
+    image, truth = lying_board(tilt_deg=6.0)
+    result = estimate_top_pose([image], BOARD, CAMERA)
     assert result.decision is Decision.EVIDENCE
     assert result.mirrored is not None
     assert angle_deg(result.plane, truth) < 0.1
@@ -106,10 +106,10 @@ def far_camera() -> Camera:
 
 def test_two_poses_that_fit_equally_well_are_reported() -> None:
     """At a large distance and with noise, nothing separates the poses; the result says so."""
-    picture, truth = lying_board(
+    image, truth = lying_board(
         tilt_deg=6.0, distance_mm=10000.0, camera=far_camera(), noise=0.03, blur_px=1.0
     )
-    result = estimate_top_pose([picture], BOARD, far_camera())
+    result = estimate_top_pose([image], BOARD, far_camera())
     assert result.decision is Decision.TILT
     assert result.quality["mirrored_margin"].verdict is Verdict.WARN
     assert result.mirrored is not None
@@ -126,7 +126,7 @@ def test_several_views_are_averaged() -> None:
     ]
     truth = laid[0][1]
     one = estimate_top_pose([laid[0][0]], BOARD, CAMERA)
-    all_three = estimate_top_pose([picture for picture, _ in laid], BOARD, CAMERA)
+    all_three = estimate_top_pose([image for image, _ in laid], BOARD, CAMERA)
     assert all(view.used for view in all_three.views)
     assert all_three.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
     assert angle_deg(all_three.plane, truth) < 0.1
@@ -137,7 +137,7 @@ def test_a_board_that_does_not_lie_flat_is_left_out_and_named() -> None:
     """A particle under one of three boards does not tilt the result."""
     flat = [lying_board(roll_deg=roll, name=f"flat_{roll:.0f}.png") for roll in (-40.0, 10.0, 70.0)]
     propped, _ = lying_board(tilt_deg=4.0, towards_deg=200.0, name="propped.png")
-    result = estimate_top_pose([*(picture for picture, _ in flat), propped], BOARD, CAMERA)
+    result = estimate_top_pose([*(image for image, _ in flat), propped], BOARD, CAMERA)
     assert [view.name for view in result.views if not view.used] == ["propped.png"]
     assert "propped.png" in result.quality["views_left_out"].advice
     assert angle_deg(result.plane, flat[0][1]) < 0.1
@@ -149,21 +149,21 @@ def test_boards_of_which_no_two_agree_are_refused_and_named(tilts_deg: tuple[flo
 
     One of three such boards may happen to be in the middle; even then there is no evidence for it.
     """
-    pictures = [
+    images = [
         lying_board(tilt_deg=tilt, distance_mm=38.0 + 2.0 * k, name=f"held_{k}.png")[0]
         for k, tilt in enumerate(tilts_deg)
     ]
     with pytest.raises(InputError, match=f"The {len(tilts_deg)} boards .* plane") as refusal:
-        estimate_top_pose(pictures, BOARD, CAMERA)
+        estimate_top_pose(images, BOARD, CAMERA)
     assert refusal.value.where == "top_pose"
     assert "held_0.png" in refusal.value.found
 
 
 def test_a_failed_image_among_good_ones_is_left_out_and_named() -> None:
     """A black frame among the views is named, but not fatal."""
-    picture, truth = lying_board()
-    black = Picture("black.png", np.zeros_like(picture.rgb))
-    result = estimate_top_pose([black, picture], BOARD, CAMERA)
+    image, truth = lying_board()
+    black = LinearImage("black.png", np.zeros_like(image.rgb))
+    result = estimate_top_pose([black, image], BOARD, CAMERA)
     assert [view.used for view in result.views] == [False, True]
     assert "black" in result.views[0].reason
     assert result.plane.distance_mm == pytest.approx(truth.distance_mm, rel=1e-3)
@@ -171,28 +171,28 @@ def test_a_failed_image_among_good_ones_is_left_out_and_named() -> None:
 
 def test_the_focal_length_s_uncertainty_reaches_the_distance() -> None:
     """The distance cannot be known better than the focal length."""
-    picture, _ = lying_board()
-    result = estimate_top_pose([picture], BOARD, CAMERA, focal_sd_px=0.01 * CAMERA.fx)
+    image, _ = lying_board()
+    result = estimate_top_pose([image], BOARD, CAMERA, focal_sd_px=0.01 * CAMERA.fx)
     assert result.distance_sd_mm >= 0.01 * result.plane.distance_mm
     assert result.quality["distance_sd"].verdict is not Verdict.PASS
 
 
 def test_without_a_usable_image_the_reason_is_given() -> None:
     """If there is only one image, its error is the error of the stage."""
-    picture, _ = lying_board()
+    image, _ = lying_board()
     with pytest.raises(InputError, match="no image"):
         estimate_top_pose([], BOARD, CAMERA)
-    black = Picture("top_pose.png", np.zeros_like(picture.rgb))
+    black = LinearImage("top_pose.png", np.zeros_like(image.rgb))
     with pytest.raises(InputError, match="black") as refusal:
         estimate_top_pose([black], BOARD, CAMERA)
     assert refusal.value.where == "top_pose/top_pose.png"
     with pytest.raises(InputError, match="480 x 200"):
-        estimate_top_pose([Picture("cut.png", picture.rgb[:200])], BOARD, CAMERA)
+        estimate_top_pose([LinearImage("cut.png", image.rgb[:200])], BOARD, CAMERA)
 
 
-def read(path: Path) -> Picture:
+def read(path: Path) -> LinearImage:
     """Return the pixels of an 8-bit image file."""
-    return Picture(
+    return LinearImage(
         path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)
     )
 

@@ -7,7 +7,7 @@ import pytest
 import scene
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.refraction import camera_to_membrane
 from gelpolight_core.radiance.whiteboard import calibrate_radiance
 
@@ -27,7 +27,7 @@ def whiteboard(vignetting: float = 0.1) -> np.ndarray:
 def relative_error(rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the relative error (rows, columns, 3) of the radiance, and the usable nodes."""
     table = scene.table()
-    result = calibrate_radiance(Picture("whiteboard.png", rgb), table, scene.LEDS)
+    result = calibrate_radiance(LinearImage("whiteboard.png", rgb), table, scene.LEDS)
     points = table.grid.points_mm()
     _, radiance = scene.flat_light(points)
     fall_off = 1.0 - 0.1 * (points**2).sum(-1, keepdims=True) / 144.0
@@ -58,7 +58,7 @@ def test_saturated_areas_are_filled_by_the_law_of_light() -> None:
     scale = np.float32(1.0 / (0.8 * whiteboard().max()))
     table = scene.table()
     result = calibrate_radiance(
-        Picture("w", np.minimum(whiteboard() * scale, 1.0)), table, scene.LEDS
+        LinearImage("w", np.minimum(whiteboard() * scale, 1.0)), table, scene.LEDS
     )
     lost = result.saturated & result.usable
     assert lost.sum() > 500
@@ -74,7 +74,7 @@ def test_a_board_smaller_than_the_circle_ends_where_it_ends() -> None:
     rgb = whiteboard()
     rgb[:, 270:] = 0.0
     table = scene.table()
-    result = calibrate_radiance(Picture("w", rgb), table, scene.LEDS)
+    result = calibrate_radiance(LinearImage("w", rgb), table, scene.LEDS)
     # Specks up to 15 nodes wide count as board, so the corners of its outline are rounded.
     assert not result.usable[table.u_px > 276].any()
     assert result.usable[(table.u_px < 250) & table.valid].mean() > 0.9
@@ -89,14 +89,14 @@ def test_a_board_smaller_than_the_circle_ends_where_it_ends() -> None:
 )
 def test_a_whiteboard_that_cannot_be_used_is_refused(rgb: np.ndarray, what: str) -> None:
     with pytest.raises(InputError, match=what):
-        calibrate_radiance(Picture("whiteboard.png", rgb), scene.table(), scene.LEDS)
+        calibrate_radiance(LinearImage("whiteboard.png", rgb), scene.table(), scene.LEDS)
 
 
 @pytest.mark.parametrize("order", [[1, 0, 2], [2, 1, 0], [1, 2, 0]])
 def test_leds_swapped_between_mirror_and_whiteboard_are_refused(order: list[int]) -> None:
-    picture = Picture("whiteboard.png", whiteboard())
+    image = LinearImage("whiteboard.png", whiteboard())
     with pytest.raises(InputError, match="is lit from the position of the"):
-        calibrate_radiance(picture, scene.table(), scene.LEDS[order])
+        calibrate_radiance(image, scene.table(), scene.LEDS[order])
 
 
 @pytest.mark.parametrize("decibel", [40.0, 35.0, 30.0])
@@ -110,7 +110,7 @@ def test_noise_is_not_called_dust_and_a_speck_is(decibel: float) -> None:
     for rgb in (clean, dirty):
         shown = np.clip(np.round(255.0 * (rgb + noise)) / 255.0, 0.0, 1.0)
         result = calibrate_radiance(
-            Picture("w", shown.astype(np.float32)), scene.table(), scene.LEDS
+            LinearImage("w", shown.astype(np.float32)), scene.table(), scene.LEDS
         )
         shares.append(result.quality["whiteboard_dust_percent"].value)
     assert shares[0] < 0.5

@@ -14,7 +14,7 @@ from gelpolight_core.reconstruction.near_light.maps import kinds, membrane_numbe
 from gelpolight_core.reconstruction.near_light.placement import place_rows
 from gelpolight_core.reconstruction.near_light.structures import (
     NOT_FINITE,
-    Picture,
+    RatioImage,
     Steps,
     slopes_like,
 )
@@ -33,7 +33,7 @@ def full_model(membrane: Membrane, leds_mm: NDArray[np.float64]) -> FullModel:
     return FullModel(leds_mm, 0.0 * leds_mm, membrane, nothing, 0.7, 0.01, (0.0, 0.0), "mirror")
 
 
-def picture_of(field: ShadedField) -> Picture:
+def image_of(field: ShadedField) -> RatioImage:
     """Return a field's image as the compiled solve takes it."""
     bad = ~np.isfinite(field.ratio)
     ratio, noise, around = (
@@ -42,7 +42,7 @@ def picture_of(field: ShadedField) -> Picture:
     )
     marks = ((field.saturated | bad) * np.array([1, 2, 4])).sum(axis=-1).astype(np.uint8)
     marks |= np.where(bad.any(axis=-1), NOT_FINITE, 0).astype(np.uint8)
-    return Picture(ratio, noise, around, marks)
+    return RatioImage(ratio, noise, around, marks)
 
 
 def solve(
@@ -68,7 +68,7 @@ def solve(
         steps = steps._replace(warm=True)
     numbers = membrane_numbers(full, coverage)  # type: ignore[arg-type]
     RowWorkers(workers).run(
-        len(depth), solve_rows, picture_of(field), depth, scale, (0, 0), numbers, steps, slopes
+        len(depth), solve_rows, image_of(field), depth, scale, (0, 0), numbers, steps, slopes
     )
     down = -np.sqrt(np.maximum(1.0 - slopes.normal_x**2 - slopes.normal_y**2, 0.0))
     normals = np.stack([slopes.normal_x, slopes.normal_y, down], axis=-1)
@@ -101,6 +101,6 @@ def quiet(
     ratio = np.where(usable[..., None], light / background, 1.0)
     planes = [np.ascontiguousarray(np.moveaxis(a, -1, 0), np.float32) for a in (ratio, unknown)]
     nothing = np.zeros((3, 1, 1), np.float32)
-    picture = Picture(planes[0], planes[1], nothing, np.zeros(usable.shape, np.uint8))
-    edge = quieted(picture, sd, RowWorkers(1), Buffers().take)
-    return np.moveaxis(picture.ratio, 0, -1), np.moveaxis(picture.noise, 0, -1), edge
+    image = RatioImage(planes[0], planes[1], nothing, np.zeros(usable.shape, np.uint8))
+    edge = quieted(image, sd, RowWorkers(1), Buffers().take)
+    return np.moveaxis(image.ratio, 0, -1), np.moveaxis(image.noise, 0, -1), edge

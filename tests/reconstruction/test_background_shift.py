@@ -17,7 +17,7 @@ from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.background_shift import background_drift, zeroed
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.exposure import Frame, exposed
 from gelpolight_core.simulation.lamps import lamps_of
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
@@ -37,9 +37,9 @@ def frames(*shares: float, count: int = 4) -> list[Frame]:
     )
     warm = VirtualSensor(design, 0, lamps=changed)
     # The camera's exposure stays; a new sensor would be exposed anew.
-    picture = warm.brightness(BareMembrane()) * sensor.exposure / warm.exposure
+    image = warm.brightness(BareMembrane()) * sensor.exposure / warm.exposure
     random = np.random.default_rng(5)
-    return [exposed(picture, design.camera, random) for _ in range(count)]
+    return [exposed(image, design.camera, random) for _ in range(count)]
 
 
 @pytest.fixture(scope="module")
@@ -72,10 +72,10 @@ def test_leds_that_changed_are_told_by_channel(
     assert any("zero" in line for line in drift.quality.advice)
 
 
-def test_a_membrane_that_moved_in_the_picture_is_told(
+def test_a_membrane_that_moved_in_the_image_is_told(
     virtual_calibration: Calibration, virtual_session: Path
 ) -> None:
-    bare = read_picture(next((virtual_session / "background").iterdir())).rgb
+    bare = read_image(next((virtual_session / "background").iterdir())).rgb
     drift = background_drift(moved(bare, 3), virtual_calibration)
     assert drift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
     assert drift.quality["drift_shift_px"].verdict is Verdict.FAIL
@@ -86,7 +86,7 @@ def test_a_membrane_that_moved_in_the_picture_is_told(
 def test_a_press_is_called_a_touch_and_never_taken_for_the_background(
     small_calibration: Calibration, small_session: Path
 ) -> None:
-    press = read_picture(small_session / "presses" / "cylinder_s5_d050.png").rgb
+    press = read_image(small_session / "presses" / "cylinder_s5_d050.png").rgb
     drift = background_drift(press, small_calibration)
     assert drift.touched
     assert drift.quality.verdict is Verdict.FAIL
@@ -147,12 +147,12 @@ def test_the_papers_calibration_alone_knows_the_same_background(
     assert np.abs(flat.brightness_percent).max() < 0.5
 
 
-def test_what_is_no_picture_of_this_sensor_is_refused(small_calibration: Calibration) -> None:
+def test_what_is_no_image_of_this_sensor_is_refused(small_calibration: Calibration) -> None:
     camera = small_calibration.camera
     dark = np.zeros((camera.height, camera.width, 3), np.float32)
     with pytest.raises(InputError, match="dark"):
         background_drift(dark, small_calibration)
     with pytest.raises(InputError, match="the calibration is for"):
         background_drift(dark[1:], small_calibration)
-    with pytest.raises(InputError, match="no picture"):
+    with pytest.raises(InputError, match="no image"):
         zeroed(small_calibration, [], operator="me", made="now")

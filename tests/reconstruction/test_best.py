@@ -24,7 +24,7 @@ from gelpolight_core.reconstruction.near_light.solver import NearLightDepth, Nea
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.terms import ALL_TERMS
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.virtual_sensor import BareMembrane, VirtualSensor
 
 Map = NDArray[np.float32]
@@ -63,7 +63,7 @@ def score(virtual_session: Path, virtual_calibration: Calibration):  # type: ign
 
     @cache
     def scored(name: str, model: str) -> Score:
-        frame = read_picture(virtual_session / "presses" / f"{name}.png").rgb
+        frame = read_image(virtual_session / "presses" / f"{name}.png").rgb
         heightmap = Reconstructor(virtual_calibration, model=model).depth(frame)
         return Score(heightmap, virtual_session / "truth" / f"{name}.npz", 11.0)
 
@@ -71,7 +71,7 @@ def score(virtual_session: Path, virtual_calibration: Calibration):  # type: ign
 
 
 def press(session: Path, name: str = PRESSES[0]) -> Map:
-    return read_picture(session / "presses" / f"{name}.png").rgb
+    return read_image(session / "presses" / f"{name}.png").rgb
 
 
 def solve(rgb: Map, calibration: Calibration, *, workers: int = 2) -> NearLightDepth:
@@ -128,7 +128,7 @@ def test_a_wide_plateau_has_its_height(score) -> None:  # type: ignore[no-untype
 
 @pytest.mark.parametrize("name", [*PRESSES, WIDE])
 def test_an_outline_has_its_size_at_half_height(score, name: str) -> None:  # type: ignore[no-untyped-def]
-    """A pixel of half the picture's size is 1 % of 5 mm."""
+    """A pixel of half the image's size is 1 % of 5 mm."""
     assert abs(score(name, "full").size) < 0.015
 
 
@@ -137,7 +137,7 @@ def test_the_full_model_is_nearer_to_the_truth_than_the_papers(score, name: str)
     assert score(name, "full").rms_mm < 0.7 * score(name, "paper").rms_mm
 
 
-def test_a_picture_of_the_bare_membrane_is_flat(virtual_calibration: Calibration) -> None:
+def test_an_image_of_the_bare_membrane_is_flat(virtual_calibration: Calibration) -> None:
     """Another frame than the calibration's, with its own noise."""
     sensor = VirtualSensor(SensorDesign().scaled(0.5), 0)
     frame = sensor.frame(BareMembrane(), averaged=1, stream="another")
@@ -227,7 +227,7 @@ def test_a_spoilt_pixel_on_the_ground_leaves_the_plateau_alone(
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, np.nan])
-def test_a_picture_without_information_is_flat_and_flagged(
+def test_an_image_without_information_is_flat_and_flagged(
     virtual_calibration: Calibration, value: float
 ) -> None:
     camera = virtual_calibration.camera
@@ -247,7 +247,7 @@ def test_outside_the_working_circle_there_is_no_depth(
     assert not result.depth_mm[outside].any()
 
 
-def test_the_coarse_picture_is_the_fine_one_averaged(
+def test_the_coarse_image_is_the_fine_one_averaged(
     virtual_session: Path, virtual_calibration: Calibration
 ) -> None:
     assert virtual_calibration.full is not None

@@ -1,4 +1,4 @@
-"""What a reconstruction takes, refuses, and says of pictures that cannot be right."""
+"""What a reconstruction takes, refuses, and says of images that cannot be right."""
 
 from __future__ import annotations
 
@@ -44,23 +44,23 @@ SHAPES = st.one_of(
 
 
 @st.composite
-def pictures(draw: st.DrawFn) -> np.ndarray:
+def images(draw: st.DrawFn) -> np.ndarray:
     """Return any array: mostly one value all over, with a few others, whatever they are."""
     kind, shape = draw(KINDS), draw(SHAPES)
     values = npst.from_dtype(np.dtype(kind))
-    picture = np.full(shape, draw(values), kind)
-    if picture.size:
+    image = np.full(shape, draw(values), kind)
+    if image.size:
         for value in draw(st.lists(values, max_size=6)):
-            picture.flat[draw(st.integers(0, picture.size - 1)) :: 7] = value
-    return picture
+            image.flat[draw(st.integers(0, image.size - 1)) :: 7] = value
+    return image
 
 
 @settings(max_examples=60, deadline=None)
-@given(pictures())
-def test_no_picture_whatever_crashes_or_gives_depth_that_is_no_number(picture: np.ndarray) -> None:
+@given(images())
+def test_no_image_whatever_crashes_or_gives_depth_that_is_no_number(image: np.ndarray) -> None:
     for reconstruct in RECONSTRUCTORS:
         try:
-            found = reconstruct.depth(picture)
+            found = reconstruct.depth(image)
         except InputError as refusal:
             assert refusal.advice
             continue

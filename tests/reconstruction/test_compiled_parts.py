@@ -20,7 +20,7 @@ from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.near_light.maps import light_levels
 from gelpolight_core.reconstruction.near_light.sampling import block_means, halve, sample_rows
-from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE, Picture
+from gelpolight_core.reconstruction.near_light.structures import NOT_FINITE, RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
 
@@ -50,7 +50,7 @@ membranes = st.one_of(
 
 
 def dented(membrane: Membrane, seed: int) -> tuple[ShadedField, Map]:
-    """Return a noisy picture of dents with walls up to 60 degrees, shadows in it, and a depth."""
+    """Return a noisy image of dents with walls up to 60 degrees, shadows in it, and a depth."""
     random = np.random.default_rng(seed)
     depth = np.zeros((ROWS, COLUMNS))
     slopes = np.zeros((ROWS, COLUMNS, 2))
@@ -226,18 +226,18 @@ def sampled(
     *,
     wide: bool,
     coded: bool = False,
-) -> Picture:
+) -> RatioImage:
     """Compare a raw image with a background at the given pixels."""
     shape = place[0].shape
     planes = [np.empty((3, *shape), np.float32) for _ in range(2)]
     nothing = np.zeros((3, 1, 1), np.float32)
-    picture = Picture(planes[0], planes[1], nothing, np.empty(shape, np.uint8))
+    image = RatioImage(planes[0], planes[1], nothing, np.empty(shape, np.uint8))
     light = light_levels(None, raw.dtype, coded=coded)
     sensor = (tuple(tuple(row) for row in mix), (np.float32(0.01),) * 3)
     kind, limit = np.full(shape, 2, np.uint8), np.float32(0.995)
     source = (*place, background)
-    sample_rows(0, shape[0], raw, light, limit, source, wide, sensor, kind, (0, 0), picture)
-    return picture
+    sample_rows(0, shape[0], raw, light, limit, source, wide, sensor, kind, (0, 0), image)
+    return image
 
 
 @settings(max_examples=8, deadline=None)
@@ -263,7 +263,7 @@ def test_a_node_sees_the_pixels_about_it(seed: int, kind: type, wide: bool) -> N
     assert not found.marks.any()
 
 
-def _means_of_numbers(found: Picture) -> NDArray[np.float32]:
+def _means_of_numbers(found: RatioImage) -> NDArray[np.float32]:
     """Return the mean of each 2 x 2 nodes without those that are no number; 1 where none is."""
     blocks = np.where(found.marks & NOT_FINITE, np.nan, found.ratio[1]).reshape(8, 2, 8, 2)
     with warnings.catch_warnings():
@@ -286,7 +286,7 @@ def test_a_spoilt_pixel_marks_its_channel_in_the_nodes_about_it(
     assert found.marks[10, 10] == mark
     assert (found.marks > 0).sum() <= 9
     planes = [np.empty((3, 8, 8), np.float32) for _ in range(2)]
-    small = Picture(planes[0], planes[1], found.around, np.empty((8, 8), np.uint8))
+    small = RatioImage(planes[0], planes[1], found.around, np.empty((8, 8), np.uint8))
     halve(0, 8, found, small)
     np.testing.assert_allclose(small.ratio[1], _means_of_numbers(found))
     # An average of four has half the noise.

@@ -11,8 +11,8 @@ from reference.denoise import quiet_even_parts
 from gelpolight_core.reconstruction.near_light.uncertainty import noise_left
 
 
-def picture(noise: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a clean picture with a slow slope and one step, and the same with noise."""
+def image(noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return a clean image with a slow slope and one step, and the same with noise."""
     rng = np.random.default_rng(0)
     clean = np.tile(np.linspace(0.4, 0.5, 200), (160, 1))
     clean[:, 120:] += 0.3
@@ -31,7 +31,7 @@ def quieted(light: np.ndarray, sigma: float = 0.005) -> np.ndarray:
 
 
 def test_noise_goes_and_the_step_stays() -> None:
-    clean, noisy = picture(0.01)
+    clean, noisy = image(0.01)
     quiet = quieted(noisy)
     even = np.s_[10:-10, 10:100]
     assert (quiet - clean)[even].std() < 0.35 * (noisy - clean)[even].std()
@@ -40,7 +40,7 @@ def test_noise_goes_and_the_step_stays() -> None:
 
 
 def test_an_image_without_noise_is_left_alone() -> None:
-    clean, noisy = picture(0.0)
+    clean, noisy = image(0.0)
     assert np.abs(quieted(noisy) - clean).max() < 2e-3
     assert quiet(noisy, ONE, np.float32(0.005) * ONE, USABLE)[2] is None
 
@@ -87,7 +87,7 @@ def test_what_lies_outside_of_the_membrane_does_not_darken_its_rim() -> None:
 @pytest.mark.parametrize("noise", [0.004, 0.02, 0.06])
 def test_the_compiled_denoising_is_the_plain_one(noise: float) -> None:
     """Also where little light needs wider averages, and where some of the membrane is unknown."""
-    _, noisy = picture(noise)
+    _, noisy = image(noise)
     background = np.linspace(0.2, 0.9, 160, dtype=np.float32)[:, None, None] * ONE
     usable = USABLE.copy()
     usable[:, :20] = usable[60:70, 90:100] = False

@@ -1,4 +1,4 @@
-"""The noise of a picture, found in the picture itself."""
+"""The noise of an image, found in the image itself."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_noise_is_found_at_every_brightness(shot: float, read: float) -> None:
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0])
-def test_a_picture_without_information_has_a_finite_noise(value: float) -> None:
+def test_an_image_without_information_has_a_finite_noise(value: float) -> None:
     noise = measured(np.full((ROWS, COLUMNS, 3), value))
     found = noise.at(np.full((3, 4, 4), 0.5, np.float32))
     assert np.isfinite(found).all()

@@ -1,4 +1,4 @@
-"""How well a surface explains its picture."""
+"""How well a surface explains its image."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import pytest
 from gelpolight_core.reconstruction.misfit import solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 
 
 @pytest.fixture(scope="module")
 def press(small_session: Path) -> np.ndarray:
-    return read_picture(small_session / "balls" / "ball_00.png").rgb
+    return read_image(small_session / "balls" / "ball_00.png").rgb
 
 
 def test_the_papers_misfit_is_the_length_of_its_normal_less_one(
@@ -32,7 +32,7 @@ def test_the_papers_misfit_is_the_length_of_its_normal_less_one(
     np.testing.assert_array_equal(known, heightmap.flags & 1 == 0)
 
 
-def test_a_true_surface_explains_its_picture_and_a_false_one_does_not(
+def test_a_true_surface_explains_its_image_and_a_false_one_does_not(
     small_calibration: Calibration, press: np.ndarray
 ) -> None:
     reconstruct = Reconstructor(small_calibration, effort="best")

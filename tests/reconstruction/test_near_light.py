@@ -70,7 +70,7 @@ def brightness(place: Array, normals: Array, view: Array, membrane: Membrane) ->
 
 
 def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
-    """Return the picture of the bump along the rays, its depth at each ray, and the normals."""
+    """Return the image of the bump along the rays, its depth at each ray, and the normals."""
     depth = np.zeros(POINTS.shape[:2])
     for _ in range(80):
         depth, slopes = bump(POINTS + depth[..., None] * DRIFT)
@@ -148,7 +148,7 @@ def test_curves_equal_to_the_power_of_the_cosine_give_its_normals() -> None:
 
 
 def test_light_frozen_at_the_flat_membrane_would_be_wrong() -> None:
-    """At depth 0 the same picture gives other normals: the depth is used."""
+    """At depth 0 the same image gives other normals: the depth is used."""
     field, depth, normals = scene_of(MATT)
     frozen = angle_deg(solved(field, 0.0 * depth, MATT).normals, normals)
     assert frozen.max() > 0.8  # eight times the error at the true depth
@@ -194,7 +194,7 @@ def test_the_stated_deviation_is_what_noise_does(membrane: Membrane) -> None:
 def test_a_wall_turned_away_from_one_light_is_found_by_the_other_two(
     membrane: Membrane, channel: int
 ) -> None:
-    """Steep walls that do not see one light: nothing of it is left in the picture."""
+    """Steep walls that do not see one light: nothing of it is left in the image."""
     field, depth, _ = scene_of(membrane)
     led = LEDS[channel]
     towards = led[:2] / np.linalg.norm(led[:2])
@@ -254,7 +254,7 @@ def test_a_pixel_that_is_no_number_spoils_nothing(bad: float) -> None:
     assert not found.flags[~touched].any()
 
 
-def test_an_all_black_picture_is_flat_flagged_and_hardly_counts() -> None:
+def test_an_all_black_image_is_flat_flagged_and_hardly_counts() -> None:
     field, depth, _ = scene_of(GLOSSY)
     found = solved(replace(field, ratio=0.0 * field.ratio), depth, GLOSSY)
     assert ((found.flags & int(Flag.DARK)) != 0).all()

@@ -1,4 +1,4 @@
-"""The paper's model in wide instructions is the model, for pictures and grids of any size."""
+"""The paper's model in wide instructions is the model, for images and grids of any size."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 
 Array = NDArray[np.float64]
 GRIDS = st.tuples(st.integers(1, 9), st.integers(1, 150))
-PICTURES = st.tuples(st.integers(1, 20), st.integers(1, 30))
+IMAGES = st.tuples(st.integers(1, 20), st.integers(1, 30))
 KINDS = st.sampled_from([np.uint8, np.uint16, np.float32])
 SEEDS = st.integers(0, 2**32 - 1)
 WORKERS = {n: RowWorkers(n) for n in (1, 2, 3)}
 
 
-def maps_of(grid: tuple[int, int], picture: tuple[int, int], seed: int) -> ShadingMaps:
-    """Return maps of nodes all over the picture and beyond it, some without light or factor."""
+def maps_of(grid: tuple[int, int], image: tuple[int, int], seed: int) -> ShadingMaps:
+    """Return maps of nodes all over the image and beyond it, some without light or factor."""
     random = np.random.default_rng(seed)
-    where = [np.float32(random.uniform(-0.2 * n, n - 1.0, grid)) for n in picture]
-    for place, size in zip(where, picture, strict=True):
+    where = [np.float32(random.uniform(-0.2 * n, n - 1.0, grid)) for n in image]
+    for place, size in zip(where, image, strict=True):
         # Also on pixels, on the last ones, and where no ray ends.
         known = random.random(grid)
         place[known < 0.2] = np.rint(np.maximum(place[known < 0.2], 0.0))
@@ -48,7 +48,7 @@ def maps_of(grid: tuple[int, int], picture: tuple[int, int], seed: int) -> Shadi
     )
 
 
-def picture_of(size: tuple[int, int], kind: type, seed: int) -> NDArray[np.generic]:
+def image_of(size: tuple[int, int], kind: type, seed: int) -> NDArray[np.generic]:
     """Return light of every strength, with black and saturated pixels."""
     light = np.random.default_rng(seed + 1).uniform(-0.1, 1.1, (*size, 3)).clip(0.0, 1.0)
     if kind is np.float32:
@@ -111,11 +111,11 @@ def by_numpy(raw: NDArray[np.generic], maps: ShadingMaps) -> tuple[Array, Array,
 @example((3, 64), (2, 2), np.uint8, 1)
 @example((2, 129), (1, 7), np.uint8, 2)
 @example((2, 65), (7, 1), np.uint16, 3)
-@given(GRIDS, PICTURES, KINDS, SEEDS)
+@given(GRIDS, IMAGES, KINDS, SEEDS)
 def test_blocks_of_nodes_are_solved_as_plain_arrays_are(
-    grid: tuple[int, int], picture: tuple[int, int], kind: type, seed: int
+    grid: tuple[int, int], image: tuple[int, int], kind: type, seed: int
 ) -> None:
-    maps, raw = maps_of(grid, picture, seed), picture_of(picture, kind, seed)
+    maps, raw = maps_of(grid, image, seed), image_of(image, kind, seed)
     field = SlopeSolver(maps, WORKERS[2]).solve(raw)
     slopes, flags, length, close = by_numpy(raw, maps)
     # Single precision, of which a steep slope loses the more the steeper it is.
@@ -127,11 +127,11 @@ def test_blocks_of_nodes_are_solved_as_plain_arrays_are(
 
 
 @settings(max_examples=25, deadline=None)
-@given(GRIDS, PICTURES, KINDS, SEEDS)
+@given(GRIDS, IMAGES, KINDS, SEEDS)
 def test_any_number_of_threads_and_any_run_gives_the_same_bits(
-    grid: tuple[int, int], picture: tuple[int, int], kind: type, seed: int
+    grid: tuple[int, int], image: tuple[int, int], kind: type, seed: int
 ) -> None:
-    maps, raw = maps_of(grid, picture, seed), picture_of(picture, kind, seed)
+    maps, raw = maps_of(grid, image, seed), image_of(image, kind, seed)
     one = SlopeSolver(maps, WORKERS[1]).solve(raw)
     for workers in WORKERS.values():
         solver = SlopeSolver(maps, workers)
@@ -147,8 +147,8 @@ def same(one: SlopeField, other: SlopeField) -> bool:
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.float32])
-def test_a_picture_is_left_as_it_was_and_may_be_a_view(kind: type) -> None:
-    maps, raw = maps_of((9, 100), (20, 30), 5), picture_of((20, 60), kind, 5)
+def test_an_image_is_left_as_it_was_and_may_be_a_view(kind: type) -> None:
+    maps, raw = maps_of((9, 100), (20, 30), 5), image_of((20, 60), kind, 5)
     raw.flags.writeable = False
     before, solver = raw.copy(), SlopeSolver(maps, WORKERS[1])
     assert same(solver.solve(raw[:, ::2]), solver.solve(np.ascontiguousarray(raw[:, ::2])))
@@ -156,12 +156,12 @@ def test_a_picture_is_left_as_it_was_and_may_be_a_view(kind: type) -> None:
 
 
 @settings(max_examples=25, deadline=None)
-@given(GRIDS, PICTURES, KINDS, SEEDS)
+@given(GRIDS, IMAGES, KINDS, SEEDS)
 def test_one_pass_to_the_divergence_is_slopes_and_then_integration(
-    grid: tuple[int, int], picture: tuple[int, int], kind: type, seed: int
+    grid: tuple[int, int], image: tuple[int, int], kind: type, seed: int
 ) -> None:
     """Whatever the threads; grids of seven lines and more are padded."""
-    maps, raw = maps_of(grid, picture, seed), picture_of(picture, kind, seed)
+    maps, raw = maps_of(grid, image, seed), image_of(image, kind, seed)
     poisson = PoissonSolver(*grid, pitch_mm=0.1)
     slopes = SlopeSolver(maps, WORKERS[1]).solve(raw)
     expected = poisson.integrate(slopes.slope_x, slopes.slope_y).depth_mm

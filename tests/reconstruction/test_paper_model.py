@@ -25,17 +25,17 @@ def lopsided(points: np.ndarray) -> np.ndarray:
 
 
 def test_known_slopes_are_found_with_their_signs() -> None:
-    field = solve_slopes(scene.raw_picture(lopsided, CALIBRATION), MAPS)
+    field = solve_slopes(scene.raw_image(lopsided, CALIBRATION), MAPS)
     expected = lopsided(CALIBRATION.table.grid.points_mm())
     seen = field.flags & int(Flag.OUTSIDE) == 0
-    # A pixel is 0.1 mm here and the picture is interpolated between pixels.
+    # A pixel is 0.1 mm here and the image is interpolated between pixels.
     np.testing.assert_allclose(field.slope_x[seen], expected[seen][:, 0], atol=0.02)
     np.testing.assert_allclose(field.slope_y[seen], expected[seen][:, 1], atol=0.02)
     assert np.median(field.length_error[seen]) < 1e-3
 
 
 def test_the_bump_stands_at_its_place_and_height() -> None:
-    heightmap = Reconstructor(CALIBRATION).depth(scene.raw_picture(lopsided, CALIBRATION))
+    heightmap = Reconstructor(CALIBRATION).depth(scene.raw_image(lopsided, CALIBRATION))
     row, column = np.unravel_index(heightmap.depth_mm.argmax(), heightmap.depth_mm.shape)
     assert heightmap.x_mm[column] == pytest.approx(2.0, abs=0.15)
     assert heightmap.y_mm[row] == pytest.approx(-1.0, abs=0.15)
@@ -43,7 +43,7 @@ def test_the_bump_stands_at_its_place_and_height() -> None:
 
 
 def test_the_fused_pass_is_the_plain_mathematics() -> None:
-    raw = scene.raw_picture(lopsided, CALIBRATION)
+    raw = scene.raw_image(lopsided, CALIBRATION)
     raw8 = np.round(np.clip(raw, 0, 1) * 255).astype(np.uint8)
     field = solve_slopes(raw8, MAPS)
     slope_x, slope_y = plain_slopes(raw8, CALIBRATION)
@@ -55,11 +55,11 @@ def test_the_fused_pass_is_the_plain_mathematics() -> None:
     assert np.abs(depth - plain)[seen].max() < 2e-3
 
 
-def test_eight_and_sixteen_bit_and_float_pictures_agree() -> None:
-    raw = np.clip(scene.raw_picture(lopsided, CALIBRATION), 0, 1)
+def test_eight_and_sixteen_bit_and_float_images_agree() -> None:
+    raw = np.clip(scene.raw_image(lopsided, CALIBRATION), 0, 1)
     fields = [
-        solve_slopes(picture, MAPS)
-        for picture in (
+        solve_slopes(image, MAPS)
+        for image in (
             raw,
             np.round(raw * 255).astype(np.uint8),
             np.round(raw * 65535).astype("u2"),
@@ -71,14 +71,14 @@ def test_eight_and_sixteen_bit_and_float_pictures_agree() -> None:
 
 
 def test_the_number_of_threads_does_not_change_a_bit() -> None:
-    raw = scene.raw_picture(lopsided, CALIBRATION)
+    raw = scene.raw_image(lopsided, CALIBRATION)
     one, three = (solve_slopes(raw, MAPS, workers=n) for n in (1, 3))
     np.testing.assert_array_equal(one.slope_x, three.slope_x)
     np.testing.assert_array_equal(one.flags, three.flags)
 
 
 def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
-    raw = scene.raw_picture(lopsided, CALIBRATION)
+    raw = scene.raw_image(lopsided, CALIBRATION)
     bad = raw.copy()
     bad[100, 120] = np.nan
     bad[101, 140] = np.inf
@@ -98,7 +98,7 @@ def test_bad_pixels_are_flagged_and_the_rest_is_unchanged() -> None:
     assert np.isfinite(Reconstructor(CALIBRATION).depth(bad).depth_mm).all()
 
 
-def test_a_black_picture_is_dark_everywhere_and_finite() -> None:
+def test_a_black_image_is_dark_everywhere_and_finite() -> None:
     heightmap = Reconstructor(CALIBRATION).depth(np.zeros((240, 320, 3), np.uint8))
     seen = heightmap.flags & int(Flag.OUTSIDE) == 0
     assert (heightmap.flags[seen] & int(Flag.DARK) != 0).all()
@@ -112,7 +112,7 @@ def test_normals_are_unit_and_face_the_camera() -> None:
     assert normals[0, 0, 0] / normals[0, 0, 2] == pytest.approx(0.5)
 
 
-def test_a_picture_of_another_size_is_refused_with_both_sizes() -> None:
+def test_an_image_of_another_size_is_refused_with_both_sizes() -> None:
     with pytest.raises(InputError, match="320x240x3") as refusal:
         Reconstructor(CALIBRATION).depth(np.zeros((480, 640, 3), np.uint8), name="other.png")
     assert "640x480x3" in str(refusal.value)

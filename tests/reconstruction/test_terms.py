@@ -19,7 +19,7 @@ from gelpolight_core.reconstruction.near_light.solver import NearLightDepth, Nea
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.indenters import Cylinder
 from gelpolight_core.simulation.indenters import press as pressed
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane, VirtualSensor
@@ -30,7 +30,7 @@ NAME = "cylinder_s4_d150"  # deep, with steep walls and shadows
 
 @pytest.fixture(scope="module")
 def rgb(virtual_session: Path) -> Map:
-    return read_picture(virtual_session / "presses" / f"{NAME}.png").rgb
+    return read_image(virtual_session / "presses" / f"{NAME}.png").rgb
 
 
 @pytest.fixture(scope="module")

@@ -52,7 +52,7 @@ class Repeats:
 
 @pytest.fixture(scope="module", params=[1.0, 4.0], ids=["8-bit, 43 dB", "8-bit, 31 dB"])
 def repeats(request: pytest.FixtureRequest, virtual_calibration: Calibration) -> Repeats:
-    """Press a cylinder and take its picture again and again."""
+    """Press a cylinder and take its image again and again."""
     design = SensorDesign().scaled(0.5)
     quiet, item = design.camera, design.presses[1]
     camera = replace(
@@ -67,11 +67,11 @@ def repeats(request: pytest.FixtureRequest, virtual_calibration: Calibration) ->
         decay_mm=design.membrane.decay_length_mm,
         pitch_mm=0.04,
     )
-    picture = VirtualSensor(design, 0).brightness(PressedMembrane(surface))
+    image = VirtualSensor(design, 0).brightness(PressedMembrane(surface))
     random = np.random.default_rng(11)
     reconstruct = Reconstructor(virtual_calibration)
     maps = [
-        reconstruct.depth(exposed(picture, camera, random), uncertainty=k == 0)
+        reconstruct.depth(exposed(image, camera, random), uncertainty=k == 0)
         for k in range(REPEATS)
     ]
     slopes = [m.normals[..., :2] / m.normals[..., 2:] for m in maps if m.normals is not None]
@@ -177,7 +177,7 @@ def test_nothing_is_stated_that_was_not_asked_for(virtual_calibration: Calibrati
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, np.nan])
-def test_a_picture_without_information_has_finite_deviations(
+def test_an_image_without_information_has_finite_deviations(
     virtual_calibration: Calibration, value: float
 ) -> None:
     camera = virtual_calibration.camera

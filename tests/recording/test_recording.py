@@ -76,18 +76,16 @@ def test_what_it_says_of_itself_comes_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_other_programs_open_its_frames(tmp_path: Path, kind: type) -> None:
     """Through tifffile, and through libtiff in OpenCV: neither knows our own data."""
-    pictures = write_recording(tmp_path / "a.gplrec", kind=kind, shape=(50, 41))
+    images = write_recording(tmp_path / "a.gplrec", kind=kind, shape=(50, 41))
     with tifffile.TiffFile(tmp_path / "a.gplrec") as file:
-        assert len(file.pages) == len(pictures)
-        for number, (page, rgb) in enumerate(zip(file.pages, pictures, strict=True)):
+        assert len(file.pages) == len(images)
+        for number, (page, rgb) in enumerate(zip(file.pages, images, strict=True)):
             assert np.array_equal(page.asarray(), rgb)
             told = json.loads(page.tags["ImageDescription"].value)
             assert told == {"number": number, "time_s": 100.0 + number / 50.0}
     done, theirs = cv2.imreadmulti(str(tmp_path / "a.gplrec"), flags=cv2.IMREAD_UNCHANGED)
     assert done
-    assert all(
-        np.array_equal(bgr[..., ::-1], rgb) for bgr, rgb in zip(theirs, pictures, strict=True)
-    )
+    assert all(np.array_equal(bgr[..., ::-1], rgb) for bgr, rgb in zip(theirs, images, strict=True))
 
 
 def test_noise_of_a_camera_takes_less_than_half_the_space(tmp_path: Path) -> None:

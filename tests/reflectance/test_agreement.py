@@ -22,12 +22,12 @@ Map = np.ndarray
 ODD = "ball_01.png"
 
 
-def compared(results: StageResults, pictures: tuple[Map, ...]) -> tuple[PressAgreement, ...]:
+def compared(results: StageResults, images: tuple[Map, ...]) -> tuple[PressAgreement, ...]:
     assert results.table is not None and results.lights is not None
     assert results.radiance is not None and results.factors is not None
     return compare_presses(
         results.presses,
-        pictures,
+        images,
         results.table,
         results.lights.led_positions_mm,
         results.radiance,
@@ -42,7 +42,7 @@ def recomputed(project: CalibrationProject) -> StageStatus:
 
 def test_good_presses_agree_with_each_other(small_project: CalibrationProject) -> None:
     results = small_project.results
-    found = compared(results, results.pictures)
+    found = compared(results, results.images)
     assert len(found) == len(results.presses)
     assert [a.fault for a in found] == [""] * len(found)
     assert max(a.radius_off_percent for a in found) < 8.0
@@ -95,10 +95,10 @@ def test_dirt_on_a_contact_is_named(small_project: CalibrationProject) -> None:
     mask = contact_mask(results.presses[1], results.table)
     columns = np.nonzero(mask)[1]
     mask[:, : int(np.quantile(columns, 0.7))] = False
-    dirty = results.pictures[1].copy()
+    dirty = results.images[1].copy()
     dirty[mask] *= 0.4
-    pictures = (results.pictures[0], dirty, *results.pictures[2:])
-    (odd,) = [a for a in compared(results, pictures) if a.fault]
+    images = (results.images[0], dirty, *results.images[2:])
+    (odd,) = [a for a in compared(results, images) if a.fault]
     assert odd.name.endswith(ODD)
     assert "dirt" in odd.fault
 
@@ -106,4 +106,4 @@ def test_dirt_on_a_contact_is_named(small_project: CalibrationProject) -> None:
 def test_three_presses_say_nothing_of_each_other(small_project: CalibrationProject) -> None:
     results = small_project.results
     few = replace(results, balls=results.balls[:3])
-    assert compared(few, few.pictures) == ()
+    assert compared(few, few.images) == ()

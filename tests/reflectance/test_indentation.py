@@ -26,7 +26,7 @@ from gelpolight_core.optics.refraction import (
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reflectance.indentation import Indentation, find_indentation
 
-Pictures = tuple[NDArray[np.float32], NDArray[np.float32]]
+Images = tuple[NDArray[np.float32], NDArray[np.float32]]
 Array = NDArray[np.float64]
 WIDTH, HEIGHT = 320, 240
 
@@ -85,8 +85,8 @@ def scene(
     contact_over_ball: float = 0.55,
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0),
     reflectance: NDArray[np.floating] | float = 1.0,
-) -> Pictures:
-    """Return an 8-bit picture of presses (x, y, contact radius), and its background."""
+) -> Images:
+    """Return an 8-bit image of presses (x, y, contact radius), and its background."""
     rng = np.random.default_rng(seed)
     flat = np.zeros((HEIGHT, WIDTH))
     factor = np.broadcast_to(np.asarray(reflectance), flat.shape)[..., None]
@@ -95,8 +95,8 @@ def scene(
     form = surface(list(presses), drape_px=drape_px, contact_over_ball=contact_over_ball)
     pressed = shade(*form) * np.array(gain)
     taken = []
-    for picture in (pressed, background):
-        signal = exposure * picture * factor + noise * rng.standard_normal(picture.shape)
+    for image in (pressed, background):
+        signal = exposure * image * factor + noise * rng.standard_normal(image.shape)
         taken.append((np.rint(255.0 * np.clip(signal, 0.0, 1.0)) / 255.0).astype(np.float32))
     return taken[0], taken[1]
 
@@ -134,7 +134,7 @@ def test_centre_and_radius_of_any_clear_press(
     assert found.quality.verdict is not Verdict.FAIL
 
 
-def test_quiet_picture_gives_a_tenth_of_a_pixel() -> None:
+def test_quiet_image_gives_a_tenth_of_a_pixel() -> None:
     found = find_indentation(*scene((141.3, 118.8, 40.0)))
     assert off_by(found, 141.3, 118.8) < 0.25
     assert found.contact_radius_px == pytest.approx(40.0, abs=0.4)
@@ -242,7 +242,7 @@ def test_two_presses_are_refused() -> None:
 
 
 @pytest.mark.parametrize(("x", "y"), [(10.0, 120.0), (150.0, 225.0), (310.0, 20.0), (300.0, 120.0)])
-def test_contact_cut_by_the_picture_is_refused(x: float, y: float) -> None:
+def test_contact_cut_by_the_image_is_refused(x: float, y: float) -> None:
     assert "border cuts" in refusal(*scene((x, y, 35.0))).found
 
 
@@ -257,7 +257,7 @@ def test_contact_cut_by_the_working_area_is_refused() -> None:
         find_indentation(*dark)
 
 
-def test_swapped_pictures_are_refused() -> None:
+def test_swapped_images_are_refused() -> None:
     press, background = scene((150.0, 120.0, 35.0))
     error = refusal(background, press)
     assert "in the background" in error.found
@@ -275,7 +275,7 @@ def test_colours_in_another_order_are_refused() -> None:
     assert "bright" in error.found or "light changed" in error.found
 
 
-def test_black_and_saturated_pictures_are_refused() -> None:
+def test_black_and_saturated_images_are_refused() -> None:
     press, background = scene((150.0, 120.0, 35.0))
     assert "black" in refusal(np.zeros_like(press), background).found
     assert "saturated" in refusal(np.ones_like(press), background).found
@@ -296,21 +296,21 @@ def test_different_sizes_are_refused_with_both_sizes() -> None:
         find_indentation(press, background, valid=np.zeros((HEIGHT, WIDTH), dtype=np.bool_))
 
 
-def stretched(pictures: Pictures, factor: float) -> Pictures:
-    """Return pictures whose height is stretched about the middle."""
+def stretched(images: Images, factor: float) -> Images:
+    """Return images whose height is stretched about the middle."""
     move = np.array([[1.0, 0.0, 0.0], [0.0, factor, HEIGHT / 2 * (1.0 - factor)]])
     border = cv2.BORDER_REPLICATE
     press, background = (
         cv2.warpAffine(p, move, (WIDTH, HEIGHT), borderMode=border).astype(np.float32)
-        for p in pictures
+        for p in images
     )
     return press, background
 
 
 def test_oval_contact_is_refused_and_a_slightly_oval_one_is_not() -> None:
-    pictures = scene((160.0, 120.0, 40.0))
-    assert "round" in refusal(*stretched(pictures, 1.45)).found
-    found = find_indentation(*stretched(pictures, 1.1))
+    images = scene((160.0, 120.0, 40.0))
+    assert "round" in refusal(*stretched(images, 1.45)).found
+    found = find_indentation(*stretched(images, 1.1))
     assert found.axis_ratio == pytest.approx(1.0 / 1.1, abs=0.03)
 
 
@@ -334,8 +334,8 @@ def test_flat_punch_is_refused() -> None:
 def test_noise_is_measured_through_shading_and_edges(sigma: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     y, x = np.indices((200, 200)) / 200.0
-    picture = np.stack([x, x * y, np.where(x > 0.5, 1.0, 0.0)], axis=2)
-    noisy = (picture + sigma * rng.standard_normal(picture.shape)).astype(np.float32)
+    image = np.stack([x, x * y, np.where(x > 0.5, 1.0, 0.0)], axis=2)
+    noisy = (image + sigma * rng.standard_normal(image.shape)).astype(np.float32)
     everywhere = np.ones((200, 200), dtype=np.bool_)
     # The median of 20 000 blocks is known to 1 %.
     assert pixel_noise(noisy, everywhere) == pytest.approx((sigma,) * 3, rel=0.05)
@@ -349,16 +349,16 @@ def test_gain_is_that_of_the_membrane_though_most_of_it_is_pressed() -> None:
     assert gain == pytest.approx((1.05,) * 3, abs=0.005)
 
 
-# -- pictures of others -------------------------------------------------------------------------
+# -- images of others -------------------------------------------------------------------------
 
 
 def read_rgb(path: Path) -> NDArray[np.float32]:
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    assert picture is not None, path
-    return np.ascontiguousarray(picture[..., ::-1], dtype=np.float32) / np.float32(255.0)
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    assert image is not None, path
+    return np.ascontiguousarray(image[..., ::-1], dtype=np.float32) / np.float32(255.0)
 
 
-# Contact's edge by eye, on enlarged differences: these run out of the picture or along its border.
+# Contact's edge by eye, on enlarged differences: these run out of the image or along its border.
 CUT = {0, 6, 11, 12, 17, 22, 23, 28, 33, 38}
 
 

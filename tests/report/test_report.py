@@ -103,13 +103,13 @@ def test_the_html_needs_no_other_file(whole: Report) -> None:
 
 
 def test_the_drawings_are_complete(whole: Report) -> None:
-    pictures = [a["src"] for tag, a in parsed(whole).tags if tag == "img"]
-    assert len(pictures) == sum(len(s.drawings) for s in whole.sections)
-    for source in pictures:
+    images = [a["src"] for tag, a in parsed(whole).tags if tag == "img"]
+    assert len(images) == sum(len(s.drawings) for s in whole.sections)
+    for source in images:
         assert source is not None
         data = np.frombuffer(base64.b64decode(source.split(",")[1]), np.uint8)
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
-        assert picture.std() > 5.0  # something is drawn on it
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        assert image.std() > 5.0  # something is drawn on it
 
 
 def test_a_calibration_without_known_objects_is_reported_as_not_validated(whole: Report) -> None:

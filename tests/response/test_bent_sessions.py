@@ -15,7 +15,7 @@ from gelpolight_core.calibration.pipeline import CalibrationRun, calibrate_sessi
 from gelpolight_core.design.parts import Press, SessionDesign
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import simulate_session
 
@@ -100,7 +100,7 @@ def test_an_unmodelled_gamma_would_be_noticed(gamma: Run) -> None:
 
 def test_pixel_values_and_read_images_give_the_same_light(gamma: Run) -> None:
     folder, run = gamma
-    read = read_picture(folder / PRESS, response=run.calibration.response).rgb
+    read = read_image(folder / PRESS, response=run.calibration.response).rgb
     for model in ("paper", "full"):
         reconstruct = Reconstructor(run.calibration, model=model)
         from_numbers = reconstruct.depth(raw(gamma)).depth_mm

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session, read_session
 
 TEXT = """format = "gelpolight-session"
@@ -28,10 +28,10 @@ default = 3.0
 """
 
 
-def session_of(folder: Path, more: str = "", *pictures: str) -> Session:
+def session_of(folder: Path, more: str = "", *images: str) -> Session:
     """Return a session with additions to its description, and with small images."""
     (folder / "session.toml").write_text(TEXT + more)
-    for number, name in enumerate(pictures):
+    for number, name in enumerate(images):
         path = folder / name
         path.parent.mkdir(exist_ok=True)
         assert cv2.imwrite(str(path), np.full((4, 6, 3), 40 * number + 20, np.uint8))
@@ -63,7 +63,7 @@ def test_a_declared_response_is_undone_in_every_stage(
     assert session.declared_response == declared
     assert session.averaged("mirror").rgb == pytest.approx(light, abs=1e-6)
     # The file itself is read unchanged.
-    assert read_picture(tmp_path / "mirror" / "m.png").rgb == pytest.approx(20 / 255)
+    assert read_image(tmp_path / "mirror" / "m.png").rgb == pytest.approx(20 / 255)
 
 
 @pytest.mark.parametrize(
@@ -91,14 +91,14 @@ def test_a_contradictory_or_misspelt_declaration_is_named(
 def test_a_series_is_read_as_the_camera_encoded_it_with_its_times(tmp_path: Path) -> None:
     more = '[camera]\ngamma = 2.2\n[response]\n"b.png" = 4.0\n"a.png" = 1\n'
     session = session_of(tmp_path, more, "response/a.png", "response/b.png")
-    pictures, times = session.series()
+    images, times = session.series()
     assert session.optional_stages == ("response",)
     assert times == (1.0, 4.0)
-    assert [p.rgb[0, 0, 0] for p in pictures] == pytest.approx([20 / 255, 60 / 255])
+    assert [p.rgb[0, 0, 0] for p in images] == pytest.approx([20 / 255, 60 / 255])
 
 
 @pytest.mark.parametrize(
-    ("more", "pictures", "what"),
+    ("more", "images", "what"),
     [
         ("", ("a.png",), "no exposure time for a.png"),
         ('[response]\n"a.png" = 1.0\n', ("a.png", "b.png"), "no exposure time for b.png"),
@@ -107,9 +107,9 @@ def test_a_series_is_read_as_the_camera_encoded_it_with_its_times(tmp_path: Path
     ],
 )
 def test_a_series_whose_times_do_not_fit_is_refused(
-    tmp_path: Path, more: str, pictures: tuple[str, ...], what: str
+    tmp_path: Path, more: str, images: tuple[str, ...], what: str
 ) -> None:
-    session = session_of(tmp_path, more, *(f"response/{name}" for name in pictures))
+    session = session_of(tmp_path, more, *(f"response/{name}" for name in images))
     assert session.optional_stages == ("response",)
     with pytest.raises(InputError, match=what):
         session.series()

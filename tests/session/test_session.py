@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.session.file_hashes import refuse_copies
-from gelpolight_core.session.images import average, read_picture, require_colour
+from gelpolight_core.session.images import average, read_image, require_colour
 from gelpolight_core.session.session import read_session
 
 GOOD = """format = "gelpolight-session"
@@ -165,10 +165,10 @@ def test_images_are_red_first_and_linear(tmp_path: Path, kind: str, top: int, en
     rgb = np.zeros((4, 5, 3), kind)
     rgb[0, 0] = [top, top // 3, 0]
     write_rgb(tmp_path / f"p.{ending}", rgb)
-    picture = read_picture(tmp_path / f"p.{ending}")
-    np.testing.assert_allclose(picture.rgb[0, 0], [1.0, 1 / 3, 0.0], atol=1e-6)
-    assert picture.size == (5, 4)
-    assert picture.bit_depth == (8 if top == 255 else 16)
+    image = read_image(tmp_path / f"p.{ending}")
+    np.testing.assert_allclose(image.rgb[0, 0], [1.0, 1 / 3, 0.0], atol=1e-6)
+    assert image.size == (5, 4)
+    assert image.bit_depth == (8 if top == 255 else 16)
 
 
 def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path: Path) -> None:
@@ -185,15 +185,15 @@ def test_frames_of_one_view_are_averaged_and_sizes_must_agree(tmp_path: Path) ->
 
 
 def test_a_lone_frame_is_passed_on() -> None:
-    picture = Picture("a", np.ones((2, 2, 3), np.float32))
-    assert average([picture], name="mean") is picture
+    image = LinearImage("a", np.ones((2, 2, 3), np.float32))
+    assert average([image], name="mean") is image
 
 
-@pytest.mark.parametrize("data", [b"", b"not a picture", b"\x89PNG\r\n\x1a\n" + b"\0" * 40])
+@pytest.mark.parametrize("data", [b"", b"not an image", b"\x89PNG\r\n\x1a\n" + b"\0" * 40])
 def test_a_file_that_is_not_an_image_is_refused(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "p.png").write_bytes(data)
     with pytest.raises(InputError, match="not a complete"):
-        read_picture(tmp_path / "p.png")
+        read_image(tmp_path / "p.png")
 
 
 def test_a_jpeg_under_another_name_is_refused(tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ def test_a_jpeg_under_another_name_is_refused(tmp_path: Path) -> None:
     assert done
     (tmp_path / "p.png").write_bytes(data.tobytes())
     with pytest.raises(InputError, match="not a complete PNG or TIFF"):
-        read_picture(tmp_path / "p.png")
+        read_image(tmp_path / "p.png")
 
 
 @settings(max_examples=60, deadline=None)
@@ -220,19 +220,19 @@ def test_a_damaged_png_is_refused_wherever_the_damage_is(
     path = tmp_path_factory.mktemp("p") / "p.png"
     path.write_bytes(damaged[:place] if cut else damaged)
     with pytest.raises(InputError):
-        read_picture(path)
+        read_image(path)
 
 
 def test_an_image_that_declares_a_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
     head = b"\x89PNG\r\n\x1a\n" + b"\0\0\0\rIHDR" + (2**20).to_bytes(4, "big") * 2
     (tmp_path / "p.png").write_bytes(head + b"\0" * 20)
     with pytest.raises(InputError, match="declares"):
-        read_picture(tmp_path / "p.png")
+        read_image(tmp_path / "p.png")
 
 
 def test_a_grey_image_is_refused_where_colour_is_needed() -> None:
     with pytest.raises(InputError, match="grey"):
-        require_colour(Picture("g", np.full((2, 2, 3), 0.5, np.float32)), where="g")
+        require_colour(LinearImage("g", np.full((2, 2, 3), 0.5, np.float32)), where="g")
     with pytest.raises(InputError, match="saturated"):
-        require_colour(Picture("w", np.ones((2, 2, 3), np.float32)), where="w")
-    require_colour(Picture("c", np.float32([[[0.5, 0.1, 0.2]]])), where="c")
+        require_colour(LinearImage("w", np.ones((2, 2, 3), np.float32)), where="w")
+    require_colour(LinearImage("c", np.float32([[[0.5, 0.1, 0.2]]])), where="c")

@@ -91,7 +91,7 @@ def design_of(folder: Path) -> SensorDesign:
     )
 
 
-def picture_of(path: Path) -> np.ndarray:
+def image_of(path: Path) -> np.ndarray:
     """Return a rendered image as linear RGB, 0..1."""
     return cv2.imread(str(path), cv2.IMREAD_COLOR)[..., ::-1] / 255.0
 
@@ -113,7 +113,7 @@ def test_whiteboard_matches_the_path_tracer_but_for_one_exposure(
     shared_data: Path, name: str, spread: float
 ) -> None:
     folder = shared_data / name
-    rendered = picture_of(folder / "whiteboard" / "whiteboard.png")
+    rendered = image_of(folder / "whiteboard" / "whiteboard.png")
     simulated = VirtualSensor(design_of(folder)).brightness(Whiteboard())
     clear = (rendered > 0.1) & (simulated > 0.05)
     ratio = rendered[clear] / simulated[clear]
@@ -132,14 +132,14 @@ def test_press_on_a_plain_sensor_matches_the_path_tracer(
 ) -> None:
     folder = shared_data / "sensor-A"
     sensor = VirtualSensor(design_of(folder))
-    whiteboard = picture_of(folder / "whiteboard" / "whiteboard.png")
+    whiteboard = image_of(folder / "whiteboard" / "whiteboard.png")
     simulated = sensor.brightness(Whiteboard())
     clear = whiteboard > 0.2
     exposure = np.median(whiteboard[clear] / simulated[clear])
     bare = exposure * sensor.brightness(BareMembrane())
     surface = surface_of(folder / "truth" / f"{press_name}.npz")
     pressed = exposure * sensor.brightness(PressedMembrane(surface))
-    rendered = picture_of(folder / "presses" / f"{press_name}.png")
+    rendered = image_of(folder / "presses" / f"{press_name}.png")
     touched = np.abs(pressed - bare).max(axis=2) > 0.004
     error = (rendered - pressed)[touched]
     assert touched.sum() > 50_000
@@ -152,12 +152,12 @@ def test_press_on_a_plain_sensor_matches_the_path_tracer(
 @pytest.mark.parametrize("name", ["sensor-A", "sensor-B"])
 def test_mirror_spots_match_the_path_tracer(shared_data: Path, name: str) -> None:
     folder = shared_data / name
-    rendered = picture_of(folder / "mirror" / "mirror_0mm.png")
+    rendered = image_of(folder / "mirror" / "mirror_0mm.png")
     simulated = VirtualSensor(design_of(folder)).brightness(Mirror())
     v, u = np.mgrid[:960, :1280]
     for k in range(3):
         places = []
-        for picture in (rendered, simulated):
-            weight = np.where(picture[..., k] > 0.3, picture[..., k], 0.0)
+        for image in (rendered, simulated):
+            weight = np.where(image[..., k] > 0.3, image[..., k], 0.0)
             places.append(np.array([(u * weight).sum(), (v * weight).sum()]) / weight.sum())
         assert np.abs(places[0] - places[1]).max() < 0.05

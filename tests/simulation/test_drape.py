@@ -111,7 +111,7 @@ def test_a_height_image_is_pressed_with_its_shape(tmp_path: Path) -> None:
     assert plate.obstacle(x, y) == pytest.approx(np.array(expected))
 
 
-@pytest.mark.parametrize("content", [None, b"", b"no picture"])
+@pytest.mark.parametrize("content", [None, b"", b"no image"])
 def test_an_invalid_height_image_is_refused(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "heights.png"
     if content is not None:

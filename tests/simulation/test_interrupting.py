@@ -94,5 +94,5 @@ def test_the_poses_of_a_session_are_had_one_by_one(sensor: VirtualSensor) -> Non
     poses = checkerboard_poses(DESIGN)
     assert len(poses) == 16
     # Each fills a large part of the image: white paper brighter than the room behind it.
-    picture = sensor.brightness(Checkerboard(poses[3]))[..., 0]
-    assert 0.1 < (picture > 0.5).mean() < 0.6
+    image = sensor.brightness(Checkerboard(poses[3]))[..., 0]
+    assert 0.1 < (image > 0.5).mean() < 0.6

@@ -60,6 +60,6 @@ def test_low_light_shadow_has_the_size_that_the_outline_gives() -> None:
 
 def test_the_figure_is_an_image(comparison, tmp_path: Path) -> None:
     draw_shadow_comparison(comparison, tmp_path / "shadow.png")
-    picture = cv2.imread(str(tmp_path / "shadow.png"))
-    assert picture.shape[0] > 400
-    assert picture.std() > 5.0
+    image = cv2.imread(str(tmp_path / "shadow.png"))
+    assert image.shape[0] > 400
+    assert image.std() > 5.0

@@ -113,7 +113,7 @@ def test_lens_distortion_is_undone_exactly(u: float, v: float) -> None:
 
 def test_mirror_spots_stand_at_the_mirror_twins() -> None:
     design = replace(SensorDesign(camera=replace(QUIET, distortion=(0.0, 0.0, 0.0, 0.0))))
-    picture = np.linalg.solve(
+    image = np.linalg.solve(
         np.array(design.photometry.crosstalk),
         VirtualSensor(design).brightness(Mirror()).reshape(-1, 3).T,
     ).T.reshape(960, 1280, 3)
@@ -129,7 +129,7 @@ def test_mirror_spots_stand_at_the_mirror_twins() -> None:
             + led.y_mm * np.cross(normal, across)
         )
         twin = lamp + 2.0 * (layers.top_distance_mm - normal @ lamp) * normal
-        weight = picture[..., k]
+        weight = image[..., k]
         spot = np.array([(u * weight).sum(), (v * weight).sum()]) / weight.sum()
         expected = camera.fx * twin[:2] / twin[2] + (camera.cx, camera.cy)
         # 8 x 8 rays per pixel locate the centroid of a 5 px disc to a few hundredths.

@@ -77,9 +77,9 @@ def test_a_closed_sensor_shows_background_balls_and_scale_only(
 
 def test_images_are_in_colour_and_boards_are_grey(session: Path) -> None:
     for path in session.rglob("*.png"):
-        picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         grey = path.parent.name in ("checkerboard", "top_pose")
-        assert picture.shape == ((240, 320) if grey else (240, 320, 3))
+        assert image.shape == ((240, 320) if grey else (240, 320, 3))
 
 
 def test_description_and_truth_say_what_was_simulated(session: Path) -> None:
@@ -116,8 +116,8 @@ def test_boards_are_found_where_they_were_put(session: Path) -> None:
     camera = DESIGN.scaled(SCALE).camera
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1.0]])
     for number in (0, 5, 10, 15):
-        picture = cv2.imread(str(session / f"checkerboard/view_{number:02d}.png"), 0)
-        found, corners = cv2.findChessboardCornersSB(picture, (9, 6), None, cv2.CALIB_CB_ACCURACY)
+        image = cv2.imread(str(session / f"checkerboard/view_{number:02d}.png"), 0)
+        found, corners = cv2.findChessboardCornersSB(image, (9, 6), None, cv2.CALIB_CB_ACCURACY)
         assert found
         expected, _ = cv2.projectPoints(
             poses[number].corners_mm(),

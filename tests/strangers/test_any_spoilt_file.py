@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 NAMES = (
-    "calibration", "recording", "PNG picture", "TIFF picture", "records", "true depth", "session",
+    "calibration", "recording", "PNG image", "TIFF image", "records", "true depth", "session",
     "decisions", "design", "protocol", "truth", "ledger", "tools", "indenters", "validation",
     "workspace", "settings",
 )  # fmt: skip

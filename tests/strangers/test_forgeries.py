@@ -43,7 +43,7 @@ from gelpolight_core.recording.reader import Recording, is_recording
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.decisions import read_decisions
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.indenters import relief_from_image
 
@@ -51,7 +51,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "c.gplcal": read_calibration,
     "s.gplcal": read_summary,
     "r.gplrec": Recording.open,
-    "p.png": read_picture,
+    "p.png": read_image,
     "g.png": lambda p: relief_from_image(p, width_mm=1.0, relief_mm=1.0, depth_mm=1.0),
     "t.npz": read_true_depth,
     "session.toml": lambda p: read_session(p.parent),
@@ -168,7 +168,7 @@ def test_a_tiff_that_declares_a_gigantic_size_is_refused_unread(
         data += b"".join(struct.pack(order + "HHII", t, 4, 1, v) for t, v in entries)
     (tmp_path / "p.tif").write_bytes(data + bytes(16))
     with pytest.raises(InputError, match="declares 30000 x 30000 pixels"):
-        read_picture(tmp_path / "p.tif")
+        read_image(tmp_path / "p.tif")
 
 
 def test_a_relief_of_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
@@ -204,11 +204,11 @@ def test_a_ball_is_named_by_a_file_in_its_folder_and_has_a_length(
 
 
 @pytest.mark.parametrize("file", ["../secret.png", "/etc/passwd", "..", "a/b.png"])
-def test_a_truth_names_only_pictures_beside_it(tmp_path: Path, file: str) -> None:
+def test_a_truth_names_only_images_beside_it(tmp_path: Path, file: str) -> None:
     (tmp_path / "truth.csv").write_text(
         f"file,shape,diameter_mm,side_mm,height_mm\n{file},ball,3,,1\n"
     )
-    with pytest.raises(InputError, match="not the name of a picture in this folder"):
+    with pytest.raises(InputError, match="not the name of an image in this folder"):
         read_truth(tmp_path)
 
 

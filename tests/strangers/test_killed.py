@@ -13,7 +13,7 @@ from gelpolight_core.batch.ledger import BatchLedger
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.protocol_run import open_run
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 
 HERE = Path(__file__).resolve().parent
@@ -90,7 +90,7 @@ def test_what_was_told_is_there_and_all_files_are_whole(seed: int, tmp_path: Pat
     run = open_run(tmp_path / "run")
     assert set(by_kind["press"]) <= {press.file for press in run.done}
     for press in run.done:
-        read_picture(run.picture(press))
+        read_image(run.image(press))
     assert run.progress.refused >= len(by_kind.get("refusal", []))
     ledger = Ledger(tmp_path / "measured.jsonl", "c")
     assert all(ledger.find(f"k{number}") for number in by_kind.get("measurement", []))

@@ -62,10 +62,10 @@ def test_half_a_file_under_its_first_name_is_no_file_of_anybody(tmp_path: Path) 
     folder = workspace.protocols_folder("T-1") / "run"
     begin_run(folder, Protocol(repeats=1, regions=2), serial="T-1", calibration="c")
     run = open_run(folder)
-    picture = run.accept(run.wanted[0], [noisy(0)])
+    image = run.accept(run.wanted[0], [noisy(0)])
     workspace.use(path)
     for size in (0, 1, 100, len(whole) // 2, len(whole) - 1):
-        for old in (path, picture, picture.with_name("truth.csv"), workspace.folder / "w.json"):
+        for old in (path, image, image.with_name("truth.csv"), workspace.folder / "w.json"):
             (old.parent / f".{old.name}.0badcafe.part").write_bytes(whole[:size])
         assert [entry.path for entry in workspace.entries()] == [path]
         assert workspace.in_use == path
@@ -133,7 +133,7 @@ def test_a_recording_without_any_block_of_what_was_not_on_the_disk_gives_no_wron
     The link to a frame can be there without the frame.
     """
     path = tmp_path / "a.gplrec"
-    pictures = write_recording(path, frames=3, shape=(16, 16))
+    images = write_recording(path, frames=3, shape=(16, 16))
     whole = path.read_bytes()
     first = whole.index(layout.FRAME_MAGIC)
     for place in range(first, len(whole), BLOCK):
@@ -147,7 +147,7 @@ def test_a_recording_without_any_block_of_what_was_not_on_the_disk_gives_no_wron
                     frame = recording.frame(index)
                 except InputError:
                     continue
-                assert np.array_equal(frame.rgb, pictures[frame.number])
+                assert np.array_equal(frame.rgb, images[frame.number])
                 found += 1
         assert found >= 1  # a block can hold the end of a frame and the beginning of the next
 

@@ -16,7 +16,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.lock import RunLock
 from gelpolight_core.records.records import NAME, Records
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 from gelpolight_core.simulation.session import session_toml
 
@@ -86,7 +86,7 @@ def worked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[st
     return root, done
 
 
-def test_every_picture_that_was_said_to_be_kept_is_there(
+def test_every_image_that_was_said_to_be_kept_is_there(
     worked: tuple[Path, list[dict[str, list[str]]]],
 ) -> None:
     root, done = worked
@@ -95,7 +95,7 @@ def test_every_picture_that_was_said_to_be_kept_is_there(
     session = read_session(root / "session")
     assert {path.name for path in session.captured("balls")} == set(names)
     for path in session.captured("balls"):
-        read_picture(path)
+        read_image(path)
 
 
 def test_every_measurement_is_there(worked: tuple[Path, list[dict[str, list[str]]]]) -> None:

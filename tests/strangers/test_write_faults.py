@@ -44,7 +44,7 @@ def session(tmp_path: Path) -> Path:
     return folder
 
 
-def test_two_programs_that_capture_into_one_session_keep_both_pictures(session: Path) -> None:
+def test_two_programs_that_capture_into_one_session_keep_both_images(session: Path) -> None:
     one, two = CalibrationProject(session), CalibrationProject(session)
     one._next_name = lambda folder, suffix=".png": "ball_001.png"  # type: ignore[method-assign]
     assert one.add_capture(Stage.BALLS, [noisy(1)]) == "ball_001.png"

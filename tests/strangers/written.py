@@ -34,7 +34,7 @@ from gelpolight_core.report.build import calibration_report
 from gelpolight_core.report.document import Report
 from gelpolight_core.report.file import write_report
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.capture import write_picture
+from gelpolight_core.session.capture import write_image
 from gelpolight_core.session.decisions import Decisions, write_decisions
 from gelpolight_core.session.description import write_description
 from gelpolight_core.session.session import BoardSpec, Session, read_session
@@ -98,7 +98,7 @@ def _decisions(folder: Path, which: int) -> None:
 
 
 def _capture(folder: Path, which: int) -> None:
-    write_picture(noisy(which), folder / "balls" / f"ball_{which}.png", new=True, inside=folder)
+    write_image(noisy(which), folder / "balls" / f"ball_{which}.png", new=True, inside=folder)
 
 
 def _heights(name: str, folder: Path, which: int) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, as_picture, judged, or_refusal
+from app.calibrate.detection import Detection, as_image, judged, or_refusal
 from app.calibrate.marks import ball_contour, ball_handle, working_rim
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
@@ -40,7 +40,7 @@ class BallSetting:
         Result of the mirror stage.
     background : (rows, columns, 3) float32
         The bare membrane, resampled onto the table's grid, crosstalk removed.
-    picture_size : (width, height)
+    image_size : (width, height)
         Size of the frames in pixels.
     """
 
@@ -48,7 +48,7 @@ class BallSetting:
     led_positions_mm: Array
     crosstalk: Array
     background: NDArray[np.float32]
-    picture_size: tuple[int, int]
+    image_size: tuple[int, int]
 
 
 def detect_ball(
@@ -80,8 +80,8 @@ def detect_ball(
     rim = working_rim(table)
 
     def detect() -> Detection:
-        _refuse_size(rgb, setting.picture_size)
-        seen = unmix(table.apply(as_picture(rgb).rgb), setting.crosstalk)
+        _refuse_size(rgb, setting.image_size)
+        seen = unmix(table.apply(as_image(rgb).rgb), setting.crosstalk)
         press = find_ball(
             seen,
             setting.background,

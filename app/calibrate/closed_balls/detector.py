@@ -13,7 +13,7 @@ from app.calibrate.detection import Detection, or_refusal, read_raw
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import linear_image
+from gelpolight_core.image.linear import linear_image
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.in_place.press import find_contact
 from gelpolight_core.reconstruction.in_place.change import Reference, reference

@@ -13,12 +13,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, as_picture, or_refusal
+from app.calibrate.detection import Detection, as_image, or_refusal
 from app.calibrate.marks import board_corners, board_outline
 from app.live.image_checks import Rgb
 from app.live.overlay import Overlay
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
     blur_error,
     check_exposure,
@@ -65,8 +65,8 @@ def detect_board(
     faint = Overlay(lines=tuple(board_outline(view, "info") for view in earlier))
 
     def detect() -> Detection:
-        picture = as_picture(rgb)
-        view = find_board(picture, board, rough=None if patient else glance(picture, board))
+        image = as_image(rgb)
+        view = find_board(image, board, rough=None if patient else glance(image, board))
         marks = Overlay(
             markers=board_corners(view), lines=(*faint.lines, board_outline(view, "good"))
         )
@@ -76,24 +76,24 @@ def detect_board(
     return or_refusal(detect, marks=faint)
 
 
-def glance(picture: Picture, board: BoardSpec) -> Array:
+def glance(image: LinearImage, board: BoardSpec) -> Array:
     """Return approximate corners from the quick detectors, or raise InputError."""
-    red, green, blue = cv2.split(picture.rgb)
+    red, green, blue = cv2.split(image.rgb)
     grey = np.asarray((red + green + blue) / np.float32(3.0), np.float32)
-    check_exposure(grey, picture.name)
+    check_exposure(grey, image.name)
     rough = find_rough_corners(grey, board.inner_corners)
     if rough is None:
         rough = search_rough_corners(grey, board.inner_corners, longest_px=GLANCE_PX)
     if rough is not None:
         return rough
     width_px = sharpest_edge_px(grey)
-    if width_px > edge_limit_px(picture.size[0]):
-        raise blur_error(width_px, edge_limit_px(picture.size[0]), picture.name)
+    if width_px > edge_limit_px(image.size[0]):
+        raise blur_error(width_px, edge_limit_px(image.size[0]), image.name)
     raise InputError(
         tr("no board with {w} x {h} inner corners was found").format(
             w=board.inner_corners[0], h=board.inner_corners[1]
         ),
-        where=picture.name,
+        where=image.name,
         advice=tr("Show the whole board, evenly lit, with a light margin around it"),
     )
 
@@ -138,7 +138,7 @@ def _uncovered_area(views: Sequence[BoardView]) -> str:
         (tr("left"), tr("middle"), tr("right")),
         (tr("bottom left"), tr("bottom"), tr("bottom right")),
     )
-    counts = coverage_counts(views, views[0].picture_size)
+    counts = coverage_counts(views, views[0].image_size)
     rows = [part.sum(axis=0) for part in np.array_split(counts, 3, axis=0)]
     ninths = np.array([[p.sum() for p in np.array_split(row, 3)] for row in rows])
     order = ((0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0), (1, 1))
@@ -146,11 +146,11 @@ def _uncovered_area(views: Sequence[BoardView]) -> str:
 
 
 def _view_figures(view: BoardView, earlier: Sequence[BoardView]) -> tuple[Figure, ...]:
-    covered = coverage_counts([*earlier, view], view.picture_size) > 0
+    covered = coverage_counts([*earlier, view], view.image_size) > 0
     return (
         judge("tilt", tr("Tilt"), view.tilt_deg, "deg"),
         judge("edge_width", tr("Edge width"), view.edge_width_px, "px",
-              warn=edge_limit_px(view.picture_size[0])),
+              warn=edge_limit_px(view.image_size[0])),
         judge("grid_rms", tr("Deviation from a flat grid"), view.grid_rms_px, "px"),
         judge("contrast", tr("Contrast"), 100.0 * view.contrast, "%"),
         judge("saturated", tr("Saturated light squares"), 100.0 * view.saturated_share, "%",

@@ -94,7 +94,7 @@ class LensStep(ImageStep):
             for path in session.found(self.step.folder):
                 if path.name not in known:
                     try:
-                        view = find_view(session.picture(path), session.checkerboard)
+                        view = find_view(session.image(path), session.checkerboard)
                     except InputError as fault:
                         view = refused_view(path.name, fault)
                     self._views = {**self._views, path.name: view}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from app.calibrate.detection import Detection, as_picture, judged, or_refusal
+from app.calibrate.detection import Detection, as_image, judged, or_refusal
 from app.calibrate.marks import LED_ROLES, spot_markers, spot_mask
 from app.live.image_checks import Rgb
 from app.live.overlay import Marker, Overlay
@@ -40,7 +40,7 @@ def detect_mirror(
     )
 
     def detect() -> Detection:
-        spots = find_mirror_spots(as_picture(rgb))
+        spots = find_mirror_spots(as_image(rgb))
         marks = Overlay(
             markers=(*expected, *spot_markers(spots, editable=editable)),
             masks=tuple(
@@ -65,7 +65,7 @@ def placed_spots(rgb: Rgb, session: Session) -> Detection:
     """Show the manually placed spots as handles that can be moved again."""
 
     def detect() -> Detection:
-        spots = find_mirror_spots(as_picture(rgb), placed=session.decisions.spots_px)
+        spots = find_mirror_spots(as_image(rgb), placed=session.decisions.spots_px)
         marks = Overlay(markers=spot_markers(spots, editable=True))
         return judged(marks, spots.quality.figures, tr("The spots were placed by hand."), spots)
 

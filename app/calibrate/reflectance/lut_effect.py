@@ -21,7 +21,7 @@ from gelpolight_core.reconstruction.paper.model import ShadingMaps, solve_slopes
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session
 
 Array = NDArray[np.float64]
@@ -81,7 +81,7 @@ def ball_effect(
 
     @lru_cache(maxsize=2)
     def frame(name: str) -> NDArray[np.float32]:
-        return read_picture(session.folder / name, response=run.calibration.response).rgb
+        return read_image(session.folder / name, response=run.calibration.response).rgb
 
     def effect(edit: CurveEdit, name: str) -> Effect:
         maps = _maps(reconstructor.paper.maps, run.calibration, edit)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.calibrate.detection import Detection, as_picture, judged, or_refusal
+from app.calibrate.detection import Detection, as_image, judged, or_refusal
 from app.calibrate.lens.detector import glance
 from app.calibrate.marks import board_corners, board_outline, foot_point
 from app.live.image_checks import Rgb
@@ -31,10 +31,10 @@ def detect_top_pose(
     """
 
     def detect() -> Detection:
-        picture = as_picture(rgb, tr("Image"))
+        image = as_image(rgb, tr("Image"))
         if not patient:
-            glance(picture, board)
-        pose = estimate_top_pose([picture], board, camera)
+            glance(image, board)
+        pose = estimate_top_pose([image], board, camera)
         view = pose.views[0].board
         markers = () if view is None else board_corners(view)
         lines = () if view is None else (board_outline(view, "good"),)

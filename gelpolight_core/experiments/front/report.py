@@ -103,7 +103,7 @@ def write_work_precision(
     rules: Sequence[RuleFigure] = (),
     machine: Machine | None = None,
 ) -> list[Path]:
-    """Write ``work-precision`` as HTML, CSV and JSON, ``integrators.csv``, ``rules.csv``, pictures.
+    """Write ``work-precision`` as HTML, CSV and JSON, ``integrators.csv``, ``rules.csv``, images.
 
     Parameters
     ----------
@@ -144,15 +144,15 @@ def write_work_precision(
     }
     for name, text in texts.items():
         write_atomically(folder / name, lambda out, text=text: out.write(text.encode()))  # type: ignore[misc]
-    pictures = []
+    images = []
     for sensor, mine in _by_sensor(points).items():
-        picture = folder / f"front-{sensor}.png"
+        image = folder / f"front-{sensor}.png"
         data = draw_depth_error(mine).png
-        write_atomically(picture, lambda out, data=data: out.write(data))  # type: ignore[misc]
-        pictures.append(picture)
+        write_atomically(image, lambda out, data=data: out.write(data))  # type: ignore[misc]
+        images.append(image)
     page = folder / "work-precision.html"
     write_page(work_precision_page(points, integrators, rules, machine), page)
-    return [page, *(folder / name for name in texts), *pictures]
+    return [page, *(folder / name for name in texts), *images]
 
 
 def work_precision_page(

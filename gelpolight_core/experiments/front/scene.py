@@ -161,7 +161,7 @@ def session_presses(session: Session, names: Sequence[str] = ()) -> list[Press]:
         if row.truth.shape not in FLAT_TOPPED or (names and row.file not in names):
             continue
         truth = read_true_depth((session.folder / "truth" / row.file).with_suffix(".npz"))
-        light = session.picture(folder / row.file).rgb
+        light = session.image(folder / row.file).rgb
         frame = np.rint(255.0 * light).astype(np.uint8)
         if not np.allclose(frame / np.float32(255.0), light, atol=1e-4):
             frame = light  # 16 bit, or not linear: linear light is kept as it is

@@ -77,10 +77,8 @@ def ball_samples(results: StageResults) -> BallSamples:
     where = tr("balls")
     table, background = need(results.table, where), need(results.background, where)
     parts = [
-        _samples_of(number, press, relative_change(picture, background), table)
-        for number, (press, picture) in enumerate(
-            zip(results.presses, results.pictures, strict=True)
-        )
+        _samples_of(number, press, relative_change(image, background), table)
+        for number, (press, image) in enumerate(zip(results.presses, results.images, strict=True))
     ]
     found = BallSamples(*(np.concatenate([getattr(p, name) for p in parts]) for name in _FIELDS))
     require_pixels(found)

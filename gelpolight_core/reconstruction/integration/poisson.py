@@ -32,7 +32,7 @@ Stencil = Literal[4, 2, 1]
 
 SLOPE_LIMIT = 10.0
 """Steepest slope taken at face value, 84 degrees: from above, a steeper wall is seen over less
-than a tenth of its height and cannot be told from a fault of the picture."""
+than a tenth of its height and cannot be told from a fault of the image."""
 
 _TAPS = 5
 _TRANSFORM = 2

@@ -232,16 +232,16 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
         )
 
     light = seen(full.background) @ calibration.crosstalk.T.astype(np.float32)
-    picture = _encoded(light, calibration.response)
+    image = _encoded(light, calibration.response)
     rows, columns = camera.height // block, camera.width // block
 
     def blocks(values: Map) -> Map:
         cut = np.ascontiguousarray(values[: rows * block, : columns * block])
         return np.asarray(cv2.resize(cut, (columns, rows), interpolation=cv2.INTER_AREA))
 
-    expected = blocks(picture)
+    expected = blocks(image)
     # The background was resampled on its way here: what another blur changes is not to be trusted.
-    blurred = cv2.GaussianBlur(picture, (0, 0), 1.0)
+    blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
     unsure = np.abs(blocks(np.asarray(blurred, np.float32)) - expected)
     least = CONTACT_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
     core = cv2.erode(known.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0)

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.reconstruction.near_light.structures import Picture
+from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
 
 Map = NDArray[np.float32]
@@ -42,7 +42,7 @@ _single = np.float32
 
 
 def quieted(
-    picture: Picture,
+    image: RatioImage,
     sd: tuple[np.float32, ...],
     workers: RowWorkers,
     take: Callable[..., NDArray[Any]],
@@ -55,7 +55,7 @@ def quieted(
 
     Parameters
     ----------
-    picture : Picture
+    image : RatioImage
         At full scale; its noise is `sd` over the background. Ratio and noise are overwritten.
     sd : 3 floats
         Noise of press minus background.
@@ -70,8 +70,8 @@ def quieted(
         How far each node was left as it is by the narrowest average, 0..1; None where the image
         is so quiet that nothing was averaged.
     """
-    ratio, noise = picture.ratio, picture.noise
-    rows, columns = picture.marks.shape
+    ratio, noise = image.ratio, image.noise
+    rows, columns = image.marks.shape
     light, base = take("light", ratio.shape), take("base", ratio.shape)
     workers.run(rows, _parted, ratio, noise, sd, light, base)
     room = [take(name, light.shape) for name in ("quiet light", "quiet base")]

@@ -438,11 +438,11 @@ def ray_ramps(scale, row, place, count):  # type: ignore[no-untyped-def]  # prag
 
 
 @_part
-def _load(w, picture, depth, scale, corner, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Copy a block of row `i` into the work array."""
     row, place = i + corner[0], begin + corner[1]
     # Plain indices: a view of a row is counted, and threads would wait for the counter.
-    ratio, noise, around, marks = picture.ratio, picture.noise, picture.around, picture.marks
+    ratio, noise, around, marks = image.ratio, image.noise, image.around, image.marks
     flat, kind = scale.flat, scale.kind
     from_around = around.shape[2] > 1
     for k in range(3):
@@ -481,12 +481,12 @@ def _store(w, plane, target, i, begin, count):  # type: ignore[no-untyped-def]  
 
 
 @_whole
-def solve_rows(first, last, picture, depth, scale, corner, membrane, steps, slopes):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Solve rows `first` to `last` of a region whose first node is `corner` (row, column).
 
     Parameters
     ----------
-    picture : Picture
+    image : RatioImage
         Of the region.
     depth : (rows, columns) float32
         Present depth at each node's ray.
@@ -506,7 +506,7 @@ def solve_rows(first, last, picture, depth, scale, corner, membrane, steps, slop
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
             place = corner[1] + begin
-            _load(w, picture, depth, scale, corner, slopes, warm, i, begin, count)
+            _load(w, image, depth, scale, corner, slopes, warm, i, begin, count)
             at = (y, _single(scale.x_mm + scale.pitch_mm * place), pitch)
             rays = ray_ramps(scale, i + corner[0], place, count)
             _begin_block(w, rays, at, leds, dark, curves, table, gloss, bounce, shadows, begun)

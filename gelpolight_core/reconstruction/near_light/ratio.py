@@ -14,7 +14,7 @@ from gelpolight_core.reconstruction.near_light.denoise import quieted
 from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, light_levels
 from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.near_light.sampling import halve, sample_rows
-from gelpolight_core.reconstruction.near_light.structures import Picture
+from gelpolight_core.reconstruction.near_light.structures import RatioImage
 from gelpolight_core.reconstruction.terms import Terms
 from gelpolight_core.reconstruction.threads import RowWorkers
 
@@ -29,14 +29,14 @@ class Compared(NamedTuple):
 
     Attributes
     ----------
-    fine, coarse : Picture
+    fine, coarse : RatioImage
         At the scale of the solve, and at the coarsest scale.
     edge : (rows, columns) float32 or None
-        How far denoising left the fine picture as it is, 0..1; None where it was not denoised.
+        How far denoising left the fine image as it is, 0..1; None where it was not denoised.
     """
 
-    fine: Picture
-    coarse: Picture
+    fine: RatioImage
+    coarse: RatioImage
     edge: Map | None
 
 
@@ -111,10 +111,10 @@ class PressSampler:
         sd = self.maps.calibration.noise / np.sqrt(2.0) / factor
         return tuple(np.float32(s) for s in sd)
 
-    def _picture(self, shape: tuple[int, int], name: str) -> Picture:
+    def _image(self, shape: tuple[int, int], name: str) -> RatioImage:
         planes = [self._take(f"{part} {name}", (3, *shape)) for part in ("ratio", "noise")]
         marks = self._take(f"marks {name}", shape, np.uint8)
-        return Picture(planes[0], planes[1], np.zeros((3, 1, 1), np.float32), marks)
+        return RatioImage(planes[0], planes[1], np.zeros((3, 1, 1), np.float32), marks)
 
     def _sampled(
         self,
@@ -124,9 +124,9 @@ class PressSampler:
         linear: bool,
         terms: Terms,
         unmix: Rows,
-    ) -> Picture:
+    ) -> RatioImage:
         corner, shape = region.at(COARSE // factor)
-        picture = self._picture(shape, "sampled")
+        image = self._image(shape, "sampled")
         self._workers.run(
             shape[0],
             sample_rows,
@@ -138,13 +138,13 @@ class PressSampler:
             (unmix, self._noise(factor)),
             self.maps.scale(factor).kind,
             corner,
-            picture,
+            image,
         )
-        return picture
+        return image
 
-    def _halved(self, fine: Picture, name: str) -> Picture:
+    def _halved(self, fine: RatioImage, name: str) -> RatioImage:
         rows, columns = fine.marks.shape
-        coarse = self._picture((rows // 2, columns // 2), name)
+        coarse = self._image((rows // 2, columns // 2), name)
         self._workers.run(rows // 2, halve, fine, coarse)
         return coarse
 

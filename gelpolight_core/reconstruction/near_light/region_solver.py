@@ -31,7 +31,7 @@ from gelpolight_core.reconstruction.near_light.rounds import (
 )
 from gelpolight_core.reconstruction.near_light.settings import Settings
 from gelpolight_core.reconstruction.near_light.structures import (
-    Picture,
+    RatioImage,
     Scale,
     Slopes,
     Steps,
@@ -219,7 +219,7 @@ class RegionSolver:
     def slopes(
         self,
         at: tuple[Scale, tuple[int, int]],
-        picture: Picture,
+        image: RatioImage,
         depth: Map,
         settings: Settings,
         terms: Terms,
@@ -231,7 +231,7 @@ class RegionSolver:
             slopes = slopes._replace(normal_x=start[0], normal_y=start[1])
         steps = Steps(settings.steps, settings.settled**2, terms.shadows, start is not None)
         rows, membrane = len(depth), self.maps.membrane
-        self._workers.run(rows, solve_rows, picture, depth, *at, membrane, steps, slopes)
+        self._workers.run(rows, solve_rows, image, depth, *at, membrane, steps, slopes)
         if not terms.ray_true_slopes:
             down = -np.sqrt(1.0 - slopes.normal_x**2 - slopes.normal_y**2)
             slopes.slope_x[:], slopes.slope_y[:] = slopes.normal_x / down, slopes.normal_y / down

@@ -65,7 +65,7 @@ def _wide(light, raw, k, c, r, fu, fv):  # type: ignore[no-untyped-def]  # pragm
 
 
 @_whole
-def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corner, picture):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corner, image):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Compare a raw image with the background, rows `first` to `last` of a region.
 
     Parameters
@@ -86,12 +86,12 @@ def sample_rows(first, last, raw, light, limit, source, wide, sensor, kind, corn
         Of the whole grid, as in `Scale`.
     corner : tuple
         Row and column of the region's first node.
-    picture : Picture
+    image : RatioImage
         Ratio, noise and marks are written.
     """
     u_px, v_px, background = source
     unmix, sd = sensor
-    ratio, noise, marks = picture.ratio, picture.noise, picture.marks
+    ratio, noise, marks = image.ratio, image.noise, image.marks
     height, width = raw.shape[0], raw.shape[1]
     back = _HALF if wide else _0
     seen = np.empty(3, np.float32)
@@ -144,7 +144,7 @@ def _finite_mean(fine, coarse, i, j):  # type: ignore[no-untyped-def]  # pragma:
 
 @_whole
 def halve(first, last, fine, coarse):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Average a picture over 2 x 2 nodes; a channel is saturated where most of them are.
+    """Average an image over 2 x 2 nodes; a channel is saturated where most of them are.
 
     Nodes that are no number are left out of the average.
     """

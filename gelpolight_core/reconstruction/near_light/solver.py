@@ -328,13 +328,13 @@ class NearLightSolver:
 
     def _noise(self, image: Image, solved: Solved, terms: Terms) -> DepthNoise:
         """Return how far a solved region may be off."""
-        picture, at = solved.compared.fine, (solved.scale, solved.region.at(COARSE)[0])
+        compared, at = solved.compared.fine, (solved.scale, solved.region.at(COARSE)[0])
         # Solving again overwrites the slopes' buffers.
         slopes = Slopes(*(part.copy() for part in solved.slopes))  # type: ignore[arg-type]
         kept = solved._replace(slopes=slopes, weight=solved.weight.copy())
 
         def solve(ratio: Map, start: tuple[Map, Map]) -> Slopes:
-            shaken = picture._replace(ratio=ratio)
+            shaken = compared._replace(ratio=ratio)
             return self._solver.slopes(at, shaken, solved.start_mm, MOVED, terms, start)
 
         levels = self._sampler.levels(image.raw.dtype, image.linear)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 Map = NDArray[np.float32]
 Triple = tuple[float, float, float]
 NOT_FINITE = 8
-"""Bit of `Picture.marks`: a pixel was not a finite number."""
+"""Bit of `RatioImage.marks`: a pixel was not a finite number."""
 
 
-class Picture(NamedTuple):
+class RatioImage(NamedTuple):
     """Press over background in a region of one scale.
 
     Attributes

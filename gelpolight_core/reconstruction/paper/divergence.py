@@ -1,4 +1,4 @@
-"""From a picture to the divergence of its slopes without writing the slopes down.
+"""From an image to the divergence of its slopes without writing the slopes down.
 
 A node's divergence needs five lines of slopes. They stay in the nearest cache in two rings, beside
 the loops that make them and the loops that add them up.
@@ -15,11 +15,11 @@ from gelpolight_core.reconstruction.paper.kernel import solve_row, work_arrays
 
 @njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, error_model="numpy", cache=True)
 def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    first, last, picture, sensor, edges, top, left, keep, slope_x, slope_y, flags, field
+    first, last, image, sensor, edges, top, left, keep, slope_x, slope_y, flags, field
 ):
     """Write lines `first` to `last` of the divergence on the padded grid, and their flags.
 
-    `picture` and `sensor` as for `solve_row`; `edges` are the first nodes and weights along x and
+    `image` and `sensor` as for `solve_row`; `edges` are the first nodes and weights along x and
     along y. Slopes (rows, columns) are written where `keep`. They are finite and within their
     limit by the way they are made.
     """
@@ -41,7 +41,7 @@ def paper_divergence_rows(  # type: ignore[no-untyped-def]  # pragma: no cover -
             # What two threads need is made by both and written by one.
             own = first <= loaded + top < last
             marks = flags[loaded] if own else others
-            solve_row(loaded, picture, sensor, work, ring_x[at], ring_y[at], marks, None)
+            solve_row(loaded, image, sensor, work, ring_x[at], ring_y[at], marks, None)
             if keep and own:
                 slope_x[loaded], slope_y[loaded] = ring_x[at], ring_y[at]
             loaded += 1

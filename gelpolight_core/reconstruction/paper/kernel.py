@@ -262,17 +262,17 @@ def work_arrays():  # type: ignore[no-untyped-def]  # pragma: no cover - compile
 
 
 @_part
-def solve_row(i, picture, sensor, work, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def solve_row(i, image, sensor, work, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Solve row `i` into lines (columns,); `length_error` may be None.
 
-    `picture` is: pixels (pixels, 3); of one of bytes two neighbours in each word (pixels,), else
+    `image` is: pixels (pixels, 3); of one of bytes two neighbours in each word (pixels,), else
     None; width, height; the value that counts as saturated. `sensor` is: `static` (rows, blocks,
     5 * 64) with u, v and the three gains; `lit` (rows, blocks), which blocks have any node of use;
     the table, a cosine and the step to the next in each word; from processed value to place in it
     (3); the cosines that it has data for (3, 2); the LEDs (3, 3); x of the first node, the pitch;
     y of the rows.
     """
-    raw, pairs, width, height, limit = picture
+    raw, pairs, width, height, limit = image
     static, lit, table, scale, coverage, leds, x_first, pitch, y_mm = sensor
     w, pixel, entry, words, found = work
     right = np.uint32(1 if width > 1 else 0)
@@ -303,11 +303,11 @@ def solve_row(i, picture, sensor, work, slope_x, slope_y, flags, length_error): 
 
 
 @_whole
-def solve_rows(first, last, picture, sensor, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def solve_rows(first, last, image, sensor, slope_x, slope_y, flags, length_error):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Solve rows `first` to `last` of maps (rows, columns); else as `solve_row`."""
     work = work_arrays()
     for i in range(first, last):
-        solve_row(i, picture, sensor, work, slope_x[i], slope_y[i], flags[i], length_error[i])
+        solve_row(i, image, sensor, work, slope_x[i], slope_y[i], flags[i], length_error[i])
 
 
 @_whole

@@ -1,7 +1,7 @@
-"""Normals of the membrane from one picture: the paper's model (Eq. 10), in one fused pass.
+"""Normals of the membrane from one image: the paper's model (Eq. 10), in one fused pass.
 
 Resampling, division by light and factor, the reflectance table and the 3x3 solve are done block by
-block of nodes, so that each byte of the picture is read once. Lights are frozen at the flat
+block of nodes, so that each byte of the image is read once. Lights are frozen at the flat
 membrane.
 """
 
@@ -86,7 +86,7 @@ class SlopeField:
 
 
 class SlopeSolver:
-    """Solves Eq. (10) for pictures of one sensor; what does not change is made ready once.
+    """Solves Eq. (10) for images of one sensor; what does not change is made ready once.
 
     It may be called from several threads, which then wait for each other.
 
@@ -118,16 +118,16 @@ class SlopeSolver:
         Parameters
         ----------
         raw : (height, width, 3) uint8, uint16 or float32
-            Raw picture in RGB order; float pictures are 0..1.
+            Raw image in RGB order; float images are 0..1.
         gain : (3,), optional
             Light of each channel over that at calibration.
         """
         slope_x, slope_y, length = (np.empty(self._shape, np.float32) for _ in range(3))
         flags = np.empty(self._shape, np.uint8)
         with self._lock:
-            picture, sensor = self._of_picture(raw, gain)
+            image, sensor = self._of_image(raw, gain)
             self._workers.run(
-                self._shape[0], solve_rows, picture, sensor, slope_x, slope_y, flags, length
+                self._shape[0], solve_rows, image, sensor, slope_x, slope_y, flags, length
             )
         return SlopeField(slope_x, slope_y, flags, length)
 
@@ -164,7 +164,7 @@ class SlopeSolver:
             self._workers.run(
                 len(field),
                 paper_divergence_rows,
-                *self._of_picture(raw, gain),
+                *self._of_image(raw, gain),
                 (edges.start_x, edges.weight_x, edges.start_y, edges.weight_y),
                 edges.top,
                 edges.left,
@@ -176,10 +176,10 @@ class SlopeSolver:
             )
         return field, SlopeField(slope_x, slope_y, flags, none)
 
-    def _of_picture(
+    def _of_image(
         self, raw: NDArray[Any], gain: Gain | None
     ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-        """Return a picture and the sensor as the kernels want them."""
+        """Return an image and the sensor as the kernels want them."""
         height, width = raw.shape[:2]
         # numba would compile the kernel a second time for a read-only array.
         raw = np.require(raw, requirements=["C", "W"])
@@ -213,12 +213,12 @@ class SlopeSolver:
 
 
 def solve_slopes(raw: NDArray[Any], maps: ShadingMaps, *, workers: int = 1) -> SlopeField:
-    """Solve one picture; for many of one sensor make a :class:`SlopeSolver`.
+    """Solve one image; for many of one sensor make a :class:`SlopeSolver`.
 
     Parameters
     ----------
     raw : (height, width, 3) uint8, uint16 or float32
-        Raw picture in RGB order; float pictures are 0..1.
+        Raw image in RGB order; float images are 0..1.
     maps : ShadingMaps
         The calibration.
     workers : int, optional

@@ -19,7 +19,7 @@ from app.calibrate.lights.detector import detect_mirror
 from app.calibrate.marks import mirror_positions_px
 from app.calibrate.radiance.detector import detect_whiteboard
 from app.calibrate.top_pose.detector import detect_top_pose
-from gelpolight_core.image.picture import Picture
+from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView
@@ -27,7 +27,7 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.resampling import ResamplingTable, build_resampling_table
 from gelpolight_core.sensor_calibration import sensor_stack
 from gelpolight_core.session.board import BoardSpec
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session, read_session
 
 
@@ -42,7 +42,7 @@ class Known:
     crosstalk: np.ndarray
 
 
-def frame(image: Picture) -> np.ndarray:
+def frame(image: LinearImage) -> np.ndarray:
     """Return an image as a camera delivers it."""
     return np.round(np.clip(image.rgb, 0.0, 1.0) * 255.0).astype(np.uint8)
 
@@ -74,8 +74,8 @@ def session(virtual_session: Path) -> Session:
 def images(session: Session) -> dict[str, np.ndarray]:
     """Return one frame of every stage."""
     stages = ("checkerboard", "top_pose", "mirror", "whiteboard", "background", "balls")
-    frames = {stage: frame(read_picture(session.files(stage)[0])) for stage in stages}
-    frames["press"] = frame(read_picture(session.folder / "presses" / "cylinder_s5_d100.png"))
+    frames = {stage: frame(read_image(session.files(stage)[0])) for stage in stages}
+    frames["press"] = frame(read_image(session.folder / "presses" / "cylinder_s5_d100.png"))
     return frames
 
 

@@ -46,7 +46,7 @@ def test_a_reported_capture_is_on_disk_with_its_radius(
     name = technician.capture()
     kept = read_session(technician.session)
     assert kept.ball_radii_mm[name] == 2.5
-    assert kept.picture(technician.session / "balls" / name).size == (320, 240)
+    assert kept.image(technician.session / "balls" / name).size == (320, 240)
     assert name in technician.wizard.panel.notice.text()
 
 

@@ -131,7 +131,7 @@ def wrong_files(session: Path, folder: Path) -> dict[str, Path]:
     cv2.imwrite(str(files["size"]), ball[::2, ::2])
     shutil.copy(session / "balls" / "ball_02.png", files["copy"])
     files["torn"].write_bytes((session / "balls" / "ball_03.png").read_bytes()[:-300])
-    files["text"].write_text("no picture")
+    files["text"].write_text("no image")
     return files
 
 
@@ -226,7 +226,7 @@ def test_a_ball_that_could_not_be_written_leaves_no_radius_behind(
     project = computed_project()
     radii = dict(project.session.ball_radii_mm)
     monkeypatch.setattr(
-        "gelpolight_core.calibration.editable_session.write_picture",
+        "gelpolight_core.calibration.editable_session.write_image",
         lambda *_, **__: raise_disk_full(),
     )
     with pytest.raises(Exception, match="disk is full"):

@@ -16,7 +16,7 @@ from technician import Technician
 from gelpolight_core.calibration.inputs import FOLDERS
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.session.description import create_session
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import Session, read_session
 
 FIRST_SEED = int(os.environ.get("GELPOLIGHT_KILL_SEED", "0"))
@@ -48,7 +48,7 @@ def test_reported_work_survives_a_kill(
     session = project.session
     for item in reported:
         if "captured" in item:
-            assert read_picture(folder / item["captured"]).size == (320, 240)
+            assert read_image(folder / item["captured"]).size == (320, 240)
             name = Path(item["captured"]).name
             if item["radius_mm"] is not None:
                 assert session.ball_radii_mm[name] == item["radius_mm"]
@@ -58,7 +58,7 @@ def test_reported_work_survives_a_kill(
         assert decided(session, name) in allowed
     for stage in FOLDERS.values():
         for path in session.captured(stage):
-            read_picture(path)
+            read_image(path)
     technician.page._show_wizard(project)
     assert technician.wizard.step_list.count() > 0
 

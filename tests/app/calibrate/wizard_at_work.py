@@ -1,4 +1,4 @@
-"""A wizard at work until it is killed: ``python wizard_at_work.py SESSION PICTURES SEED``.
+"""A wizard at work until it is killed: ``python wizard_at_work.py SESSION IMAGES SEED``.
 
 Captures and corrects in turn on a session, and writes one JSON line for everything that is
 reported as done; for data that replaces older data, also when it starts.

@@ -22,7 +22,7 @@ from app.sources.processor import Outcome
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 
 WAIT_MS = 60_000
 
@@ -104,9 +104,9 @@ def test_depth_is_shown_in_3d_once_for_each_frame(
     shown = page.views.height.map.shown_images - frames
     # The painting of the last frame may still be running.
     assert abs((view.drawings - drawings) - shown) <= 1
-    picture = view.grabFramebuffer()
-    middle = picture.pixelColor(picture.width() // 2, picture.height() // 2)
-    corner = picture.pixelColor(4, 4)
+    image = view.grabFramebuffer()
+    middle = image.pixelColor(image.width() // 2, image.height() // 2)
+    corner = image.pixelColor(4, 4)
     assert middle != corner
 
 
@@ -369,8 +369,8 @@ def test_undo_of_a_second_zero_restores_the_original(
     path = workspace.calibration_path(small_calibration.sensor.serial, "mine")
     write_calibration(small_calibration, path)
     kept = path.read_bytes()
-    picture = min((small_session / "background").glob("*.png"))
-    frames = [read_picture(picture).rgb] * FRAMES
+    image = min((small_session / "background").glob("*.png"))
+    frames = [read_image(image).rgb] * FRAMES
     first = zero_calibration(workspace, path, frames)
     second = zero_calibration(workspace, first.path, frames)
     assert workspace.in_use == first.path == second.path != path

@@ -14,7 +14,7 @@ from app.inspect.modes import ModeChoice, mode_text
 from app.live.frame_results import Shown
 from app.services.jobs import Jobs
 from app.sources.source import Frame
-from gelpolight_core.reconstruction.efforts import FOUND, WAYS, Way
+from gelpolight_core.reconstruction.modes import FOUND, MODES, Mode
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 
@@ -24,7 +24,7 @@ FRAME = np.zeros((4, 4, 3), np.uint8)
 @pytest.fixture
 def choice(context: AppContext) -> Iterator[ModeChoice]:
     owner = QObject()
-    jobs = Jobs("ways", owner)
+    jobs = Jobs("modes", owner)
     made = ModeChoice(jobs, owner, context=context)
     yield made
     jobs.close()
@@ -37,8 +37,8 @@ def full(small_calibration: Calibration) -> Reconstructor:
     return Reconstructor(small_calibration, effort="balanced")
 
 
-def _pick(choice: ModeChoice, mode: Way) -> None:
-    choice.box.setCurrentIndex(WAYS.index(mode))
+def _pick(choice: ModeChoice, mode: Mode) -> None:
+    choice.box.setCurrentIndex(MODES.index(mode))
     choice.box.activated.emit(choice.box.currentIndex())
 
 
@@ -48,10 +48,10 @@ def test_every_mode_is_offered_with_its_measured_errors(
     assert not choice.box.isEnabled()
     choice.offer(full, full)
     texts = [choice.box.itemText(k) for k in range(choice.box.count())]
-    assert len(texts) == len(WAYS) == 4
+    assert len(texts) == len(MODES) == 4
     assert "fast   0.70 / 0.41 %" in choice.box.currentText()
     assert "2.0 / 2.6 %" in texts[-1]
-    errors = [FOUND[mode] for mode in WAYS[:3]]
+    errors = [FOUND[mode] for mode in MODES[:3]]
     # More effort is more accurate in both together. The height errors of balanced and best differ
     # only by chance.
     assert errors == sorted(errors, key=lambda e: e.height_percent + e.size_percent, reverse=True)
@@ -62,7 +62,7 @@ def test_another_effort_is_used_at_once_and_saved(
 ) -> None:
     choice.offer(full, full)
     with qtbot.waitSignal(choice.chosen) as signal:
-        _pick(choice, Way("full", "fast"))
+        _pick(choice, Mode("full", "fast"))
     live, best = signal.args
     assert live.effort == "fast" and best is full
     assert full.effort == "balanced"
@@ -79,7 +79,7 @@ def test_the_papers_model_is_prepared_in_the_background(
     choice.offer(full, full)
     used: list[Reconstructor] = []
     choice.chosen.connect(lambda live, _best: used.append(live))
-    _pick(choice, Way("paper", "best"))
+    _pick(choice, Mode("paper", "best"))
     assert used[-1].model == "full"
     qtbot.waitUntil(lambda: used[-1].model == "paper", timeout=30_000)
 
@@ -112,5 +112,5 @@ def test_settings_without_a_valid_mode_give_the_default(
     choice: ModeChoice, context: AppContext
 ) -> None:
     context.settings.reconstruction = ("full", "heroic")
-    assert choice.mode == Way("full", "fast")
+    assert choice.mode == Mode("full", "fast")
     assert "2 ms" in mode_text(choice.mode, 2.0)

@@ -112,7 +112,7 @@ def test_a_calibration_is_listed_by_its_name_with_its_sensor_in_the_tooltip(qtbo
         in_use = True
 
         class summary:
-            identity, picture_size = "A-12ab", (8, 6)
+            identity, image_size = "A-12ab", (8, 6)
 
     entry: Any = Entry()
     box = CalibrationBox()

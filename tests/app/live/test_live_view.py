@@ -300,7 +300,7 @@ def test_without_a_stream_the_view_says_so(view: LiveView) -> None:
     image_view = child(view, "live.image")
     words = [label.text() for label in image_view.findChildren(QWidget) if hasattr(label, "text")]
     assert "No camera. Select a source." in words
-    assert image_view.picture_size == (0, 0)
+    assert image_view.image_size == (0, 0)
 
 
 def test_stripes_come_and_go_on_a_still(view: LiveView) -> None:
@@ -348,11 +348,11 @@ def test_a_snapshot_contains_the_exact_values_and_no_marks(
 def test_the_snapshot_key_saves_into_the_folder_and_reports_the_path(
     view: LiveView, qtbot: QtBot, tmp_path: Path
 ) -> None:
-    view.snapshot_folder = tmp_path / "pictures"
+    view.snapshot_folder = tmp_path / "snapshots"
     view.show_image(black())
     with qtbot.waitSignal(view.saved) as reported:
         child(view, "live.snapshot").click()
-    assert Path(reported.args[0]).parent == tmp_path / "pictures"
+    assert Path(reported.args[0]).parent == tmp_path / "snapshots"
     assert Path(reported.args[0]).is_file()
 
 

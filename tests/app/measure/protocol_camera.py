@@ -17,7 +17,7 @@ RATE_HZ = 60.0
 WALL_MM = 0.25
 
 
-def picture(
+def image(
     calibration: Calibration, place_mm: tuple[float, float] | None, size_mm: float = 5.0
 ) -> NDArray[np.float64]:
     """Return the camera image (240, 320, 3), 0..1, of a round press 0.5 mm high, or of none."""
@@ -30,7 +30,7 @@ def picture(
         fall = 0.25 / WALL_MM / np.cosh((radius - 0.5 * size_mm) / WALL_MM) ** 2
         return np.asarray(-fall * away / radius)
 
-    return np.asarray(scene.raw_picture(slopes, calibration), np.float64)
+    return np.asarray(scene.raw_image(slopes, calibration), np.float64)
 
 
 class SceneCamera:
@@ -41,13 +41,13 @@ class SceneCamera:
     def __init__(self, calibration: Calibration) -> None:
         self._calibration = calibration
         self._lock = threading.Lock()
-        self._light = picture(calibration, None)
+        self._light = image(calibration, None)
         self._number = 0
         self.shaking = self.cropped = False
 
     def press(self, place_mm: tuple[float, float] | None) -> None:
         """Press at a point from the next frame on. None: lift."""
-        light = picture(self._calibration, place_mm)
+        light = image(self._calibration, place_mm)
         with self._lock:
             self._light = light
 

@@ -319,7 +319,7 @@ def test_a_section_is_shown_where_its_width_was_read_and_the_tools_in_the_other_
     assert not press_view.map.panel.grab().isNull() and not press_view.details.plot.grab().isNull()
 
     press_view.details.open_at(press_view.details.camera)
-    assert press_view.details.camera.picture_size == (320, 240)
+    assert press_view.details.camera.image_size == (320, 240)
     press_view.details.open_at(press_view.details.surface)
     qtbot.waitUntil(lambda: press_view.details.surface.view is not None, timeout=PATIENCE_MS)
     view = press_view.details.surface.view

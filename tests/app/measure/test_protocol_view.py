@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scene
-from protocol_camera import SceneCamera, picture
+from protocol_camera import SceneCamera, image
 from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -33,7 +33,7 @@ WAIT_MS = 60_000
 
 
 def frame(place_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
-    light = picture(scene.calibration(), place_mm)
+    light = image(scene.calibration(), place_mm)
     noise = np.random.default_rng(seed).standard_normal(light.shape)
     return np.clip(np.rint(255.0 * light + noise), 0, 255).astype(np.uint8)
 

@@ -61,7 +61,7 @@ def test_the_error_of_a_job_is_released_after_it_is_reported(qtbot: QtBot) -> No
     def fail(_tell: Tell) -> None:
         heavy = Heavy()
         found.append(weakref.ref(heavy))
-        raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+        raise InputError("the image is grey", where="a.png", advice="Take it in colour")
 
     with qtbot.waitSignal(jobs.refused):
         jobs.submit(Job("look", fail))
@@ -73,12 +73,12 @@ def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:
     jobs, done = Jobs("jobs"), list[Any]()
 
     def refuse(_tell: Tell) -> None:
-        raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+        raise InputError("the image is grey", where="a.png", advice="Take it in colour")
 
     with qtbot.waitSignal(jobs.refused) as told:
         jobs.submit(Job("look", refuse))
         jobs.submit(Job("count", lambda _tell: 1, done.append))
-    assert "the picture is grey" in told.args[0]
+    assert "the image is grey" in told.args[0]
     qtbot.waitUntil(lambda: done == [1])
     assert jobs.close()
 
@@ -151,7 +151,7 @@ def test_the_caller_is_notified_however_a_job_ends(end: str, qtbot: QtBot) -> No
 
     def work(tell: Tell) -> None:
         if end == "refused":
-            raise InputError("the picture is grey", where="a.png", advice="Take it in colour")
+            raise InputError("the image is grey", where="a.png", advice="Take it in colour")
         if end == "faulty":
             raise ValueError("nobody thought of this")
         assert go.wait(10.0)

@@ -47,7 +47,7 @@ def test_an_internal_error_is_one_sentence_and_the_log_has_the_traceback(
 
 
 def test_an_input_error_is_shown_unchanged(faults: Faults, context: AppContext) -> None:
-    error = InputError("the picture is black", where="mirror_01.png", advice="Switch the LEDs on")
+    error = InputError("the image is black", where="mirror_01.png", advice="Switch the LEDs on")
     sys.excepthook(InputError, error, None)
     assert context.toasts.shown()[0].text == str(error)
 

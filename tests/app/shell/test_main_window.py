@@ -203,7 +203,7 @@ def test_size_and_page_are_remembered(
 def test_the_source_of_the_last_run_is_selected_again(
     context: AppContext, make_window: MakeWindow, tmp_path: Path, qtbot: QtBot
 ) -> None:
-    folder = tmp_path / "pictures"
+    folder = tmp_path / "snapshots"
     folder.mkdir()
     window = make_window()
     context.source.choose_folder(folder)

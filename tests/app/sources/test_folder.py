@@ -40,7 +40,7 @@ def folder(tmp_path: Path) -> Path:
     """Return a folder with three images and another file."""
     for number, name in enumerate(["a.png", "b.TIFF", "c.png"]):
         write(tmp_path / name, image(number))
-    (tmp_path / "notes.txt").write_text("not a picture")
+    (tmp_path / "notes.txt").write_text("not an image")
     return tmp_path
 
 

@@ -90,12 +90,12 @@ def test_a_result_of_a_function_that_was_replaced_meanwhile_is_dropped(line: Lin
 
 def test_an_input_error_is_reported_and_the_thread_continues(line: Line) -> None:
     def refuse(item: Frame) -> int:
-        raise InputError("it is dark", where="picture", advice="Switch the LEDs on")
+        raise InputError("it is dark", where="image", advice="Switch the LEDs on")
 
     line.processor.replace(refuse)
     item = line.result(0)
     assert isinstance(item, Failure)
-    assert item.sentence == "picture: it is dark. Switch the LEDs on."
+    assert item.sentence == "image: it is dark. Switch the LEDs on."
     line.processor.replace(number_of)
     assert isinstance(line.result(1), Outcome)
 

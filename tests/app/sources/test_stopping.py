@@ -24,19 +24,19 @@ from app.sources.processor import Processor
 from app.sources.source import Frame
 import cv2
 
-picture = np.zeros((300, 400, 3), np.uint8)
+image = np.zeros((300, 400, 3), np.uint8)
 inbox = Mailbox()
 
 def work(_):
     end = time.monotonic() + 4.0
     while time.monotonic() < end:
-        cv2.fastNlMeansDenoisingColored(picture)
+        cv2.fastNlMeansDenoisingColored(image)
 
 processor = Processor(inbox, work, Mailbox())
 
 def end_while_it_works(window):
     processor.start()
-    inbox.put(Frame(picture, 0, 0.0))
+    inbox.put(Frame(image, 0, 0.0))
     def close():
         began = time.monotonic()
         processor.stop()

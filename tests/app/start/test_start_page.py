@@ -56,7 +56,7 @@ def test_the_session_that_is_not_finished_is_continued_at_its_step(
     page.enter()
     assert page.go_on.isVisible()
     assert "S-1" in words(page.go_on) and "next: Lights" in words(page.go_on)
-    assert page.go_on._picture.pixmap().width() > 40  # the newest image, not the sign
+    assert page.go_on._image.pixmap().width() > 40  # the newest image, not the sign
     with qtbot.waitSignal(context.requests.session) as asked:
         page.go_on.click()
     assert asked.args == [str(folder)]
@@ -105,4 +105,4 @@ def test_a_damaged_image_leaves_the_sign(page: StartPage, context: AppContext) -
     assert read_session_entry(folder).newest is not None
     page.enter()
     assert page.go_on.isVisible()
-    assert page.go_on._picture.pixmap().width() < 40
+    assert page.go_on._image.pixmap().width() < 40

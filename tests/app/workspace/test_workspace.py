@@ -284,8 +284,8 @@ def test_sessions_are_listed_by_sensor_the_last_changed_first(workspace: Workspa
     for number, (serial, name) in enumerate((("B-1", "old"), ("B-1", "new"), ("A-1", "x"))):
         folder = workspace.sessions_folder(serial) / name
         (folder / "mirror").mkdir(parents=True)
-        for picture in range(number):
-            (folder / "mirror" / f"{picture}.png").write_bytes(b"")
+        for image in range(number):
+            (folder / "mirror" / f"{image}.png").write_bytes(b"")
         (folder / "mirror" / ".half.png").write_bytes(b"")
         (folder / "session.toml").write_text(f'[sensor]\nserial = "{serial}"\n')
         for path in (folder / "session.toml", folder / "mirror"):

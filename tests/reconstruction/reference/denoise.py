@@ -1,9 +1,9 @@
 """Plain NumPy oracle of the denoising: quiet the even parts, leave the edges alone.
 
-A normal is not a linear function of the picture: near an LED's mirror image a channel hardly
+A normal is not a linear function of the image: near an LED's mirror image a channel hardly
 changes with the slope, and noise there tilts the surface to one side instead of both. Averaging a
 few pixels before the solve takes that away; on walls and edges, where averaging would cost
-sharpness and the signal is strong, the picture is used as it is.
+sharpness and the signal is strong, the image is used as it is.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def quiet_even_parts(
 
     Press and background are averaged alike, so that neither the fall of the light nor a speck of
     the membrane shows in their ratio. Where little light leaves more noise than `CALM`, wider
-    averages are taken, as far as the picture is even over them.
+    averages are taken, as far as the image is even over them.
 
     Parameters
     ----------

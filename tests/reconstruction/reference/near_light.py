@@ -58,7 +58,7 @@ class ShadedField:
 
 @dataclass(frozen=True, slots=True)
 class RaySlopes:
-    """Slopes along the picture's rays, as the ray-true integration wants them.
+    """Slopes along the image's rays, as the ray-true integration wants them.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ def solve_near_light(
     Parameters
     ----------
     field : ShadedField
-        The picture on the grid.
+        The image on the grid.
     depth_mm : (rows, columns) float32
         Present depth at each node's ray.
     led_positions_mm : (3, 3)

@@ -19,7 +19,7 @@ STEEPEST_NZ = 0.15
 LEAST_ALONG_RAY = 0.1
 ONE_DARK_WEIGHT = 0.5
 UNSOLVED_WEIGHT = 0.01
-# What the model does not explain of press over background; it, not noise, limits a good picture.
+# What the model does not explain of press over background; it, not noise, limits a good image.
 MODEL_ERROR = 0.03
 
 _compiled = numba.njit(cache=True, nogil=True, fastmath={"nsz", "arcp", "contract"})

@@ -11,7 +11,7 @@ from app.calibrate.reflectance import lut_model as model
 from app.calibrate.reflectance.lut_effect import ball_effect
 from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
 
 
@@ -23,7 +23,7 @@ def test_an_unedited_table_gives_the_papers_depth_of_the_ball(
     press = virtual_run.reflectance.presses[0]
     found = effect(model.start_edit(virtual_run.reflectance.table), press.name)
     paper = Reconstructor(virtual_run.calibration, model="paper")
-    depth = paper.depth(read_picture(session.folder / press.name).rgb).depth_mm
+    depth = paper.depth(read_image(session.folder / press.name).rgb).depth_mm
     assert found.profile_mm.max() == pytest.approx(float(depth.max()), rel=0.01)
     # The paper's model is within a few percent of the ball that it was calibrated with.
     assert abs(found.lowest_mm) < 0.1 * press.pose.depth_mm

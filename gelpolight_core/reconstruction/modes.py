@@ -1,4 +1,4 @@
-"""How true each way to reconstruct was found to be, for people who choose between them."""
+"""The modes of reconstruction, and how accurate each was found to be."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ PAPER, FULL, IN_PLACE = "paper", "full", "in-place"
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
-    """A way from picture to depth.
+class Mode:
+    """A model and its effort, from image to depth.
 
     Attributes
     ----------
@@ -54,19 +54,19 @@ class FoundError:
     size_percent: float
 
 
-WAYS = (*(Way(FULL, effort) for effort in EFFORTS), Way(PAPER, "best"))
-"""All ways, the quickest of the full model first."""
+MODES = (*(Mode(FULL, effort) for effort in EFFORTS), Mode(PAPER, "best"))
+"""All modes, the quickest of the full model first."""
 
-CLOSED_WAYS = (Way(IN_PLACE, "best"),)
-"""The ways for a closed sensor."""
+CLOSED_MODES = (Mode(IN_PLACE, "best"),)
+"""The modes for a closed sensor."""
 
-FOUND: Mapping[Way, FoundError] = MappingProxyType(
+FOUND: Mapping[Mode, FoundError] = MappingProxyType(
     {
-        Way(FULL, "fast"): FoundError(0.70, 0.41),
-        Way(FULL, "balanced"): FoundError(0.39, 0.22),
-        Way(FULL, "best"): FoundError(0.38, 0.15),
-        Way(PAPER, "best"): FoundError(2.0, 2.6),
+        Mode(FULL, "fast"): FoundError(0.70, 0.41),
+        Mode(FULL, "balanced"): FoundError(0.39, 0.22),
+        Mode(FULL, "best"): FoundError(0.38, 0.15),
+        Mode(PAPER, "best"): FoundError(2.0, 2.6),
     }
 )
 """On a matt sensor rendered at 50 dB by a path tracer that is not ours, calibrated from its
-pictures alone: eight presses, 3 to 7 mm wide and 0.5 to 1.5 mm deep."""
+images alone: eight presses, 3 to 7 mm wide and 0.5 to 1.5 mm deep."""

@@ -1,4 +1,4 @@
-"""Extreme pictures: values that no camera should give, and all that the file formats allow."""
+"""Extreme images: values that no camera should give, and all that the file formats allow."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from gelpolight_core.simulation.indenters import Ball
 from gelpolight_core.translation import tr
 
 Map = NDArray[np.float32]
-SUBJECT = "pictures"
+SUBJECT = "images"
 BAD_PIXELS = 40
 SPOILT_UM = 8.0
 """Of 40 bad pixels, a twentieth of a per cent, on a press of 1 mm."""
@@ -42,12 +42,12 @@ BESIDE_UM = 2.0
 HIDDEN_MM = 1.0
 
 
-def picture_cases() -> tuple[Case, ...]:
-    """Return the cases on pictures."""
+def image_cases() -> tuple[Case, ...]:
+    """Return the cases on images."""
     return (
         *_bad_pixels(),
         *_missing_channels(),
-        *_whole_pictures(),
+        *_whole_images(),
         *_other_light(),
         *_kinds(),
         *_contacts(),
@@ -122,14 +122,14 @@ def _with_patch(value: float, channels: tuple[int, ...], flag: Flag | None) -> S
     return judged(known, press, bound, frame=frame, spare=wider, needs=needs)
 
 
-def _whole_pictures() -> list[Case]:
+def _whole_images() -> list[Case]:
     def like(make: Callable[[Map], NDArray[Any]]) -> Callable[[], Seen]:
         return lambda: _not_of_this_sensor(make(standard_press().frame))
 
     required = tr("finite, and the map says that it is not to be trusted")
     cases: list[tuple[str, str, Callable[[Map], NDArray[Any]]]] = [
-        ("all_black", tr("an all black picture"), np.zeros_like),
-        ("all_white", tr("an all white picture"), np.ones_like),
+        ("all_black", tr("an all black image"), np.zeros_like),
+        ("all_white", tr("an all white image"), np.ones_like),
         ("all_grey", tr("every pixel 0.5"), lambda f: np.full_like(f, 0.5)),
         ("all_dim", tr("every pixel 0.1"), lambda f: np.full_like(f, 0.1)),
         ("all_nan", tr("no pixel a number"), lambda f: np.full_like(f, np.nan)),
@@ -139,7 +139,7 @@ def _whole_pictures() -> list[Case]:
         ("doubled", tr("twice the exposure"), lambda f: f * np.float32(2.0)),
         ("halved", tr("half the exposure"), lambda f: f * np.float32(0.5)),
         ("blue_first", tr("blue and red exchanged"), lambda f: f[..., ::-1]),
-        ("upside_down", tr("the picture upside down"), lambda f: f[::-1]),
+        ("upside_down", tr("the image upside down"), lambda f: f[::-1]),
         ("noise", tr("nothing but noise"), _noise),
         ("scale_255", tr("floats of 0..255 in place of 0..1"), lambda f: f * np.float32(255.0)),
         ("twelve_bit", tr("12 bits in a 16 bit file"), lambda f: (f * 4095.0).astype(np.uint16)),
@@ -215,7 +215,7 @@ def _kinds() -> list[Case]:
         "turned_in_memory": lambda f: np.asfortranarray(f),
         "read_only": _read_only,
     }
-    label = tr("a picture as {kind}")
+    label = tr("an image as {kind}")
     return [
         _case(
             f"kind_{kind}", label.format(kind=kind.replace("_", " ")), required, partial(_as, make)

@@ -14,7 +14,7 @@ FloatArray = NDArray[np.floating]
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class LinearImage:
     """One image of a stage.
 
     Attributes
@@ -45,7 +45,7 @@ class Picture:
 
 def linear_image(
     rgb: NDArray[Any], name: str, *, response: CameraResponse | None = None, grey: bool = False
-) -> Picture:
+) -> LinearImage:
     """Convert a camera's values to linear light 0..1.
 
     Parameters
@@ -66,4 +66,4 @@ def linear_image(
         if response is None
         else response.linearise(values)
     )
-    return Picture(name, light, bit_depth=8 * values.dtype.itemsize, grey=grey)
+    return LinearImage(name, light, bit_depth=8 * values.dtype.itemsize, grey=grey)

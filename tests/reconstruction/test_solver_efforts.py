@@ -21,7 +21,7 @@ from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.reflectance.membrane import CURVE_NODES
 from gelpolight_core.sensor_calibration import Calibration
-from gelpolight_core.session.images import read_picture
+from gelpolight_core.session.images import read_image
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 from gelpolight_core.simulation.indenters import press as pressed
 from gelpolight_core.simulation.virtual_sensor import (
@@ -56,7 +56,7 @@ def balanced(virtual_calibration: Calibration) -> Reconstructor:
 
 @pytest.fixture(scope="module")
 def frame(virtual_session: Path) -> Frame:
-    return as_camera(read_picture(virtual_session / "presses" / f"{PRESS}.png").rgb)
+    return as_camera(read_image(virtual_session / "presses" / f"{PRESS}.png").rgb)
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
@@ -93,9 +93,9 @@ def test_the_region_of_a_contact_changes_the_depth_by_micrometres(
 ) -> None:
     indenter = Ball(3.0, depth_mm) if round_end else Cylinder(3.0, depth_mm)
     surface = pressed(indenter, x_mm=centre_mm[0], y_mm=centre_mm[1])
-    picture = shown(PressedMembrane(surface))
+    image = shown(PressedMembrane(surface))
     region, whole = (
-        balanced.near_light.depth(picture, effort=effort, normals=False, everywhere=e)
+        balanced.near_light.depth(image, effort=effort, normals=False, everywhere=e)
         for e in (False, True)
     )
     assert region.depth_mm.max() > 0.5 * depth_mm
@@ -110,12 +110,12 @@ def test_one_round_is_enough_for_a_shallow_press(
     balanced: Reconstructor, shown: Callable[[State], Frame], depth_mm: float
 ) -> None:
     surface = pressed(Cylinder(3.0, depth_mm), x_mm=1.0, y_mm=-2.0)
-    picture = shown(PressedMembrane(surface))
-    once = balanced.depth(picture)
+    image = shown(PressedMembrane(surface))
+    once = balanced.depth(image)
     assert once.depth_mm.max() > 0.5 * depth_mm
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(balanced.near_light, "_settings", ALWAYS_TWO_ROUNDS)
-        twice = balanced.depth(picture)
+        twice = balanced.depth(image)
     assert np.abs(once.depth_mm - twice.depth_mm).max() < 1e-3
 
 
@@ -155,10 +155,10 @@ def test_half_scale_is_near_to_the_best(
     virtual_session: Path,
     virtual_calibration: Calibration,
 ) -> None:
-    """In a picture of half the size, whose nodes are twice as far apart as a camera's."""
-    picture = as_camera(read_picture(virtual_session / "presses" / f"{name}.png").rgb)
-    best = Reconstructor(virtual_calibration).depth(picture)
-    planned = balanced.depth(picture)
+    """In an image of half the size, whose nodes are twice as far apart as a camera's."""
+    image = as_camera(read_image(virtual_session / "presses" / f"{name}.png").rgb)
+    best = Reconstructor(virtual_calibration).depth(image)
+    planned = balanced.depth(image)
     off = planned.depth_mm - best.depth_mm
     plateau = best.depth_mm > 0.95 * best.depth_mm.max()
     assert abs(np.median(off[plateau])) < 0.01 * best.depth_mm.max()
@@ -182,8 +182,8 @@ def test_walls_that_light_does_not_decide_are_said_at_every_effort(
 ) -> None:
     """Walls of 57 degrees, and of 84."""
     surface = pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3, decay_mm=decay_mm)
-    picture = shown(PressedMembrane(surface))
-    notes = Reconstructor(virtual_calibration, effort=effort).depth(picture).notes
+    image = shown(PressedMembrane(surface))
+    notes = Reconstructor(virtual_calibration, effort=effort).depth(image).notes
     assert any("steep walls" in note for note in notes) is said
 
 
@@ -217,8 +217,8 @@ def test_what_a_frame_needs_is_known_without_reconstructing_it(
     model: str, frame: Frame, shown: Callable[[State], Frame], virtual_calibration: Calibration
 ) -> None:
     reconstruct = Reconstructor(virtual_calibration, model=model)
-    for picture in (frame, shown(BareMembrane())):
-        needed, found = reconstruct.needs(picture), reconstruct.depth(picture).trace
+    for image in (frame, shown(BareMembrane())):
+        needed, found = reconstruct.needs(image), reconstruct.depth(image).trace
         assert found is not None
         asked = {"normals", "standard deviations", "second near-light round"}
         assert set(needed.done) == set(found.done) - asked
@@ -260,7 +260,7 @@ def test_several_threads_may_ask_at_once(frame: Frame, balanced: Reconstructor) 
         np.testing.assert_array_equal(heightmap.depth_mm, expected)
 
 
-def test_bit_depth_and_float_pictures_give_the_same_depth(
+def test_bit_depth_and_float_images_give_the_same_depth(
     frame: Frame, balanced: Reconstructor
 ) -> None:
     eight = balanced.depth(frame).depth_mm
@@ -279,7 +279,7 @@ def test_what_is_not_finite_is_a_missing_channel(frame: Frame, balanced: Reconst
 
 
 @pytest.mark.parametrize("value", [0, 255])
-def test_an_even_picture_is_survived(value: int, frame: Frame, balanced: Reconstructor) -> None:
+def test_an_even_image_is_survived(value: int, frame: Frame, balanced: Reconstructor) -> None:
     assert np.isfinite(balanced.depth(np.full_like(frame, value)).depth_mm).all()
 
 
@@ -315,8 +315,8 @@ def test_a_press_almost_to_the_lights_stays_finite(
     effort: str, shown: Callable[[State], Frame], virtual_calibration: Calibration
 ) -> None:
     surface = pressed(Ball(8.0, 12.0), x_mm=1.2, y_mm=-0.8)
-    picture = shown(PressedMembrane(surface))
-    found = Reconstructor(virtual_calibration, effort=effort).depth(picture)
+    image = shown(PressedMembrane(surface))
+    found = Reconstructor(virtual_calibration, effort=effort).depth(image)
     assert found.normals is not None
     assert np.isfinite(found.depth_mm).all()
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-4)
