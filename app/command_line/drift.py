@@ -12,7 +12,7 @@ from app.command_line.terminal import say
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.io.user import user_name
-from gelpolight_core.reconstruction.background_shift import background_drift, zeroed
+from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.translation import tr
 
 
@@ -38,16 +38,16 @@ def run(options: argparse.Namespace) -> int:
         refuse_unwritable(path)
     reconstructor = load_reconstructor(options.calibration)
     frame = read_frame(options.image, reconstructor)
-    drift = background_drift(frame, reconstructor.calibration)
-    say("\n".join(quality_lines({tr("background"): drift.quality})))
+    shift = background_shift(frame, reconstructor.calibration)
+    say("\n".join(quality_lines({tr("background"): shift.quality})))
     if options.json:
         content = {
-            "touched": drift.touched,
-            "shift_px": None if drift.shift_px is None else list(drift.shift_px),
-            "brightness_percent": list(drift.brightness_percent),
-            "differs_percent": drift.differs_percent,
-            "verdict": drift.quality.verdict.value,
-            "figures": drift.quality.as_rows(),
+            "touched": shift.touched,
+            "shift_px": None if shift.shift_px is None else list(shift.shift_px),
+            "brightness_percent": list(shift.brightness_percent),
+            "differs_percent": shift.differs_percent,
+            "verdict": shift.quality.verdict.value,
+            "figures": shift.quality.as_rows(),
         }
         write_json(content, options.json)
     if options.zero:

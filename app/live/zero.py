@@ -20,8 +20,8 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.user import user_name
 from gelpolight_core.quality import Verdict
 from gelpolight_core.reconstruction.background_shift import (
-    BackgroundDrift,
-    background_drift,
+    BackgroundShift,
+    background_shift,
     zeroed,
 )
 from gelpolight_core.translation import tr
@@ -40,13 +40,13 @@ class Zeroed:
         The calibration with the present background.
     origin : Path
         The original calibration, which is kept.
-    before : BackgroundDrift
+    before : BackgroundShift
         The image compared with the original background.
     """
 
     path: Path
     origin: Path
-    before: BackgroundDrift
+    before: BackgroundShift
 
 
 class ZeroControl(QObject):
@@ -135,7 +135,7 @@ def zero_calibration(workspace: Workspace, used: Path, frames: Sequence[NDArray[
     """
     origin = original_of(used)
     calibration = read_calibration(origin)
-    before = background_drift(frames[0], calibration)
+    before = background_shift(frames[0], calibration)
     made = datetime.now(UTC).isoformat(timespec="seconds")
     changed = zeroed(calibration, frames, operator=user_name(), made=made)
     path = origin.with_name(f"{origin.stem}{SUFFIX}{ENDING}")

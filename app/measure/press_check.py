@@ -15,7 +15,7 @@ from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.result import Truth
 from gelpolight_core.measurement.steadiness import find_contact
 from gelpolight_core.optics.refraction import membrane_to_camera
-from gelpolight_core.reconstruction.background_shift import background_drift
+from gelpolight_core.reconstruction.background_shift import background_shift
 from gelpolight_core.reconstruction.in_place.calibration import AnyCalibration, InPlaceCalibration
 from gelpolight_core.translation import tr
 
@@ -212,7 +212,7 @@ def why_not_bare(rgb: NDArray[Any], calibration: AnyCalibration) -> str:
         Of the sensor. Its background is the membrane with nothing on it.
     """
     try:
-        touched = background_drift(rgb, calibration).touched
+        touched = background_shift(rgb, calibration).touched
     except InputError as error:
         return str(error)
     if not touched:

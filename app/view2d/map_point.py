@@ -114,8 +114,8 @@ class PixelMap:
         if node is None:
             return None
         if depth_mm is not None:
-            drift = self._table.drift[node] * depth_mm[node] / grid.pitch_mm
-            node = self._inside(row - float(drift[1]), column - float(drift[0])) or node
+            ray_slope = self._table.ray_slope[node] * depth_mm[node] / grid.pitch_mm
+            node = self._inside(row - float(ray_slope[1]), column - float(ray_slope[0])) or node
         if not self._table.valid[node]:
             return None
         return float(self._table.u_px[node]), float(self._table.v_px[node])
@@ -141,7 +141,7 @@ class PixelMap:
         grid = self._table.grid
         point = np.array([grid.x_mm[node[1]], grid.y_mm[node[0]]])
         if depth_mm is not None:
-            point = point + self._table.drift[node] * depth_mm[node]
+            point = point + self._table.ray_slope[node] * depth_mm[node]
         return float(point[0]), float(point[1])
 
     def _inside(self, row: float, column: float) -> tuple[int, int] | None:

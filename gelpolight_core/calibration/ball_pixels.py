@@ -30,7 +30,7 @@ class BallPixels:
 
     Attributes
     ----------
-    points_mm, drift, view : (N, 2), (N, 2), (N, 3)
+    points_mm, ray_slope, view : (N, 2), (N, 2), (N, 3)
         Camera rays (point and ray slope), and unit directions back to the camera.
     ratio, weight, around : (N, 3)
         Press over background, 1 / its standard deviation, and its average in the neighbourhood.
@@ -39,7 +39,7 @@ class BallPixels:
     """
 
     points_mm: Array
-    drift: Array
+    ray_slope: Array
     view: Array
     ratio: Array
     weight: Array
@@ -75,7 +75,7 @@ def gather_ball_pixels(
     ratio = np.asarray(image / base, np.float32)
     around = neighbourhood(ratio, usable, grid.pitch_mm, BOUNCE_REACH_MM)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
-    centre = press.seen_centre_mm(table.drift[row, column].astype(np.float64))
+    centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
     contact = press.contact_radius_mm
     random = np.random.default_rng(0)
@@ -93,11 +93,11 @@ def gather_ball_pixels(
     below = base[rows, columns].astype(np.float64)
     known = (value > LEAST_VALUE) & (value < SATURATED) & (background[rows, columns] > LEAST_VALUE)
     sd = np.hypot(np.hypot(noise / np.sqrt(2.0), MODEL_ERROR * value) / below, MODEL_ERROR)
-    drift = table.drift[rows, columns].astype(np.float64)
+    ray_slope = table.ray_slope[rows, columns].astype(np.float64)
     return BallPixels(
         np.stack([grid.x_mm[columns], grid.y_mm[rows]], axis=-1),
-        drift,
-        view_directions(drift),
+        ray_slope,
+        view_directions(ray_slope),
         value / below,
         np.where(known, np.concatenate(trust) / sd, 0.0),
         around[rows, columns].astype(np.float64),
@@ -113,7 +113,7 @@ def thinned(pixels: BallPixels) -> BallPixels:
 
     return BallPixels(
         half(pixels.points_mm),
-        half(pixels.drift),
+        half(pixels.ray_slope),
         half(pixels.view),
         half(pixels.ratio),
         half(pixels.weight),

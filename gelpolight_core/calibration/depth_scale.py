@@ -178,11 +178,11 @@ def synthetic_press(
     stride = max(min(table.grid.shape) // NODES, 1)
     grid, cut = table.grid, np.s_[::stride, ::stride]
     x, y = grid.x_mm[::stride], grid.y_mm[::stride]
-    drift, usable = table.drift[cut], table.valid[cut]
+    ray_slope, usable = table.ray_slope[cut], table.valid[cut]
     width = min(np.ptp(x), np.ptp(y))
     radius, height = PLATEAU_SHARE * width, HEIGHT_SHARE * width
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    rays = drift.reshape(-1, 2).astype(np.float64)
+    rays = ray_slope.reshape(-1, 2).astype(np.float64)
     centre = np.array([x.mean(), y.mean()])
     depth = np.zeros(len(points))
     for _ in range(12):  # damped: a ray's slope against the drape stays below 1
@@ -201,7 +201,7 @@ def synthetic_press(
     planes = [np.ascontiguousarray(np.moveaxis(m, -1, 0)) for m in (ratio, around)]
     noise = np.full_like(planes[0], NOISE)
     image = RatioImage(planes[0], noise, planes[1], np.zeros(shape, np.uint8))
-    field = SyntheticPress(image, x, y, np.moveaxis(drift, -1, 0), usable)
+    field = SyntheticPress(image, x, y, np.moveaxis(ray_slope, -1, 0), usable)
     return field, depth.reshape(shape).astype(np.float32), (r < radius).reshape(shape) & usable
 
 

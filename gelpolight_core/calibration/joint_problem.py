@@ -93,7 +93,9 @@ class Problem:
             self.presses, x[COMMON : self.balls_end].reshape(-1, 3), strict=True
         ):
             pose = BallPose((float(ball[0]), float(ball[1])), pixels.radius_mm, float(ball[2]))
-            seen.append(draped_ball(pixels.points_mm, pixels.drift, pose, decay_mm=float(x[DECAY])))
+            seen.append(
+                draped_ball(pixels.points_mm, pixels.ray_slope, pose, decay_mm=float(x[DECAY]))
+            )
         return seen
 
     def _press(self, x: Array, index: int, seen: Surface) -> tuple[Array, Array, Array, Array]:

@@ -197,7 +197,7 @@ def membrane_reflectance(calibration: Calibration, full: FullModel) -> float:
     points = np.stack([x, y, np.zeros_like(x)], axis=-1)[usable]
     light, _ = light_directions(full.led_positions_mm, points)
     cosine = -light[..., 2]
-    view = view_directions(calibration.table.drift[thin][usable].astype(np.float64))
+    view = view_directions(calibration.table.ray_slope[thin][usable].astype(np.float64))
     up = np.broadcast_to([0.0, 0.0, -1.0], view.shape)
     raw = (calibration.radiance[thin][usable] * cosine).astype(np.float32)
     board = unmix(raw, calibration.crosstalk)

@@ -168,7 +168,7 @@ def camera_to_membrane(
     -------
     points_mm : (..., 2)
         Points (x, y) where the rays meet the top surface, sensor frame; NaN for rays that never do.
-    drift : (..., 2)
+    ray_slope : (..., 2)
         Ray slope: lateral shift (x, y) of the visible surface point per mm of indentation depth; it
         points towards the foot of the perpendicular.
     """

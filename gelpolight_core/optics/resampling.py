@@ -75,7 +75,7 @@ class ResamplingTable:
         Raw pixel coordinates; -1 for nodes that are not visible.
     valid : (rows, columns) bool
         Visible to the camera and inside the working circle.
-    drift : (rows, columns, 2) float32
+    ray_slope : (rows, columns, 2) float32
         Ray slope: lateral shift (x, y) of the visible surface point per mm of depth.
     """
 
@@ -83,7 +83,7 @@ class ResamplingTable:
     u_px: NDArray[np.float32]
     v_px: NDArray[np.float32]
     valid: NDArray[np.bool_]
-    drift: NDArray[np.float32]
+    ray_slope: NDArray[np.float32]
 
     def apply(self, rgb: NDArray[np.float32]) -> NDArray[np.float32]:
         """Resample a raw image (height, width[, 3]) onto the grid, bilinear; 0 outside."""
@@ -138,14 +138,14 @@ def build_resampling_table(
             & (pixels[..., 0] <= camera.width - 1)
             & (pixels[..., 1] <= camera.height - 1)
         )
-        _, drift = camera_to_membrane(directions, plane, stack)
+        _, ray_slope = camera_to_membrane(directions, plane, stack)
         seen = np.where(inside[..., None], pixels, -1.0)
-        return seen.astype(np.float32), inside, drift.astype(np.float32)
+        return seen.astype(np.float32), inside, ray_slope.astype(np.float32)
 
     steepest = BEFORE_FOLD * camera.fold
     # Fixed block size, independent of the number of threads, so that the table is always the same.
     blocks = [slice(first, first + BLOCK_ROWS) for first in range(0, grid.shape[0], BLOCK_ROWS)]
-    pixels, inside, drift = (
+    pixels, inside, ray_slope = (
         np.concatenate(parts) for parts in zip(*in_parallel(seen_from, blocks), strict=True)
     )
     return ResamplingTable(
@@ -153,7 +153,7 @@ def build_resampling_table(
         np.ascontiguousarray(pixels[..., 0]),
         np.ascontiguousarray(pixels[..., 1]),
         inside & in_circle,
-        drift,
+        ray_slope,
     )
 
 

@@ -32,8 +32,8 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 
 TOUCHED_SHARE = 0.08
-"""A contact changes the light of its walls by tens of percent; what drifts is even over lengths
-like the field's."""
+"""A contact changes the light of its walls by tens of percent; a shift of the background is even
+over the field."""
 TOUCHED_AREA_MM2 = 0.3
 """Less area is a speck that came or went."""
 QUIET_MM = 0.25
@@ -45,7 +45,7 @@ DIFFERS = 0.03
 
 
 @dataclass(frozen=True, slots=True)
-class BackgroundDrift:
+class BackgroundShift:
     """How far an untouched image is from the calibration's background.
 
     Attributes
@@ -58,7 +58,7 @@ class BackgroundDrift:
     differs_percent : float
         Share of the field where a channel differs by more than 3 %.
     touched : bool
-        Something is pressed, so that nothing can be said of drift.
+        Something is pressed, so the shift is not known.
     quality : QualityTable
         The same as judged figures with advice; fails when touched.
     """
@@ -70,7 +70,7 @@ class BackgroundDrift:
     quality: QualityTable
 
 
-def background_drift(frame: NDArray[Any], calibration: AnyCalibration) -> BackgroundDrift:
+def background_shift(frame: NDArray[Any], calibration: AnyCalibration) -> BackgroundShift:
     """Compare an image of the untouched sensor with the calibration's background.
 
     Parameters
@@ -109,7 +109,7 @@ def background_drift(frame: NDArray[Any], calibration: AnyCalibration) -> Backgr
     shift = None if touched else texture_shift_px(seen, base, usable, calibration.table)
     brightness = (float(change[0]), float(change[1]), float(change[2]))
     quality = _judge(shift, brightness, differs, touched)
-    return BackgroundDrift(shift, brightness, differs, touched, quality)
+    return BackgroundShift(shift, brightness, differs, touched, quality)
 
 
 def zeroed(
@@ -127,7 +127,7 @@ def zeroed(
     calibration : Calibration
         To be changed; the result is another.
     frames : sequence of (height, width, 3)
-        Images of the untouched sensor, to be averaged; as for :func:`background_drift`.
+        Images of the untouched sensor, to be averaged; as for :func:`background_shift`.
     operator : str
         Who did it.
     made : str
@@ -146,7 +146,7 @@ def zeroed(
             advice=tr("Take one, with nothing on the sensor"),
         )
     for frame in frames:
-        _refuse_unfit(background_drift(frame, calibration))
+        _refuse_unfit(background_shift(frame, calibration))
     present = _on_grid(frames, calibration)
     edit = HandEdit("background", CHANNEL_KEYS, made, operator)
     provenance = replace(calibration.provenance, edits=(*calibration.provenance.edits, edit))
@@ -272,14 +272,14 @@ def _judge(
     return QualityTable(tuple(figures))
 
 
-def _refuse_unfit(drift: BackgroundDrift) -> None:
+def _refuse_unfit(shift: BackgroundShift) -> None:
     """Refuse to take an image for the background that is none, or that zero cannot mend."""
     for key in ("drift_touched", "drift_shift_px"):
-        figures = [f for f in drift.quality.figures if f.key == key]
+        figures = [f for f in shift.quality.figures if f.key == key]
         if figures and figures[0].verdict is Verdict.FAIL:
             found = (
                 tr("something is pressed into the membrane")
-                if drift.touched
+                if shift.touched
                 else tr("the membrane has moved by {px:.1f} px").format(px=figures[0].value)
             )
             raise InputError(found, where=tr("zero"), advice=figures[0].advice)

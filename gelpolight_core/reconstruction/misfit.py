@@ -112,14 +112,14 @@ def _image_misfit(
     """Return the full model's misfit at the nodes `thin`; 0 where no channel is of use."""
     assert heightmap.normals is not None
     table, depth = calibration.table, heightmap.depth_mm[thin].astype(np.float64)
-    drift = table.drift[thin].astype(np.float64)
+    ray_slope = table.ray_slope[thin].astype(np.float64)
     x, y = (g[thin].astype(np.float64) for g in np.meshgrid(heightmap.x_mm, heightmap.y_mm))
     # The surface is seen where its ray crosses the flat membrane.
     index = [
         (part - offset * depth - first) / heightmap.pitch_mm
         for part, offset, first in (
-            (x, drift[..., 0], float(heightmap.x_mm[0])),
-            (y, drift[..., 1], float(heightmap.y_mm[0])),
+            (x, ray_slope[..., 0], float(heightmap.x_mm[0])),
+            (y, ray_slope[..., 1], float(heightmap.y_mm[0])),
         )
     ]
     column, row = (np.asarray(part, np.float32) for part in index)
@@ -132,7 +132,7 @@ def _image_misfit(
     pitch = heightmap.pitch_mm * (thin[0].step or 1)
     around = neighbourhood(ratio, inside, pitch, full.membrane.bounce_reach_mm)
     normals = heightmap.normals[thin].astype(np.float64)
-    explained = direct_light(full, np.stack([x, y], axis=-1), depth, normals, drift)
+    explained = direct_light(full, np.stack([x, y], axis=-1), depth, normals, ray_slope)
     bounced = full.membrane.bounce * around * bounce_weight(normals)[..., None]
     left = np.where(of_use, ratio - explained - bounced, 0.0)
     count = np.maximum(of_use.sum(axis=-1), 1)
@@ -140,7 +140,7 @@ def _image_misfit(
 
 
 def direct_light(
-    full: FullModel, places_mm: Array, depth_mm: Array, normals: Array, drift: Array
+    full: FullModel, places_mm: Array, depth_mm: Array, normals: Array, ray_slope: Array
 ) -> Array:
     """Return the direct brightness (..., 3) over the flat membrane's (PHYSICS, shading).
 
@@ -154,18 +154,20 @@ def direct_light(
         How deep.
     normals : (..., 3)
         Its unit normals.
-    drift : (..., 2)
+    ray_slope : (..., 2)
         Sideways move of the ray per mm of depth.
     """
     shape = depth_mm.shape
     there = np.concatenate([places_mm, -depth_mm[..., None]], axis=-1).reshape(-1, 1, 3)
-    flat = np.concatenate([places_mm - drift * depth_mm[..., None], 0.0 * depth_mm[..., None]], -1)
+    flat = np.concatenate(
+        [places_mm - ray_slope * depth_mm[..., None], 0.0 * depth_mm[..., None]], -1
+    )
     to_led = full.led_positions_mm - there
     from_flat = full.led_positions_mm - flat.reshape(-1, 1, 3)
     far, far_flat = (np.linalg.norm(a, axis=-1) for a in (to_led, from_flat))
     light, light_flat = to_led / far[..., None], from_flat / far_flat[..., None]
     gain = light[..., 2] / light_flat[..., 2] * (far_flat / far) ** 2
-    view = view_directions(drift.reshape(-1, 2))
+    view = view_directions(ray_slope.reshape(-1, 2))
     level = np.broadcast_to([0.0, 0.0, -1.0], view.shape)
     bright = full.membrane.response(light, normals.reshape(-1, 3), view)
     bright_flat = np.maximum(full.membrane.response(light_flat, level, view), 1e-9)

@@ -70,14 +70,14 @@ def contact_radius_from_depth(
     return float(brentq(excess, 1e-6 * radius_mm, limit))
 
 
-def ball_surface(points_mm: Array, drift: Array, pose: BallPose) -> tuple[Array, Array]:
+def ball_surface(points_mm: Array, ray_slope: Array, pose: BallPose) -> tuple[Array, Array]:
     """Intersect the camera's rays with the ball.
 
     Parameters
     ----------
     points_mm : (..., 2)
         Where the rays meet the undeformed top surface.
-    drift : (..., 2)
+    ray_slope : (..., 2)
         Sideways move of the ray per mm of depth.
     pose : BallPose
         The ball.
@@ -91,7 +91,7 @@ def ball_surface(points_mm: Array, drift: Array, pose: BallPose) -> tuple[Array,
     """
     centre = np.array([*pose.centre_mm, pose.radius_mm - pose.depth_mm])
     start = np.concatenate([points_mm, np.zeros_like(points_mm[..., :1])], axis=-1) - centre
-    along = np.concatenate([drift, np.full_like(drift[..., :1], -1.0)], axis=-1)
+    along = np.concatenate([ray_slope, np.full_like(ray_slope[..., :1], -1.0)], axis=-1)
     a = (along**2).sum(-1)
     b = (start * along).sum(-1)
     c = (start**2).sum(-1) - pose.radius_mm**2
@@ -108,7 +108,7 @@ class ShadedPixels:
 
     Attributes
     ----------
-    points_mm, drift : (N, 2)
+    points_mm, ray_slope : (N, 2)
         Rays, as for :func:`ball_surface`.
     ratio : (N, 3)
         Press over background: radiance and reflectance factor cancel.
@@ -117,7 +117,7 @@ class ShadedPixels:
     """
 
     points_mm: Array
-    drift: Array
+    ray_slope: Array
     ratio: Array
     weight: Array
 
@@ -152,7 +152,9 @@ def refine_centre(
     """
     flat = np.concatenate([pixels.points_mm, np.zeros_like(pixels.points_mm[..., :1])], axis=-1)
     flat_light, flat_distance = light_directions(led_positions_mm, flat)
-    view = np.concatenate([pixels.drift, np.full_like(pixels.drift[..., :1], -1.0)], axis=-1)
+    view = np.concatenate(
+        [pixels.ray_slope, np.full_like(pixels.ray_slope[..., :1], -1.0)], axis=-1
+    )
     view /= np.linalg.norm(view, axis=-1, keepdims=True)
     up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
     weight = pixels.weight
@@ -161,7 +163,7 @@ def refine_centre(
         pose = BallPose(
             (float(parameters[0]), float(parameters[1])), start.radius_mm, start.depth_mm
         )
-        surface, normals = ball_surface(pixels.points_mm, pixels.drift, pose)
+        surface, normals = ball_surface(pixels.points_mm, pixels.ray_slope, pose)
         light, distance = light_directions(led_positions_mm, surface)
         gain = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
         lit = _blend(light, normals, view, parameters[2:])

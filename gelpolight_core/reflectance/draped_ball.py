@@ -13,7 +13,7 @@ ROUNDS = 6
 
 
 def draped_ball(
-    points_mm: Array, drift: Array, pose: BallPose, *, decay_mm: float
+    points_mm: Array, ray_slope: Array, pose: BallPose, *, decay_mm: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return what each ray sees of a pressed ball and of the drape around it.
 
@@ -22,7 +22,7 @@ def draped_ball(
 
     Parameters
     ----------
-    points_mm, drift : (N, 2)
+    points_mm, ray_slope : (N, 2)
         Where the rays meet the undeformed top surface, and their sideways move per mm of depth.
     pose : BallPose
         The ball.
@@ -52,10 +52,10 @@ def draped_ball(
         return np.where(r < contact, ball, drape)
 
     depth = np.full(len(points_mm), 0.5 * pose.depth_mm)
-    for _ in range(ROUNDS):  # each round shrinks the error by slope times drift, about a tenth
-        away = points_mm + depth[:, None] * drift - centre
+    for _ in range(ROUNDS):  # each round shrinks the error by slope times ray slope, about a tenth
+        away = points_mm + depth[:, None] * ray_slope - centre
         depth = profile(np.hypot(away[:, 0], away[:, 1]))
-    place = points_mm + depth[:, None] * drift
+    place = points_mm + depth[:, None] * ray_slope
     away = place - centre
     r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     outside, inside = np.maximum(r, contact), np.minimum(r, contact)

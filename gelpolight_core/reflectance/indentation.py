@@ -34,7 +34,7 @@ from gelpolight_core.reflectance.indentation_checks import (
     SMALLEST_RADIUS_PX,
     BallRefusal,
     Reason,
-    check_drift,
+    check_light_change,
     check_order,
     check_round,
     check_shading,
@@ -288,15 +288,15 @@ def _detect(
     circle = contour.circle
     check_visible(circle, area, name)
     far = area & (distance_in_radii(area.shape, circle) > 2.0)
-    drift = change_where(change, background, far)
-    check_drift(drift, name)
+    light_change = change_where(change, background, far)
+    check_light_change(light_change, name)
     _check_one(change, area, covered, shading, name)
     if found_by == "edge":
         check_round(contour, name)
     check_shading(shading, circle, ball_radius_px, hidden, name)
     check_order(image, background, area, circle, name, background_name)
     reaches = reaches_border(region, change.valid_small)
-    found = _result(image, change, contour, region, reaches, drift, found_by)
+    found = _result(image, change, contour, region, reaches, light_change, found_by)
     try:
         check_whole(contour, area, reaches and found_by == "edge", name)
     except BallRefusal as cut:
@@ -435,9 +435,9 @@ def indentation_at(
     contour = Contour(circle, points, 0.0, 1.0, 1.0, PLACED_SD_PX)
     region = np.asarray(change.scaled > DETECTION)
     far = area & (distance_in_radii(area.shape, circle) > 2.0)
-    drift = change_where(change, background, far)
+    light_change = change_where(change, background, far)
     reaches = reaches_border(region, change.valid_small)
-    return _result(press, change, contour, region, reaches, drift, "hand")
+    return _result(press, change, contour, region, reaches, light_change, "hand")
 
 
 def _in_noise_units(change: ScaledDifference) -> Array:
@@ -493,7 +493,7 @@ def _result(
     contour: Contour,
     region: Mask,
     reaches: bool,
-    drift: float,
+    light_change: float,
     found_by: str,
 ) -> Indentation:
     circle = contour.circle
@@ -519,5 +519,5 @@ def _result(
         gain=change.gain,
         signal_to_noise=signal,
         touches_border=reaches,
-        quality=judge_indentation(contour, found_by, signal, change.gain, drift, saturated),
+        quality=judge_indentation(contour, found_by, signal, change.gain, light_change, saturated),
     )

@@ -41,7 +41,7 @@ _ALLOWED_RESIDUAL_PX = 1.5
 _LEAST_COVERAGE = 0.35
 # 12 % of a usual contact are 4 degrees; more is no place to start a refinement from.
 _LARGEST_SD = 0.12
-_LARGEST_DRIFT = 0.1
+_LARGEST_LIGHT_CHANGE = 0.1
 # The inner half of a ball changes as the whole does: 0.9 to 1.6 on all sensors seen. Flat faces
 # give 0.2 and less, domed ones 0.5.
 _LEAST_INNER_CHANGE = 0.7
@@ -376,12 +376,12 @@ def check_order(
         )
 
 
-def check_drift(drift: float, name: str) -> None:
+def check_light_change(light_change: float, name: str) -> None:
     """Refuse images between which the light changed.
 
     Parameters
     ----------
-    drift : float
+    light_change : float
         Relative change far from the contact.
     name : str
         The image's name.
@@ -391,11 +391,11 @@ def check_drift(drift: float, name: str) -> None:
     InputError
         If it is more than a tenth.
     """
-    if drift > _LARGEST_DRIFT:
+    if light_change > _LARGEST_LIGHT_CHANGE:
         raise BallRefusal(
             Reason.LIGHT_CHANGED,
             tr("the light changed by {drift:.0f} % far from the contact").format(
-                drift=100.0 * drift
+                drift=100.0 * light_change
             ),
             where=name,
             advice=tr("Fix exposure and lights, then capture background and press again"),
@@ -426,7 +426,7 @@ def judge_indentation(
     found_by: str,
     signal: float,
     gain: tuple[float, float, float],
-    drift: float,
+    light_change: float,
     saturated: float,
 ) -> QualityTable:
     """Judge the figures of an indentation that was not refused.
@@ -441,7 +441,7 @@ def judge_indentation(
         Root mean square difference inside the contact over the noise of one pixel.
     gain : tuple of 3 floats
         Brightness of the image over the background's, per channel.
-    drift : float
+    light_change : float
         Relative change far from the contact.
     saturated : float
         Share of the contact at the end of the scale.
@@ -486,7 +486,7 @@ def judge_indentation(
             figure("coverage", 100.0 * contour.coverage, "%", 70.0, lowest, middle),
             figure("signal_to_noise", signal, "", 2.0, None, deeper),
             figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
-            figure("drift", 100.0 * drift, "%", 3.0, 100.0 * _LARGEST_DRIFT, light),
+            figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * _LARGEST_LIGHT_CHANGE, light),
             figure("saturated", 100.0 * saturated, "%", 5.0, None, tr("Use a shorter exposure")),
         )
     )

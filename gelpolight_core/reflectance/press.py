@@ -64,14 +64,14 @@ class BallPress:
     indentation: Indentation
     quality: QualityTable
 
-    def seen_centre_mm(self, drift: Array) -> Array:
+    def seen_centre_mm(self, ray_slope: Array) -> Array:
         """Return where the contact's centre is seen on the undeformed top surface, (2,).
 
-        The rays meet the contact ring below the surface and further in, by `drift` per mm.
+        The rays meet the contact ring below the surface and further in, by `ray_slope` per mm.
         """
         sagitta = self.pose.radius_mm - np.sqrt(self.pose.radius_mm**2 - self.contact_radius_mm**2)
         centre: Array = np.asarray(self.pose.centre_mm, np.float64)
-        return centre - float(self.pose.depth_mm - sagitta) * drift
+        return centre - float(self.pose.depth_mm - sagitta) * ray_slope
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,9 +146,9 @@ def find_ball(
             advice=tr("Correct the stated radius of this ball (not its diameter)"),
         )
     depth = ball_depth_from_contact(contact, radius_mm)
-    drift = _drift_at(table, seen)
+    ray_slope = _ray_slope_at(table, seen)
     ring = depth - (radius_mm - np.sqrt(radius_mm**2 - contact**2))
-    centre = seen + ring * drift
+    centre = seen + ring * ray_slope
     start = BallPose((float(centre[0]), float(centre[1])), radius_mm, depth)
     inside = usable & _within(table, seen, INSIDE * contact)
     pixels = _shaded_pixels(image, background, table, inside)
@@ -181,15 +181,15 @@ def _within(table: ResamplingTable, centre_mm: Array, radius_mm: float) -> NDArr
 def contact_mask(press: BallPress, table: ResamplingTable) -> NDArray[np.bool_]:
     """Return the nodes (rows, columns) well inside the contact, where the ball's shape is known."""
     rough = np.asarray(press.pose.centre_mm)
-    seen = press.seen_centre_mm(_drift_at(table, rough))
+    seen = press.seen_centre_mm(_ray_slope_at(table, rough))
     return table.valid & _within(table, seen, INSIDE * press.contact_radius_mm)
 
 
-def _drift_at(table: ResamplingTable, point_mm: Array) -> Array:
+def _ray_slope_at(table: ResamplingTable, point_mm: Array) -> Array:
     column, row = np.round(table.grid.to_index(point_mm)).astype(int)
     rows, columns = table.grid.shape
     return np.asarray(
-        table.drift[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)], np.float64
+        table.ray_slope[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)], np.float64
     )
 
 
@@ -208,7 +208,7 @@ def _shaded_pixels(
     points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
     return ShadedPixels(
         points,
-        table.drift[rows, columns].astype(np.float64),
+        table.ray_slope[rows, columns].astype(np.float64),
         value / np.maximum(base, LEAST_VALUE),
         weight,
     )

@@ -84,7 +84,9 @@ def ball_scatter(
         if rows.size == 0:
             continue  # its whole contact lies where the whiteboard gave no light
         points = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
-        centre = press.seen_centre_mm(table.drift[rows, columns].mean(axis=0).astype(np.float64))
+        centre = press.seen_centre_mm(
+            table.ray_slope[rows, columns].mean(axis=0).astype(np.float64)
+        )
         seen = BallPose(
             (float(centre[0]), float(centre[1])), press.pose.radius_mm, press.pose.depth_mm
         )

@@ -10,9 +10,9 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 
 
-def view_directions(drift: Array) -> Array:
+def view_directions(ray_slope: Array) -> Array:
     """Return unit directions (..., 3) back along the rays, from their slopes (..., 2)."""
-    view = np.concatenate([drift, -np.ones_like(drift[..., :1])], axis=-1)
+    view = np.concatenate([ray_slope, -np.ones_like(ray_slope[..., :1])], axis=-1)
     return np.asarray(view / np.linalg.norm(view, axis=-1, keepdims=True))
 
 

@@ -104,7 +104,7 @@ def pixels_of(
     depth = drape(place, pose, truth.decay_mm)
     # The ray through a true point is tilted by its ray slope: P0 = P - depth w(P0), w = -P0 / 38.
     points = place / (1.0 - depth[:, None] / 38.0)
-    drift = -points / 38.0
+    ray_slope = -points / 38.0
     step = 1e-5
     slope = np.stack(
         [
@@ -115,7 +115,7 @@ def pixels_of(
     ) / (2.0 * step)
     normals = np.concatenate([-slope, -np.ones((len(r), 1))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    view = np.concatenate([drift, -np.ones((len(r), 1))], axis=1)
+    view = np.concatenate([ray_slope, -np.ones((len(r), 1))], axis=1)
     view /= np.linalg.norm(view, axis=1, keepdims=True)
     flat = np.concatenate([points, np.zeros((len(r), 1))], axis=1)
     up = np.broadcast_to([0.0, 0.0, -1.0], flat.shape)
@@ -126,7 +126,7 @@ def pixels_of(
     runs = random.normal(size=(-(-len(r) // TOGETHER), 3)).repeat(TOGETHER, axis=0)
     ratio += noise * runs[: len(r)]
     weight = np.full_like(ratio, 1.0 / max(noise, 0.01))
-    return BallPixels(points, drift, view, ratio, weight, around, pose.radius_mm)
+    return BallPixels(points, ray_slope, view, ratio, weight, around, pose.radius_mm)
 
 
 def found_press(pose: BallPose, random: np.random.Generator) -> BallPress:
@@ -325,11 +325,11 @@ def test_one_press_that_is_not_a_ball_does_not_decide() -> None:
 
 
 def test_views_run_back_along_the_rays() -> None:
-    drift = np.array([[[0.3, -0.1], [0.0, 0.0]]])
-    view = view_directions(drift)
+    ray_slope = np.array([[[0.3, -0.1], [0.0, 0.0]]])
+    view = view_directions(ray_slope)
     np.testing.assert_allclose(view[0, 1], [0.0, 0.0, -1.0])
     # A step of 1 mm of depth along the view shifts the point by the ray slope.
-    np.testing.assert_allclose(view[0, 0, :2] / -view[0, 0, 2], drift[0, 0])
+    np.testing.assert_allclose(view[0, 0, :2] / -view[0, 0, 2], ray_slope[0, 0])
     assert np.linalg.norm(view[0, 0]) == pytest.approx(1.0)
 
 

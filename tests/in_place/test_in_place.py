@@ -21,7 +21,7 @@ from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.measure import measure_object
 from gelpolight_core.quality import Verdict
-from gelpolight_core.reconstruction.background_shift import background_drift, zeroed
+from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.in_place.calibration import require_open
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -230,7 +230,7 @@ def test_drift_and_zero_work_without_optics(
     closed_run: InPlaceRun, closed_session: ClosedSession
 ) -> None:
     frame = closed_session.averaged("background").rgb
-    assert background_drift(frame, closed_run.calibration).quality.verdict is Verdict.PASS
+    assert background_shift(frame, closed_run.calibration).quality.verdict is Verdict.PASS
     new = zeroed(
         closed_run.calibration, [frame], operator="tester", made="2026-01-01T00:00:00+00:00"
     )

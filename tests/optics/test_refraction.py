@@ -80,15 +80,15 @@ def test_the_ray_takes_the_quickest_path() -> None:
     assert direction[0] * stack.thicknesses_mm[0] == pytest.approx(quickest[0], abs=1e-5)
 
 
-def test_the_drift_is_where_the_ray_meets_a_higher_surface() -> None:
+def test_the_ray_slope_is_where_the_ray_meets_a_higher_surface() -> None:
     """Moving a millimetre from elastomer to air shifts the visible point by the ray slope."""
     plane = tilted_plane(0.01, -0.02)
     stack = build_stack(39.0, elastomer_thickness_mm=14.0, elastomer_index=1.41)
     thinner = build_stack(38.0, elastomer_thickness_mm=13.0, elastomer_index=1.41)
     direction = np.array([0.2, -0.1, 1.0])
-    point, drift = camera_to_membrane(direction, plane, stack)
+    point, ray_slope = camera_to_membrane(direction, plane, stack)
     closer, _ = camera_to_membrane(direction, plane, thinner)
-    np.testing.assert_allclose(point + 1.0 * drift, closer, atol=1e-12)
+    np.testing.assert_allclose(point + 1.0 * ray_slope, closer, atol=1e-12)
 
 
 def test_layers_thicker_than_the_distance_are_refused() -> None:

@@ -58,9 +58,9 @@ def solve(
 ) -> RaySlopes:
     """Solve every node's normal at the present depth, as `solve_near_light` does."""
     full = full_model(membrane, leds_mm)
-    drift = np.moveaxis(field.drift, -1, 0)
+    ray_slope = np.moveaxis(field.ray_slope, -1, 0)
     kind = kinds(field.usable, field.inside, 1)
-    scale = sensor_scale(full, (field.x_mm, field.y_mm), drift, kind, factor=1)
+    scale = sensor_scale(full, (field.x_mm, field.y_mm), ray_slope, kind, factor=1)
     depth = np.ascontiguousarray(depth_mm, np.float32)
     slopes = slopes_like(depth)
     if start is not None:
@@ -76,12 +76,12 @@ def solve(
 
 
 def place_on_grid(
-    depth_mm: Map, drift: Map, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
+    depth_mm: Map, ray_slope: Map, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
 ) -> tuple[Map, Map, NDArray[np.bool_]]:
     """Find the ray that sees each true position, as the oracle of that name does."""
     full = full_model(Membrane(), np.array([[0.5, 11.8, -13.7], [-10, -5, -13], [10, -6, -13]]))
     kind = np.full(depth_mm.shape, 2, np.uint8)
-    scale = sensor_scale(full, (x_mm, y_mm), np.moveaxis(drift, -1, 0), kind, factor=1)
+    scale = sensor_scale(full, (x_mm, y_mm), np.moveaxis(ray_slope, -1, 0), kind, factor=1)
     depth = np.ascontiguousarray(depth_mm, np.float32)
     flags, marks = np.zeros(depth.shape, np.uint8), np.zeros(depth.shape, np.uint8)
     placed, place = np.empty_like(depth), np.empty((2, *depth.shape), np.float32)

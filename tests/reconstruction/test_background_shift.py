@@ -14,7 +14,7 @@ from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
 from gelpolight_core.health.expected import raw_background
 from gelpolight_core.quality import Verdict
-from gelpolight_core.reconstruction.background_shift import background_drift, zeroed
+from gelpolight_core.reconstruction.background_shift import background_shift, zeroed
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.images import read_image
@@ -54,31 +54,31 @@ def moved(frame: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
 
 
 def test_a_sensor_that_has_not_changed_has_not_drifted(small_calibration: Calibration) -> None:
-    drift = background_drift(frames(1.0, 1.0, 1.0, count=1)[0], small_calibration)
-    assert not drift.touched
-    assert np.abs(drift.brightness_percent).max() < 0.5
-    assert drift.differs_percent < 1.0
-    assert drift.shift_px is None or np.hypot(*drift.shift_px) < 0.2
-    assert drift.quality.verdict is Verdict.PASS
+    shift = background_shift(frames(1.0, 1.0, 1.0, count=1)[0], small_calibration)
+    assert not shift.touched
+    assert np.abs(shift.brightness_percent).max() < 0.5
+    assert shift.differs_percent < 1.0
+    assert shift.shift_px is None or np.hypot(*shift.shift_px) < 0.2
+    assert shift.quality.verdict is Verdict.PASS
 
 
 def test_leds_that_changed_are_told_by_channel(
     small_calibration: Calibration, warm: list[Frame]
 ) -> None:
-    drift = background_drift(warm[0], small_calibration)
-    assert drift.brightness_percent == pytest.approx([3.0, 0.0, -3.0], abs=0.5)
-    assert not drift.touched
-    assert drift.quality.verdict is Verdict.WARN
-    assert any("zero" in line for line in drift.quality.advice)
+    shift = background_shift(warm[0], small_calibration)
+    assert shift.brightness_percent == pytest.approx([3.0, 0.0, -3.0], abs=0.5)
+    assert not shift.touched
+    assert shift.quality.verdict is Verdict.WARN
+    assert any("zero" in line for line in shift.quality.advice)
 
 
 def test_a_membrane_that_moved_in_the_image_is_told(
     virtual_calibration: Calibration, virtual_session: Path
 ) -> None:
     bare = read_image(next((virtual_session / "background").iterdir())).rgb
-    drift = background_drift(moved(bare, 3), virtual_calibration)
-    assert drift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
-    assert drift.quality["drift_shift_px"].verdict is Verdict.FAIL
+    shift = background_shift(moved(bare, 3), virtual_calibration)
+    assert shift.shift_px == pytest.approx((3.0, 0.0), abs=0.3)
+    assert shift.quality["drift_shift_px"].verdict is Verdict.FAIL
     with pytest.raises(InputError, match="the membrane has moved by"):
         zeroed(virtual_calibration, [moved(bare, 3)], operator="me", made="now")
 
@@ -87,9 +87,9 @@ def test_a_press_is_called_a_touch_and_never_taken_for_the_background(
     small_calibration: Calibration, small_session: Path
 ) -> None:
     press = read_image(small_session / "presses" / "cylinder_s5_d050.png").rgb
-    drift = background_drift(press, small_calibration)
-    assert drift.touched
-    assert drift.quality.verdict is Verdict.FAIL
+    shift = background_shift(press, small_calibration)
+    assert shift.touched
+    assert shift.quality.verdict is Verdict.FAIL
     with pytest.raises(InputError, match="something is pressed"):
         zeroed(small_calibration, [press], operator="me", made="now")
 
@@ -105,8 +105,8 @@ def test_after_zeroing_changed_leds_the_bare_membrane_is_flat(
     )
     assert np.abs(before).max() > 0.02
     assert np.sqrt(np.mean(after**2)) < 0.25 * np.sqrt(np.mean(before**2))
-    drift = background_drift(warm[0], new)
-    assert np.abs(drift.brightness_percent).max() < 0.3
+    shift = background_shift(warm[0], new)
+    assert np.abs(shift.brightness_percent).max() < 0.3
 
 
 def test_a_place_too_dim_for_the_calibration_stays_out_after_zeroing(
@@ -143,7 +143,7 @@ def test_the_papers_calibration_alone_knows_the_same_background(
     known = (small_calibration.factors > 0.0).all(axis=2)
     both = raw_background(paper)[known], raw_background(small_calibration)[known]
     assert both[0] == pytest.approx(both[1], rel=1e-3, abs=1e-4)
-    flat = background_drift(frames(1.0, 1.0, 1.0, count=1)[0], paper)
+    flat = background_shift(frames(1.0, 1.0, 1.0, count=1)[0], paper)
     assert np.abs(flat.brightness_percent).max() < 0.5
 
 
@@ -151,8 +151,8 @@ def test_what_is_no_image_of_this_sensor_is_refused(small_calibration: Calibrati
     camera = small_calibration.camera
     dark = np.zeros((camera.height, camera.width, 3), np.float32)
     with pytest.raises(InputError, match="dark"):
-        background_drift(dark, small_calibration)
+        background_shift(dark, small_calibration)
     with pytest.raises(InputError, match="the calibration is for"):
-        background_drift(dark[1:], small_calibration)
+        background_shift(dark[1:], small_calibration)
     with pytest.raises(InputError, match="no image"):
         zeroed(small_calibration, [], operator="me", made="now")

@@ -265,7 +265,7 @@ def test_the_coarse_image_is_the_fine_one_averaged(
     assert four.pitch_mm == pytest.approx(4.0 * one.pitch_mm)
     # What is brought to full scale by straight lines is what it would be there.
     grid = virtual_calibration.table.grid
-    rays = np.moveaxis(virtual_calibration.table.drift, -1, 0)
+    rays = np.moveaxis(virtual_calibration.table.ray_slope, -1, 0)
     own = sensor_scale(virtual_calibration.full, (grid.x_mm, grid.y_mm), rays, one.kind, factor=1)
     inner = np.s_[:, 8:-8, 8:-8]
     np.testing.assert_allclose(one.flat[inner], own.flat[inner], rtol=3e-4)

@@ -22,17 +22,17 @@ def lopsided_depth(x: Array, y: Array) -> Array:
 
 
 def leaning(points: Array) -> Array:
-    """Return the rays' drift: towards the camera's foot, not the same along x and y."""
+    """Return the slopes of the rays: towards the camera's foot, not the same along x and y."""
     x, y = points[..., 0], points[..., 1]
     return np.stack([-(x - 0.4) / 28.0, -(y + 0.7) / 33.0], axis=-1)
 
 
-def seen_along_rays(depth_of: object, drift: Array) -> Array:
+def seen_along_rays(depth_of: object, ray_slope: Array) -> Array:
     """Return the depth that each node's ray sees: d = depth(P0 + d w), by bisection."""
     low, high = np.zeros(POINTS.shape[:2]), np.full(POINTS.shape[:2], 3.0)
     for _ in range(60):
         middle = 0.5 * (low + high)
-        place = POINTS + middle[..., None] * drift
+        place = POINTS + middle[..., None] * ray_slope
         above = middle > depth_of(place[..., 0], place[..., 1])  # type: ignore[operator]
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return 0.5 * (low + high)
@@ -47,11 +47,11 @@ def inner(margin: int = 10) -> tuple[slice, slice]:
 
 
 def test_a_bump_stands_at_its_true_place() -> None:
-    drift = leaning(POINTS)
-    seen = seen_along_rays(lopsided_depth, drift).astype(np.float32)
+    ray_slope = leaning(POINTS)
+    seen = seen_along_rays(lopsided_depth, ray_slope).astype(np.float32)
     truth = lopsided_depth(POINTS[..., 0], POINTS[..., 1])
     assert np.abs(seen - truth).max() > 0.03  # left where it is seen it would be wrong
-    column, row, folded = place_on_grid(seen, drift.astype(np.float32), X, Y)
+    column, row, folded = place_on_grid(seen, ray_slope.astype(np.float32), X, Y)
     placed = resample(seen, column, row)
     # Linear interpolation: pitch^2 / 8 times the curvature, 3 per mm, is 1 um.
     assert np.abs(placed - truth)[inner()].max() < 1.5e-3
@@ -59,9 +59,9 @@ def test_a_bump_stands_at_its_true_place() -> None:
 
 
 def test_every_place_knows_the_ray_that_sees_it() -> None:
-    drift = leaning(POINTS)
-    seen = seen_along_rays(lopsided_depth, drift)
-    column, row, _ = place_on_grid(seen.astype(np.float32), drift.astype(np.float32), X, Y)
+    ray_slope = leaning(POINTS)
+    seen = seen_along_rays(lopsided_depth, ray_slope)
+    column, row, _ = place_on_grid(seen.astype(np.float32), ray_slope.astype(np.float32), X, Y)
     # Through the surface at a true position runs the ray from P0 = P - depth w(P0).
     truth = lopsided_depth(POINTS[..., 0], POINTS[..., 1])
     foot = POINTS.copy()
@@ -88,13 +88,13 @@ def test_the_floor_hidden_behind_a_wall_is_flagged(axis: int) -> None:
     """Rays lean by 0.3 per mm, so a wall 1 mm high hides a strip of 0.3 mm behind it."""
     lean = 0.3
     along = POINTS[..., axis]
-    drift = np.zeros_like(POINTS)
-    drift[..., axis] = lean
+    ray_slope = np.zeros_like(POINTS)
+    ray_slope[..., axis] = lean
     # The ray of node s sees s + lean d. What stands 1 mm deep over 0..2 is seen by the nodes from
     # -0.3 to 1.7; those from 1.7 to 2 see the wall at 2. The ground from -0.3 to 0 is hidden.
     wall = np.clip((2.0 - along) / lean, 0.0, 1.0)
     seen = np.where(along > -lean, wall, 0.0).astype(np.float32)
-    column, row, folded = place_on_grid(seen, drift.astype(np.float32), X, Y)
+    column, row, folded = place_on_grid(seen, ray_slope.astype(np.float32), X, Y)
     placed = resample(seen, column, row)
     middle = np.zeros_like(folded)
     middle[inner(20)] = True
@@ -110,9 +110,9 @@ def test_the_floor_hidden_behind_a_wall_is_flagged(axis: int) -> None:
 
 def test_flags_are_moved_without_being_mixed() -> None:
     """Flag 4 beside flag 16 must not become 10, which would mean something else."""
-    drift = leaning(POINTS)
-    seen = seen_along_rays(lopsided_depth, drift).astype(np.float32)
-    column, row, _ = place_on_grid(seen, drift.astype(np.float32), X, Y)
+    ray_slope = leaning(POINTS)
+    seen = seen_along_rays(lopsided_depth, ray_slope).astype(np.float32)
+    column, row, _ = place_on_grid(seen, ray_slope.astype(np.float32), X, Y)
     flags = np.where(POINTS[..., 0] < 2.0, 4.0, 16.0).astype(np.float32)
     moved = resample(flags, column, row, nearest=True)
     assert set(np.unique(moved)) == {4.0, 16.0}

@@ -106,7 +106,7 @@ def test_a_depth_left_at_its_flat_position_lies_beside_the_truth(
     x, y = np.meshgrid(grid.x_mm, grid.y_mm)
     moved = [np.hypot(x[m].mean(), y[m].mean()) for m in (top, left.depth_mm > 0.75)]
     row, column = np.argwhere(top).mean(axis=0).round().astype(int)
-    lean = np.hypot(*virtual_calibration.table.drift[row, column])
+    lean = np.hypot(*virtual_calibration.table.ray_slope[row, column])
     assert moved[1] - moved[0] == pytest.approx(0.75 * lean, rel=0.15)
 
 

@@ -34,14 +34,14 @@ def test_contact_and_depth_are_each_others_inverse(share: float, radius: float) 
 
 @given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
 def test_rays_meet_the_ball_on_its_surface_on_the_side_of_the_camera(
-    x: float, y: float, drift_x: float, drift_y: float
+    x: float, y: float, ray_slope_x: float, ray_slope_y: float
 ) -> None:
     pose = BallPose((0.0, 0.0), 3.0, 1.0)
-    surface, normal = ball_surface(np.array([[x, y]]), np.array([[drift_x, drift_y]]), pose)
+    surface, normal = ball_surface(np.array([[x, y]]), np.array([[ray_slope_x, ray_slope_y]]), pose)
     assert np.linalg.norm(surface[0] - [0.0, 0.0, 2.0]) == pytest.approx(3.0)
     assert normal[0, 2] < 0.0
     depth = -surface[0, 2]
-    np.testing.assert_allclose(surface[0, :2], [x + depth * drift_x, y + depth * drift_y])
+    np.testing.assert_allclose(surface[0, :2], [x + depth * ray_slope_x, y + depth * ray_slope_y])
 
 
 def test_rays_that_miss_the_ball_are_not_numbers() -> None:
@@ -55,14 +55,14 @@ def shaded(pose: BallPose, glossy: float, exponent: float) -> ShadedPixels:
     angle, radius = rng.uniform(0, 2 * np.pi, 3000), 1.5 * np.sqrt(rng.uniform(0, 1, 3000))
     centre = np.array(pose.centre_mm)
     points = centre + 0.05 + np.stack([radius * np.cos(angle), radius * np.sin(angle)], -1)
-    drift = -0.02 * points
-    surface, normal = ball_surface(points, drift, pose)
+    ray_slope = -0.02 * points
+    surface, normal = ball_surface(points, ray_slope, pose)
 
     def shade(at: np.ndarray, n: np.ndarray) -> np.ndarray:
         light, distance = light_directions(scene.LEDS, at)
         cosine = np.einsum("nkc,nc->nk", light, n)
         mirrored = 2 * cosine[..., None] * n[:, None, :] - light
-        view = np.concatenate([drift, -np.ones((len(drift), 1))], axis=1)
+        view = np.concatenate([ray_slope, -np.ones((len(ray_slope), 1))], axis=1)
         view /= np.linalg.norm(view, axis=1, keepdims=True)
         lobe = np.clip(np.einsum("nkc,nc->nk", mirrored, view), 0, 1) ** 4
         lit = (1 - glossy) * np.clip(cosine, 0, 1) ** exponent + glossy * lobe
@@ -71,7 +71,7 @@ def shaded(pose: BallPose, glossy: float, exponent: float) -> ShadedPixels:
     flat = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
     ratio = shade(surface, normal) / shade(flat, np.tile([0.0, 0.0, -1.0], (len(points), 1)))
     ratio *= 1.0 + 0.01 * rng.normal(size=ratio.shape)
-    return ShadedPixels(points, drift, ratio, np.full(ratio.shape, 50.0))
+    return ShadedPixels(points, ray_slope, ratio, np.full(ratio.shape, 50.0))
 
 
 @settings(max_examples=8, deadline=None)

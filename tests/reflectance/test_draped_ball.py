@@ -28,14 +28,14 @@ def simulated_depth(points_mm: Array, pose: BallPose, decay_mm: float) -> Array:
     return np.where(r <= b, ball.obstacle(np.minimum(r, b), 0.0 * r), outside)
 
 
-def marched_depth(point: Array, drift: Array, pose: BallPose, decay_mm: float) -> float:
+def marched_depth(point: Array, ray_slope: Array, pose: BallPose, decay_mm: float) -> float:
     """Return where a ray from the camera first meets the simulator's surface.
 
     It comes from above the deepest point; between samples of 1/500 of the depth it is halved.
     """
 
     def above(depth: Array) -> Array:
-        return depth - simulated_depth(point + depth[:, None] * drift, pose, decay_mm)
+        return depth - simulated_depth(point + depth[:, None] * ray_slope, pose, decay_mm)
 
     samples = np.linspace(1.01 * pose.depth_mm, 0.0, 500)
     below = np.flatnonzero(above(samples) <= 0.0)
@@ -83,16 +83,16 @@ def test_upright_rays_see_the_simulators_drape(pose: BallPose, decay: float, see
 @settings(max_examples=30, deadline=None)
 @given(poses, decays, st.floats(-0.25, 0.25), st.floats(-0.25, 0.25))
 def test_leaning_rays_end_where_a_ray_march_ends(
-    pose: BallPose, decay: float, drift_x: float, drift_y: float
+    pose: BallPose, decay: float, ray_slope_x: float, ray_slope_y: float
 ) -> None:
     points = field(pose, 2.0 * decay + pose.radius_mm, 15, 1)
-    drift = np.tile([drift_x, drift_y], (len(points), 1))
-    surface, _, _ = draped_ball(points, drift, pose, decay_mm=decay)
-    expected = [marched_depth(p, w, pose, decay) for p, w in zip(points, drift, strict=True)]
-    # Six rounds, each shrinking the error by drift times slope (at most 0.35 x 1): below 1 um.
+    ray_slope = np.tile([ray_slope_x, ray_slope_y], (len(points), 1))
+    surface, _, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
+    expected = [marched_depth(p, w, pose, decay) for p, w in zip(points, ray_slope, strict=True)]
+    # Six rounds, each shrinking the error by ray slope times slope (at most 0.35): below 1 um.
     np.testing.assert_allclose(-surface[:, 2], expected, atol=1e-3)
     np.testing.assert_allclose(
-        surface[:, :2], points - surface[:, 2:] * drift, atol=1e-12
+        surface[:, :2], points - surface[:, 2:] * ray_slope, atol=1e-12
     )  # on its own ray
 
 
@@ -100,8 +100,8 @@ def test_leaning_rays_end_where_a_ray_march_ends(
 @given(poses, decays, st.floats(-0.25, 0.25))
 def test_normals_are_square_to_the_surface(pose: BallPose, decay: float, lean: float) -> None:
     points = field(pose, 2.0 * decay + pose.radius_mm, 100, 2)
-    drift = np.tile([lean, -0.5 * lean], (len(points), 1))
-    surface, normals, _ = draped_ball(points, drift, pose, decay_mm=decay)
+    ray_slope = np.tile([lean, -0.5 * lean], (len(points), 1))
+    surface, normals, _ = draped_ball(points, ray_slope, pose, decay_mm=decay)
     place, step = surface[:, :2], 1e-4
     ball = Ball(pose.radius_mm, pose.depth_mm)
     b = contact_radius(ball.profile, ball.reach_mm, decay)
@@ -125,9 +125,9 @@ def test_normals_are_square_to_the_surface(pose: BallPose, decay: float, lean: f
 def test_the_cap_is_the_ball_that_the_rays_meet() -> None:
     pose = BallPose((4.0, -3.0), 3.0, 1.0)
     points = field(pose, 0.8, 200, 3)
-    drift = -points / 40.0
-    surface, normals, on_ball = draped_ball(points, drift, pose, decay_mm=0.7)
-    on_sphere, on_sphere_normals = ball_surface(points, drift, pose)
+    ray_slope = -points / 40.0
+    surface, normals, on_ball = draped_ball(points, ray_slope, pose, decay_mm=0.7)
+    on_sphere, on_sphere_normals = ball_surface(points, ray_slope, pose)
     assert on_ball.all()
     np.testing.assert_allclose(surface, on_sphere, atol=1e-6)
     np.testing.assert_allclose(normals, on_sphere_normals, atol=1e-6)

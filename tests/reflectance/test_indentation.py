@@ -402,8 +402,8 @@ def true_edge_centre(truth: dict[str, Any], session: dict[str, Any], ball: int) 
     on_top = centre
     for _ in range(20):
         directions = membrane_to_camera(on_top, top, stack)
-        _, drift = camera_to_membrane(directions, top, stack)
-        on_top = centre - edge_depth * drift
+        _, ray_slope = camera_to_membrane(directions, top, stack)
+        on_top = centre - edge_depth * ray_slope
     return np.asarray(camera.project(membrane_to_camera(on_top, top, stack))[0])
 
 

@@ -107,7 +107,7 @@ def _compare(depth: Array, press: BallPress, run: CalibrationRun) -> Effect:
     table = run.calibration.table
     grid, pose, contact = table.grid, press.pose, press.contact_radius_mm
     column, row = np.round(grid.to_index(np.asarray(pose.centre_mm))).astype(int)
-    centre = press.seen_centre_mm(table.drift[row, column].astype(np.float64))
+    centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     x, y = grid.x_mm - centre[0], grid.y_mm - centre[1]
     away2 = x[None, :] ** 2 + y[:, None] ** 2
     inside = away2 < contact**2

@@ -116,7 +116,7 @@ def _samples_of(number: int, press: BallPress, change: Map, table: ResamplingTab
     slopes = np.zeros((rows.size, 2))
     inside = slice(0, contact[0].size)
     if contact[0].size:
-        ray_slope = table.drift[contact].mean(axis=0).astype(np.float64)
+        ray_slope = table.ray_slope[contact].mean(axis=0).astype(np.float64)
         away = place[inside] - press.seen_centre_mm(ray_slope)
         below = np.sqrt(np.maximum(press.pose.radius_mm**2 - (away**2).sum(axis=1), 1e-6))
         slopes[inside] = -away / below[:, None]

@@ -101,5 +101,5 @@ class WorkingGrid:
             for mm, n in ((self.x_mm, self.image.width), (self.y_mm, self.image.height))
         )
         u, v = (np.ascontiguousarray(a) for a in np.meshgrid(columns, rows))
-        drift = np.zeros((*self.shape, 2), np.float32)
-        return ResamplingTable(grid, u, v, np.ones(self.shape, np.bool_), drift)
+        ray_slope = np.zeros((*self.shape, 2), np.float32)
+        return ResamplingTable(grid, u, v, np.ones(self.shape, np.bool_), ray_slope)

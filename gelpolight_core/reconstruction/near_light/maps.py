@@ -112,7 +112,7 @@ class SensorMaps:
             coarse = self.scale(COARSE)
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
             return Scale(*place, flat, kind, coarse.rays, factor / COARSE)
-        ray_slope = np.moveaxis(block_average(self.calibration.table.drift, factor), -1, 0)
+        ray_slope = np.moveaxis(block_average(self.calibration.table.ray_slope, factor), -1, 0)
         return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor)
 
 

@@ -91,7 +91,7 @@ class PaperSolver:
         table = self.calibration.table
         rows, columns = table.grid.shape
         here = np.s_[rows // 4 : 3 * rows // 4, columns // 4 : 3 * columns // 4]
-        across = np.gradient(table.drift[here][..., 0], axis=1)[table.valid[here]]
+        across = np.gradient(table.ray_slope[here][..., 0], axis=1)[table.valid[here]]
         return float(np.median(np.abs(across))) / table.grid.pitch_mm if across.size else 0.0
 
     def slopes(self, frame: NDArray[Any], gain: Gain | None) -> SlopeField:

@@ -49,7 +49,7 @@ def reconstruct(
     rows, columns = last.usable.shape
     start = np.asarray(cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_LINEAR))
     slopes, moved = one_round(last, start, full, factor * pitch)
-    column, row, _ = place_on_grid(moved, last.drift, last.x_mm, last.y_mm)
+    column, row, _ = place_on_grid(moved, last.ray_slope, last.x_mm, last.y_mm)
     depth = resample(moved, column, row)
     normals = np.stack(
         [resample(np.ascontiguousarray(slopes.normals[..., k]), column, row) for k in range(3)],
@@ -98,7 +98,7 @@ def shaded_field(
         missing,
         usable,
         np.asarray(binary_fill_holes(usable)),
-        table.drift,
+        table.ray_slope,
         grid.x_mm,
         grid.y_mm,
     )
@@ -122,7 +122,7 @@ def coarsen(field: ShadedField, factor: int) -> ShadedField:
         average(field.saturated.astype(np.float32)) > 0.5,
         average(field.usable.astype(np.float32)) > 0.99,
         average(field.inside.astype(np.float32)) > 0.5,
-        average(field.drift),
+        average(field.ray_slope),
         middle(field.x_mm, columns),
         middle(field.y_mm, rows),
     )

@@ -39,7 +39,7 @@ class ShadedField:
     inside : (rows, columns) bool
         Nodes within the seen part of the working circle; where they are not usable, the depth is
         led by what is around.
-    drift : (rows, columns, 2) float32
+    ray_slope : (rows, columns, 2) float32
         Sideways move of the ray per mm of depth.
     x_mm, y_mm : (columns,), (rows,) float64
         Nodes.
@@ -51,7 +51,7 @@ class ShadedField:
     saturated: NDArray[np.bool_]
     usable: NDArray[np.bool_]
     inside: NDArray[np.bool_]
-    drift: Map
+    ray_slope: Map
     x_mm: NDArray[np.float64]
     y_mm: NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def solve_near_light(
             field.saturated,
             field.usable,
             field.inside,
-            field.drift,
+            field.ray_slope,
             field.x_mm,
             field.y_mm,
             depth,

@@ -163,7 +163,7 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     saturated,
     usable,
     inside,
-    drift,
+    ray_slope,
     x_mm,
     y_mm,
     depth,
@@ -191,7 +191,7 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                 weight[i, j] = UNSOLVED_WEIGHT if inside[i, j] else 1.0
                 continue
             x, y, d = x_mm[j], y_mm[i], depth[i, j]
-            wx, wy = drift[i, j, 0], drift[i, j, 1]
+            wx, wy = ray_slope[i, j, 0], ray_slope[i, j, 1]
             back = sqrt(wx * wx + wy * wy + 1.0)
             vx, vy, vz = wx / back, wy / back, -1.0 / back
             for k in range(3):
@@ -298,10 +298,10 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                 min(i + 1, rows - 1),
             )
             px, py = x_mm[j1] - x_mm[j0], y_mm[i1] - y_mm[i0]
-            wxx = (drift[i, j1, 0] - drift[i, j0, 0]) / px
-            wyx = (drift[i, j1, 1] - drift[i, j0, 1]) / px
-            wxy = (drift[i1, j, 0] - drift[i0, j, 0]) / py
-            wyy = (drift[i1, j, 1] - drift[i0, j, 1]) / py
+            wxx = (ray_slope[i, j1, 0] - ray_slope[i, j0, 0]) / px
+            wyx = (ray_slope[i, j1, 1] - ray_slope[i, j0, 1]) / px
+            wxy = (ray_slope[i1, j, 0] - ray_slope[i0, j, 0]) / py
+            wyy = (ray_slope[i1, j, 1] - ray_slope[i0, j, 1]) / py
             slope_x[i, j] = -(nx * (1.0 + d * wxx) + ny * d * wyx) / along
             slope_y[i, j] = -(nx * d * wxy + ny * (1.0 + d * wyy)) / along
             flags[i, j] = flag | hidden

@@ -12,18 +12,18 @@ FOLDED = 0.05
 
 
 def place_on_grid(
-    depth_mm: Map, drift: Map, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
+    depth_mm: Map, ray_slope: Map, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64]
 ) -> tuple[Map, Map, NDArray[np.bool_]]:
     """Find, for every true position, the ray that sees the surface there.
 
-    The ray of node P0 sees the surface at P0 + depth * drift; the inverse is found by damped
+    The ray of node P0 sees the surface at P0 + depth * ray_slope; the inverse is found by damped
     fixed-point steps, which converge wherever the camera sees the surface at all.
 
     Parameters
     ----------
     depth_mm : (rows, columns)
         Depth at each node's ray.
-    drift : (rows, columns, 2)
+    ray_slope : (rows, columns, 2)
         Sideways move of the ray per mm of depth.
     x_mm, y_mm : (columns,), (rows,)
         Nodes.
@@ -41,8 +41,8 @@ def place_on_grid(
         np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32)
     )
     # The move in nodes, known on the ray grid.
-    move_x = np.ascontiguousarray(depth_mm * drift[..., 0] / pitch, np.float32)
-    move_y = np.ascontiguousarray(depth_mm * drift[..., 1] / pitch, np.float32)
+    move_x = np.ascontiguousarray(depth_mm * ray_slope[..., 0] / pitch, np.float32)
+    move_y = np.ascontiguousarray(depth_mm * ray_slope[..., 1] / pitch, np.float32)
     column, row = grid_column.copy(), grid_row.copy()
     for _ in range(ROUNDS):
         dx = cv2.remap(move_x, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
