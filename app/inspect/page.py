@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from app.context.context import AppContext
 from app.inspect.actions import FileActions
 from app.inspect.modes import ModeChoice
+from app.inspect.processing_panel import ProcessedLine
 from app.inspect.record_control import RecordControl
 from app.inspect.views import Views
 from app.live.advice import advise
@@ -113,13 +114,16 @@ class InspectPage(QWidget):
         self.views.add_to_bar(self.box)
         self.views.add_to_bar(self.modes.box)
         self.replay = ReplayBar()
+        self.processed = ProcessedLine()
         column.addWidget(self.banner)
+        column.addWidget(self.processed)
         column.addWidget(self.views, 1)
         column.addWidget(self.replay)
         column.addWidget(foot)
 
     def _connect(self) -> None:
         self.views.wanted_changed.connect(self._want)
+        self.processed.reset_wanted.connect(self.views.processing.reset)
         self.views.pointed.connect(self._on_pointed)
         self.views.image_pointed.connect(self._on_image_pointed)
         self.live.source_changed.connect(self._on_source)
@@ -187,6 +191,7 @@ class InspectPage(QWidget):
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
+        self.processed.show_steps(shown.processed, shown.refused)
         self.views.show_frame(shown, still=self.live.paused)
 
     def _on_calibration(self) -> None:
@@ -230,6 +235,8 @@ class InspectPage(QWidget):
         elif math.isfinite(self._cursor[0]):
             reading = read_at(heightmap, *self._cursor)
             text = text if reading is None else reading.text()
+            if self._shown is not None and self._shown.processed and reading is not None:
+                text = tr("Processed: {values}").format(values=text)
         self._readout.setText(text)
 
     # Advice
@@ -255,6 +262,7 @@ class InspectPage(QWidget):
     def _forget(self) -> None:
         """Clear the depth, because it belongs to another calibration or source."""
         self._shown = None
+        self.processed.show_steps((), "")
         self.views.forget()
 
     def _on_act(self, name: str) -> None:

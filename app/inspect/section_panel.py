@@ -86,9 +86,9 @@ class SectionPanel(QWidget):
         last.addWidget(self._region, 1)
         last.addWidget(save)
         side = QVBoxLayout()
-        side.addWidget(self._width)
-        side.addWidget(self._level)
-        side.addWidget(self._cutoff)
+        for widget in (self._width, self._level, self._cutoff):
+            widget.setFixedWidth(SIDE_WIDTH)
+            side.addWidget(widget)
         side.addLayout(last)
         side.addWidget(scroll, 1)
         row = QHBoxLayout(self)
@@ -136,7 +136,7 @@ class SectionPanel(QWidget):
         )  # fmt: skip
         self._cutoff.addItem(tr("no line roughness"), None)
         for cutoff_mm in CUTOFFS_MM:
-            self._cutoff.addItem(tr("Ra, Rq, Rz: cut-off {c:g} mm").format(c=cutoff_mm), cutoff_mm)
+            self._cutoff.addItem(tr("Ra, Rq, Rz at {c:g} mm").format(c=cutoff_mm), cutoff_mm)
         self._cutoff.currentIndexChanged.connect(lambda _: self.changed.emit())
 
     @property
