@@ -133,6 +133,7 @@ class InspectPage(QWidget):
         self.depth.calibration_switched.connect(self._on_calibration)
         self.depth.changed.connect(self._advise)
         self.modes.chosen.connect(self.depth.choose)
+        self.context.requests.preferences_changed.connect(self._show_again)
         self.recorder.reported.connect(self._on_recorded)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self.banner.act_wanted.connect(self._on_act)
@@ -193,6 +194,12 @@ class InspectPage(QWidget):
         self._shown = shown
         self.processed.show_steps(shown.processed, shown.refused)
         self.views.show_frame(shown, still=self.live.paused)
+
+    def _show_again(self) -> None:
+        """Show the last frame in another unit."""
+        if self._shown is not None:
+            self._show(self._shown)
+            self._show_texts()
 
     def _on_calibration(self) -> None:
         """Show the depth through another calibration, or none."""

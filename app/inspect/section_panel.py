@@ -22,6 +22,7 @@ from app.view2d.profile_plot import ProfilePlot
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
+from app.widgets.units import figure_in_unit
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.translation import tr
 
@@ -210,6 +211,7 @@ def figure_lines(figures: Sequence[Measured]) -> list[str]:
 
 def figure_text(figure: Measured, where: str = "") -> str:
     """Return a measured value with its unit and standard deviation, as markup."""
+    figure = figure_in_unit(figure)
     unit = "°" if figure.unit == DEG else f" {figure.unit}"
     digits = {"mm": 3, "um": 1}.get(figure.unit, 1)
     sd = "" if figure.sd is None else f" ± {figure.sd:.{digits}f}"

@@ -222,6 +222,15 @@ class Settings:
     def reconstruction(self, mode: tuple[str, str]) -> None:
         self._store.setValue("reconstruction", "/".join(mode))
 
+    @property
+    def length_unit(self) -> str:
+        """Unit in which measured lengths are shown: ``mm`` or ``um``."""
+        return "um" if self._text("length_unit") == "um" else "mm"
+
+    @length_unit.setter
+    def length_unit(self, unit: str) -> None:
+        self._store.setValue("length_unit", unit)
+
     def _cameras(self) -> dict[str, dict[str, str]]:
         try:
             stored = json.loads(self._text("cameras", "{}"))

@@ -351,6 +351,7 @@ class MainWindow(QMainWindow):
         dialog = PreferencesDialog(self.context.settings, self)
         dialog.theme_changed.connect(self.set_theme)
         dialog.workspace_changed.connect(self._set_workspace)
+        dialog.changed.connect(self.context.requests.preferences_changed)
         dialog.limits_changed.connect(self.context.requests.calibrations_changed)
         _show(dialog)
 

@@ -18,6 +18,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
+    QComboBox,
     QDialog,
     QLabel,
     QPlainTextEdit,
@@ -44,6 +45,7 @@ from app.shell.log_window import LogWindow
 from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
+from app.widgets.units import length_unit
 from gelpolight_core.errors import InputError
 
 
@@ -465,6 +467,18 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     assert window.context.settings.first_page == window.context.settings.last_page
     dialog._first.setCurrentIndex(0)
     assert window.context.settings.first_page == "start"
+    changed = []
+    window.context.requests.preferences_changed.connect(lambda: changed.append(1))
+    mode = dialog.findChild(QComboBox, "preferences.mode")
+    assert mode is not None
+    mode.setCurrentIndex(mode.findText("best", Qt.MatchFlag.MatchContains))
+    assert window.context.settings.reconstruction == ("full", "best")
+    unit = dialog.findChild(QComboBox, "preferences.unit")
+    assert unit is not None
+    unit.setCurrentIndex(unit.findData("um"))
+    assert window.context.settings.length_unit == length_unit() == "um"
+    unit.setCurrentIndex(unit.findData("mm"))
+    assert len(changed) == 3
     dialog._folder.setText("not/absolute")
     dialog._folder.editingFinished.emit()
     assert dialog._folder.text() == str(tmp_path / "elsewhere")
