@@ -71,6 +71,10 @@ class FileActions(QObject):
             keys=("Ctrl+Shift+P",), icon_name="picture",
             tip=tr("Save an image of the views or of the surface in any size (Ctrl+Shift+P)"),
         )  # fmt: skip
+        self.profile_action = make_action(
+            owner, "inspect.save_profile", tr("Profile…"), self.save_profile,
+            tip=tr("Save the profile of the cross-section as a table (CSV)"),
+        )  # fmt: skip
         self.saving = ViewSaving(
             views.surface, owner, settings=context.settings, player=self._player
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.context.context import AppContext
@@ -178,6 +179,11 @@ class InspectPage(QWidget):
     def begin_demo(self) -> None:
         """Use the virtual sensor."""
         self.context.source.choose_virtual_sensor()
+
+    def export_actions(self) -> tuple[QAction, ...]:
+        """Return what the File menu offers to export from this page."""
+        files = self.file_actions
+        return files.export_action, files.image_action, files.profile_action
 
     # The image
 

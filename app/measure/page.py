@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 
 from app.context.context import AppContext
@@ -97,6 +97,10 @@ class MeasurePage(QWidget):
                 part.leave()
         if shown in (self.press_view, self.protocol):
             shown.enter()
+
+    def export_actions(self) -> tuple[QAction, ...]:
+        """Return what the File menu offers to export from this page."""
+        return (self.results.export_action,)
 
     def _show_again(self) -> None:
         """Show the values in another unit."""

@@ -81,7 +81,6 @@ class SensorsPage(QWidget):
             "sensors.new",
             tr("&New sensor"),
             requests.new_sensor.emit,
-            keys=("Ctrl+N",),
             icon_name="add",
             tip=tr("Calibrate a sensor from its camera"),
         )
@@ -98,7 +97,6 @@ class SensorsPage(QWidget):
             "sensors.import",
             tr("&Import calibration"),
             self.choose_calibrations,
-            keys=("Ctrl+I",),
             icon_name="import",
             tip=tr("Copy calibration files into the library"),
         )
@@ -158,6 +156,10 @@ class SensorsPage(QWidget):
         for action in (self.new, self.session, self.demo):
             action.setVisible("calibrate" in there)
             action.setEnabled("calibrate" in there)
+
+    def export_actions(self) -> tuple[QAction, ...]:
+        """Return what the File menu offers to export from this page."""
+        return (self.report,)
 
     def _first_actions(self) -> tuple[QAction, ...]:
         first = (self.demo, self.new, self.session, self.import_, self.trash)

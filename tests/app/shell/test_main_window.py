@@ -240,7 +240,7 @@ def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
     settings = Settings(path)
     assert settings.theme == "system"
     assert settings.limits == Limits()
-    assert settings.recent_sessions == ()
+    assert settings.recent("sessions") == ()
     assert settings.window_state()[0].isEmpty()
 
 
@@ -250,14 +250,14 @@ def test_settings_survive(tmp_path: Path) -> None:
     settings.limits = Limits(age_days=12.0, height_percent=3.0, size_percent=2.0)
     settings.workspace_folder = tmp_path / "my, sensors; and=more"
     for number in range(12):
-        settings.add_recent_session(tmp_path / f"session {number}")
+        settings.add_recent("sessions", tmp_path / f"session {number}")
     settings.save()
     again = Settings(tmp_path / "desktop.ini")
     assert again.theme == "dark"
     assert again.limits == Limits(12.0, 3.0, 2.0)
     assert again.workspace_folder == settings.workspace_folder
-    assert again.recent_sessions[0] == tmp_path / "session 11"
-    assert len(again.recent_sessions) == 8
+    assert again.recent("sessions")[0] == tmp_path / "session 11"
+    assert len(again.recent("sessions")) == 8
 
 
 def drop_on(window: MainWindow, *paths: Path) -> bool:
@@ -278,7 +278,7 @@ def test_a_dropped_session_is_calibrated(window: MainWindow, session: Path) -> N
     assert drop_on(window, session)
     assert window.page_name == "calibrate"
     assert window.page("calibrate").opened == [session]
-    assert window.context.settings.recent_sessions == (session,)
+    assert window.context.settings.recent("sessions") == (session,)
 
 
 def test_a_dropped_description_opens_its_session(window: MainWindow, session: Path) -> None:
@@ -340,22 +340,12 @@ def test_a_folder_without_a_session_is_refused_in_one_sentence(
     window.open_session(tmp_path)
     assert "session.toml" in window.context.toasts.shown()[0].text
     assert window.page_name == "sensors"
-    assert window.context.settings.recent_sessions == ()
+    assert window.context.settings.recent("sessions") == ()
 
 
 def test_an_error_of_a_page_is_shown(window: MainWindow) -> None:
     window.open_path_in("calibrate", "/nowhere/bad")
     assert "it is bad" in window.context.toasts.shown()[0].text
-
-
-def test_recent_sessions_can_be_opened_and_cleared(window: MainWindow, session: Path) -> None:
-    window.open_session(session)
-    menu = window.menus._recent
-    menu.aboutToShow.emit()
-    menu.actions()[0].trigger()
-    assert window.page("calibrate").opened == [session, session]
-    next(a for a in menu.actions() if a.text() == "Clear this list").trigger()
-    assert window.context.settings.recent_sessions == ()
 
 
 def test_the_edit_menu_names_what_it_undoes(window: MainWindow) -> None:
