@@ -20,7 +20,7 @@ from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
-from app.sensors.details import Details
+from app.sensors.details import Details, uses_text
 from app.sensors.model import LibraryModel
 from app.sensors.report_writer import ReportWriter
 from app.sensors.sessions_box import SessionsBox
@@ -31,6 +31,7 @@ from app.widgets.actions import make_action
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.workspace import ENDING
+from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.translation import tr
 
@@ -291,11 +292,20 @@ class SensorsPage(QWidget):
 
     def _show_chosen(self) -> None:
         entry = self.chosen()
-        self._details.show_entry(entry)
+        self._details.show_entry(entry, self._uses(entry))
         self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
         self.report.setEnabled(entry is not None and not entry.broken and not self._writing)
         self.reveal.setEnabled(entry is not None)
         self.remove.setEnabled(entry is not None)
+
+    def _uses(self, entry: Entry | None) -> str:
+        """Return how often a calibration was used, or why that is not known."""
+        if entry is None or entry.summary is None:
+            return ""
+        try:
+            return uses_text(*self._context.workspace.uses(entry.summary.identity))
+        except InputError as error:
+            return str(error)
 
     def _with_chosen(self, function: Callable[[Entry], None]) -> None:
         entry = self.chosen()
