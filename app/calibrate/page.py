@@ -65,7 +65,7 @@ class CalibratePage(QWidget):
         self.question.answered.connect(self._on_answer)
         self.question.back_wanted.connect(self._leave_session)
         context.source.changed.connect(self._on_source)
-        self.start.show_recent(context.settings.recent_sessions)
+        self.start.show_recent(context.settings.recent("sessions"))
 
     def _prepare(self, form: FormPage) -> SetupCamera:
         none = tr("No camera: import images")
@@ -78,7 +78,7 @@ class CalibratePage(QWidget):
     def enter(self) -> None:
         """Update the page and open the camera."""
         self._shown = True
-        self.start.show_recent(self.context.settings.recent_sessions)
+        self.start.show_recent(self.context.settings.recent("sessions"))
         if self.wizard is not None:
             self.wizard.enter()
 
@@ -205,7 +205,7 @@ class CalibratePage(QWidget):
         self.wizard.left.connect(self._leave_session)
         self._stack.addWidget(self.wizard)
         self._stack.setCurrentWidget(self.wizard)
-        self.context.settings.add_recent_session(project.session.folder)
+        self.context.settings.add_recent("sessions", project.session.folder)
         self.wizard.go_to(step or self.wizard.first_open_step())
         if self._shown:
             self.wizard.enter()
@@ -213,7 +213,7 @@ class CalibratePage(QWidget):
     def _leave_session(self) -> None:
         self._close_wizard()
         self.start.show_problem("")
-        self.start.show_recent(self.context.settings.recent_sessions)
+        self.start.show_recent(self.context.settings.recent("sessions"))
         self._stack.setCurrentWidget(self.start)
 
     def _close_wizard(self) -> None:

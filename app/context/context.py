@@ -105,6 +105,7 @@ class Requests(QObject):
     demo = Signal()  # select the virtual sensor as the source
     begin_demo = Signal()  # the same, and start calibrating it
     rest = Signal(bool)  # pause the processing of live images while times are measured, or continue
+    preferences_changed = Signal()  # the mode of the live depth, or the unit of lengths
     calibrations_changed = Signal()  # calibrations added, removed, validated or put into use
 
 

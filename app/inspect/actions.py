@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from app.inspect.views import Views
 from app.live.depth import LiveDepth
 from app.services.jobs import Job, Jobs
 from app.sources.recording import RecordingSource
-from app.view2d.quantities import Reference, difference_to
+from app.view2d.quantities import Reference
 from app.view3d.image_dialog import ImageChoice, ImageDialog
 from app.view3d.saving import Player, ViewSaving
 from app.view3d.surface import Surface
@@ -28,6 +29,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.export.profile_file import write_profile
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.io.atomic import write_atomically
+from gelpolight_core.measurement.map_processing import difference
 from gelpolight_core.translation import tr
 
 
@@ -69,11 +71,16 @@ class FileActions(QObject):
             keys=("Ctrl+Shift+P",), icon_name="picture",
             tip=tr("Save an image of the views or of the surface in any size (Ctrl+Shift+P)"),
         )  # fmt: skip
+        self.profile_action = make_action(
+            owner, "inspect.save_profile", tr("Profile…"), self.save_profile,
+            tip=tr("Save the profile of the cross-section as a table (CSV)"),
+        )  # fmt: skip
         self.saving = ViewSaving(
             views.surface, owner, settings=context.settings, player=self._player
         )
         self.saving.reported.connect(self._tell)
         views.surface.menu.reference_wanted.connect(self.take_reference)
+        views.processing.hold_wanted.connect(self.hold_reference)
         views.surface.menu.mesh_wanted.connect(self.export)
         views.surface.menu.offer_mesh()
         views.section.save_wanted.connect(self.save_profile)
@@ -110,7 +117,8 @@ class FileActions(QObject):
                 return export_recording(path, reconstructor, choice, tell)
 
         elif last is not None and last.heightmap is not None:
-            heightmap, name = last.heightmap, frame_name(last.frame, source)
+            heightmap = last.heightmap
+            name = frame_name(last.frame, source, processed=bool(last.processed))
 
             def work(tell: Any) -> list[Path]:
                 return export_frame(heightmap, choice, name)
@@ -138,7 +146,10 @@ class FileActions(QObject):
         if profile is None:
             self._tell(tr("There is no profile yet."), "warn")
             return
-        proposed = self._context.settings.folder("table") / "profile.csv"
+        last = self._depth.last
+        processed = last is not None and bool(last.processed)
+        file = "profile-processed.csv" if processed else "profile.csv"
+        proposed = self._context.settings.folder("table") / file
         chosen, _ = QFileDialog.getSaveFileName(
             self._owner, tr("Save the profile"), str(proposed), tr("Table (*.csv)")
         )
@@ -150,16 +161,22 @@ class FileActions(QObject):
 
     def take_reference(self, how: str) -> None:
         """Compare with the current frame (``hold``), a file (``load``) or nothing (``clear``)."""
-        last = self._depth.last
         if how == "clear":
             self._views.compare_with(None)
         elif how == "load":
             self._ask_reference()
-        elif last is None or last.heightmap is None:
+        elif self.hold_reference():
+            self._views.compare_with(self._views.reference)
+
+    def hold_reference(self) -> bool:
+        """Keep the height map of now, as reconstructed, as the reference. Return whether it is."""
+        last = self._depth.last
+        if last is None or last.raw is None:
             self._tell(tr("There is no depth to use as a reference yet."), "warn")
-        else:
-            name = tr("frame {n}").format(n=last.frame.number)
-            self._views.compare_with(Reference(last.heightmap, name))
+            return False
+        name = tr("frame {n}").format(n=last.frame.number)
+        self._views.hold(Reference(replace(last.raw, source=name), name))
+        return True
 
     def _ask_reference(self) -> None:
         chosen, _ = QFileDialog.getOpenFileName(
@@ -176,8 +193,8 @@ class FileActions(QObject):
         """Compare with a height map that was exported as npz."""
         try:
             heightmap = read_npz(path)
-            if self._depth.last is not None and self._depth.last.heightmap is not None:
-                difference_to(self._depth.last.heightmap, heightmap)
+            if self._depth.last is not None and self._depth.last.raw is not None:
+                difference(self._depth.last.raw, heightmap)
         except InputError as error:
             self._tell(str(error), "fail")
             return

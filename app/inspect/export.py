@@ -52,7 +52,7 @@ def format_words() -> dict[str, str]:
     return {name: words.get(name, name) for name in FORMATS}
 
 
-def frame_name(frame: Frame, source: Source | None) -> str:
+def frame_name(frame: Frame, source: Source | None, *, processed: bool = False) -> str:
     """Return the name of an exported frame: of a recording, the same as in the export of a range.
 
     Parameters
@@ -61,10 +61,13 @@ def frame_name(frame: Frame, source: Source | None) -> str:
         The frame.
     source : Source or None
         Its source.
+    processed : bool, optional
+        Whether its height map is processed. The name then says so.
     """
+    name = f"frame-{frame.number:05d}"
     if frame.index is not None and source is not None:
-        return f"{source.name}-{frame.index:05d}.png"
-    return f"frame-{frame.number:05d}.png"
+        name = f"{source.name}-{frame.index:05d}"
+    return f"{name}-processed.png" if processed else f"{name}.png"
 
 
 def export_frame(heightmap: HeightMap, choice: ExportChoice, name: str) -> list[Path]:

@@ -98,6 +98,7 @@ class ModeChoice(QObject):
         self._jobs, self._context = jobs, context
         self.box = ModeBox()
         self.box.activated.connect(self._on_chosen)
+        context.requests.preferences_changed.connect(self._follow_settings)
         self._live: Reconstructor | None = None
         self._best: Reconstructor | None = None
         self._paper: Reconstructor | None = None
@@ -145,6 +146,12 @@ class ModeChoice(QObject):
         mode = self.box.itemData(index)
         self._context.settings.reconstruction = (mode.model, mode.effort)
         self._choose()
+
+    def _follow_settings(self) -> None:
+        offered = [self.box.itemData(index) for index in range(self.box.count())]
+        if self.mode in offered and self.mode != self.box.currentData():
+            self.box.setCurrentIndex(offered.index(self.mode))
+            self._choose()
 
     def _choose(self) -> None:
         mode, live, best = self.box.currentData(), self._live, self._best

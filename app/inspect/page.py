@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.context.context import AppContext
 from app.inspect.actions import FileActions
 from app.inspect.modes import ModeChoice
+from app.inspect.processing_panel import ProcessedLine
 from app.inspect.record_control import RecordControl
 from app.inspect.views import Views
 from app.live.advice import advise
@@ -113,13 +115,16 @@ class InspectPage(QWidget):
         self.views.add_to_bar(self.box)
         self.views.add_to_bar(self.modes.box)
         self.replay = ReplayBar()
+        self.processed = ProcessedLine()
         column.addWidget(self.banner)
+        column.addWidget(self.processed)
         column.addWidget(self.views, 1)
         column.addWidget(self.replay)
         column.addWidget(foot)
 
     def _connect(self) -> None:
         self.views.wanted_changed.connect(self._want)
+        self.processed.reset_wanted.connect(self.views.processing.reset)
         self.views.pointed.connect(self._on_pointed)
         self.views.image_pointed.connect(self._on_image_pointed)
         self.live.source_changed.connect(self._on_source)
@@ -129,6 +134,7 @@ class InspectPage(QWidget):
         self.depth.calibration_switched.connect(self._on_calibration)
         self.depth.changed.connect(self._advise)
         self.modes.chosen.connect(self.depth.choose)
+        self.context.requests.preferences_changed.connect(self._show_again)
         self.recorder.reported.connect(self._on_recorded)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self.banner.act_wanted.connect(self._on_act)
@@ -174,6 +180,11 @@ class InspectPage(QWidget):
         """Use the virtual sensor."""
         self.context.source.choose_virtual_sensor()
 
+    def export_actions(self) -> tuple[QAction, ...]:
+        """Return what the File menu offers to export from this page."""
+        files = self.file_actions
+        return files.export_action, files.image_action, files.profile_action
+
     # The image
 
     def pause(self, on: bool) -> None:
@@ -187,7 +198,14 @@ class InspectPage(QWidget):
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
+        self.processed.show_steps(shown.processed, shown.refused)
         self.views.show_frame(shown, still=self.live.paused)
+
+    def _show_again(self) -> None:
+        """Show the last frame in another unit."""
+        if self._shown is not None:
+            self._show(self._shown)
+            self._show_texts()
 
     def _on_calibration(self) -> None:
         """Show the depth through another calibration, or none."""
@@ -230,6 +248,8 @@ class InspectPage(QWidget):
         elif math.isfinite(self._cursor[0]):
             reading = read_at(heightmap, *self._cursor)
             text = text if reading is None else reading.text()
+            if self._shown is not None and self._shown.processed and reading is not None:
+                text = tr("Processed: {values}").format(values=text)
         self._readout.setText(text)
 
     # Advice
@@ -255,6 +275,7 @@ class InspectPage(QWidget):
     def _forget(self) -> None:
         """Clear the depth, because it belongs to another calibration or source."""
         self._shown = None
+        self.processed.show_steps((), "")
         self.views.forget()
 
     def _on_act(self, name: str) -> None:

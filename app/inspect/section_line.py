@@ -15,7 +15,7 @@ from app.widgets.plots import own_handle_menus
 from gelpolight_core.measurement.area import Rectangle
 
 INK = "#ff5ac8"
-REGION_INK = "#ffb02e"
+REGION_INK = "#ff5c2e"
 BAND = QColor(255, 90, 200, 60)
 LEAST_MM = 0.05
 
@@ -97,8 +97,8 @@ class RegionBox(QObject):
     def __init__(self, view: MapView) -> None:
         super().__init__(view)
         self._roi = pg.RectROI(
-            [-1.0, -1.0],
-            [2.0, 2.0],
+            [-2.0, -2.0],
+            [4.0, 4.0],
             pen=pg.mkPen(REGION_INK, width=2),
             hoverPen=pg.mkPen("#ffffff", width=2),
             handlePen=pg.mkPen(REGION_INK, width=2),

@@ -22,6 +22,7 @@ from app.view2d.profile_plot import ProfilePlot
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import MarkupLabel, escaped
 from app.widgets.naming import named
+from app.widgets.units import figure_in_unit
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.translation import tr
 
@@ -86,9 +87,9 @@ class SectionPanel(QWidget):
         last.addWidget(self._region, 1)
         last.addWidget(save)
         side = QVBoxLayout()
-        side.addWidget(self._width)
-        side.addWidget(self._level)
-        side.addWidget(self._cutoff)
+        for widget in (self._width, self._level, self._cutoff):
+            widget.setFixedWidth(SIDE_WIDTH)
+            side.addWidget(widget)
         side.addLayout(last)
         side.addWidget(scroll, 1)
         row = QHBoxLayout(self)
@@ -136,7 +137,7 @@ class SectionPanel(QWidget):
         )  # fmt: skip
         self._cutoff.addItem(tr("no line roughness"), None)
         for cutoff_mm in CUTOFFS_MM:
-            self._cutoff.addItem(tr("Ra, Rq, Rz: cut-off {c:g} mm").format(c=cutoff_mm), cutoff_mm)
+            self._cutoff.addItem(tr("Ra, Rq, Rz at {c:g} mm").format(c=cutoff_mm), cutoff_mm)
         self._cutoff.currentIndexChanged.connect(lambda _: self.changed.emit())
 
     @property
@@ -210,6 +211,7 @@ def figure_lines(figures: Sequence[Measured]) -> list[str]:
 
 def figure_text(figure: Measured, where: str = "") -> str:
     """Return a measured value with its unit and standard deviation, as markup."""
+    figure = figure_in_unit(figure)
     unit = "°" if figure.unit == DEG else f" {figure.unit}"
     digits = {"mm": 3, "um": 1}.get(figure.unit, 1)
     sd = "" if figure.sd is None else f" ± {figure.sd:.{digits}f}"

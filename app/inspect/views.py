@@ -16,12 +16,14 @@ from app.bench.bench_area import BenchArea
 from app.context.context import AppContext
 from app.context.source_button import SourceButton
 from app.inspect.display_panel import DisplayPanel
+from app.inspect.level_points import LevelPoints
 from app.inspect.normals_panel import NormalsPanel
+from app.inspect.processing_panel import ProcessingPanel
 from app.inspect.quality_panel import QualityPanel
 from app.inspect.section_line import INK, REGION_INK, RegionBox, SectionLine
 from app.inspect.section_panel import SectionPanel
 from app.live.frame_results import Shown, Wanted
-from app.live.height_panel import HeightPanel
+from app.live.height_panel import HeightPanel, extent_of
 from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Jobs
@@ -36,7 +38,7 @@ from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 # Raised when views are added, so that an old layout is not applied to them.
-LAYOUT_VERSION = 2
+LAYOUT_VERSION = 3
 AREAS = Qt.DockWidgetArea
 
 
@@ -76,6 +78,8 @@ class Views(QMainWindow):
         self.section = SectionPanel()
         self.line, self.region = SectionLine(self.height.map), RegionBox(self.height.map)
         self.display = DisplayPanel()
+        self.processing = ProcessingPanel()
+        self.level_points = LevelPoints(self.height.map)
         self._bench = BenchArea(context.source)
         self.docks: dict[str, QDockWidget] = {}
         self._visible: dict[str, bool] = {}
@@ -115,6 +119,7 @@ class Views(QMainWindow):
             ("section", tr("Cross-section"), self.section, "Alt+6"),
             ("look", tr("Display"), self.display, "Alt+7"),
             ("bench", tr("Virtual bench"), self._bench, "Alt+8"),
+            ("processing", tr("Processing"), self.processing, "Alt+9"),
         )
         for name, title, widget, keys in table:
             dock = named(QDockWidget(title, self), f"inspect.dock.{name}", title)
@@ -147,9 +152,11 @@ class Views(QMainWindow):
         self.tabifyDockWidget(docks["normals"], docks["quality"])
         self.splitDockWidget(docks["surface"], docks["section"], Qt.Orientation.Vertical)
         self.splitDockWidget(docks["look"], docks["bench"], Qt.Orientation.Vertical)
+        self.tabifyDockWidget(docks["look"], docks["processing"])
         for dock in docks.values():
             dock.show()
         docks["camera"].raise_()
+        docks["look"].raise_()
         self.resizeDocks(
             [docks["surface"], docks["height"], docks["look"]],
             [560, 400, 260],
@@ -170,7 +177,8 @@ class Views(QMainWindow):
         self.height.range_released.connect(self.display.unlock_range)
         self.quality.chosen.connect(self.wanted_changed)
         self.normals.chosen.connect(self.wanted_changed)
-        for part in (self.line, self.region):
+        self.processing.changed.connect(self._on_section)
+        for part in (self.line, self.region, self.level_points):
             part.moved.connect(self._lay_lines)
             part.moved.connect(self.wanted_changed)
         self.section.changed.connect(self._on_section)
@@ -199,6 +207,9 @@ class Views(QMainWindow):
             region=self.region.rectangle if self._measures_region() else None,
             display=self.display.display,
             reference=self.reference,
+            processing=self.processing.processing(
+                self.region.rectangle, self.level_points.points_mm
+            ),
         )
 
     def _section(self) -> Section:
@@ -217,8 +228,11 @@ class Views(QMainWindow):
             self.camera.show_rgb(shown.camera, size=(columns, rows))
         if shown.heightmap is None:
             return
+        self._name_processed(bool(shown.processed))
+        self.processing.show_still(still)
         if not self._has_depth:
             self._has_depth = True
+            self.level_points.spread(extent_of(shown.heightmap))
             self._on_section()
         if shown.surface is not None:
             self.surface.show_surface(shown.surface)
@@ -230,6 +244,14 @@ class Views(QMainWindow):
         if shown.cut is not None:
             self.section.show_cut(shown.cut)
 
+    def _name_processed(self, processed: bool) -> None:
+        """Say in the titles of the views that the height map is processed."""
+        titles = {"surface": tr("3D"), "height": tr("Height map"), "section": tr("Cross-section")}
+        for name, title in titles.items():
+            text = tr("{view} (processed)").format(view=title) if processed else title
+            if self.docks[name].windowTitle() != text:
+                self.docks[name].setWindowTitle(text)
+
     def prepare(self) -> None:
         """Load what the visible views need, before the first depth arrives."""
         if self._visible["surface"]:
@@ -238,6 +260,7 @@ class Views(QMainWindow):
     def forget(self) -> None:
         """Clear the depth: the calibration or source changed, or there is none."""
         words = tr("No depth yet.")
+        self._name_processed(False)
         self._has_depth = False
         self._on_section()
         self.surface.show_surface(None)
@@ -252,9 +275,14 @@ class Views(QMainWindow):
 
     def compare_with(self, reference: Reference | None) -> None:
         """Show the difference from this height map in 3D from now on. None: no difference."""
-        self.reference = reference
+        self.hold(reference)
         self.display.colour_by("depth" if reference is None else "difference")
         self.wanted_changed.emit()
+
+    def hold(self, reference: Reference | None) -> None:
+        """Keep a height map to compare with. None: no height map."""
+        self.reference = reference
+        self.processing.show_reference(reference)
 
     def show_pixel(self, pixel: tuple[float, float] | None) -> None:
         """Mark a pixel in the camera image."""
@@ -309,7 +337,10 @@ class Views(QMainWindow):
     def _on_section(self) -> None:
         self.line.show(self._visible["section"] and self._has_depth)
         self.line.set_width(self.section.width_mm)
-        self.region.show(self._measures_region() and self._has_depth)
+        level = self.processing.level
+        region = self._measures_region() or level == "rectangle"
+        self.region.show(region and self._has_depth)
+        self.level_points.show(level == "points" and self._has_depth)
         self._lay_lines()
         self.wanted_changed.emit()
 

@@ -16,21 +16,23 @@ from app.view2d import shading
 from app.view2d.colour_range import ColourRange, SteadyEnd
 from app.view2d.cuts import Cut, Section, cut
 from app.view2d.display import SURROUND, Display, colour_table
+from app.view2d.processing import Processed, Processing, Processor
 from app.view2d.quantities import (
     FLAG_COLOURS,
     Reference,
     depth_scale,
     difference_scale,
-    difference_to,
     flag_scale,
     slope_scale,
     uncertainty_scale,
 )
 from app.view3d.surface import LIVE_NODES, ColourScale, Surface, surface_of
 from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.measurement.map_processing import difference, usable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.misfit import Misfit, solve_misfit
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.translation import tr
 
 LIVE_PX = 560
 CAMERA_PX = 760
@@ -62,6 +64,8 @@ class Wanted:
         The display settings.
     reference : Reference or None
         The reference of the difference.
+    processing : Processing
+        What is done to the height map of a frozen image.
     still : bool
         Whether the image is frozen. It is then processed at full detail, with the uncertainty if
         needed.
@@ -76,6 +80,7 @@ class Wanted:
     region: Rectangle | None = None
     display: Display = field(default_factory=Display)
     reference: Reference | None = None
+    processing: Processing = field(default_factory=Processing)
     still: bool = False
 
     @property
@@ -105,7 +110,13 @@ class Shown:
     frame : Frame
         The frame of the camera.
     heightmap : HeightMap or None
-        As reconstructed.
+        As shown and measured: with the steps of `processed`, else as reconstructed.
+    raw : HeightMap or None
+        As reconstructed. The normals and the quality are always those of this one.
+    processed : tuple of str
+        Sentences that say what was done to the height map. Empty: nothing.
+    refused : str
+        Why the height map could not be processed.
     range_mm : (low, high)
         Depths at the ends of the colours.
     camera : (rows, columns, 3) uint8 or None
@@ -126,6 +137,9 @@ class Shown:
 
     frame: Frame
     heightmap: HeightMap | None = None
+    raw: HeightMap | None = None
+    processed: tuple[str, ...] = ()
+    refused: str = ""
     range_mm: tuple[float, float] = (0.0, 1.0)
     camera: NDArray[np.uint8] | None = None
     height: NDArray[np.uint8] | None = None
@@ -161,6 +175,7 @@ class Maker:
         self.colour_range = ColourRange()
         self._misfit_top = SteadyEnd()
         self._last: tuple[Frame, tuple[Reconstructor, bool], HeightMap, float] | None = None
+        self._process = Processor()
 
     def __call__(self, frame: Frame) -> Shown:
         """Compute the requested results of a frame."""
@@ -169,17 +184,24 @@ class Maker:
         camera = camera_image(frame, wanted) if wanted.camera else None
         if self.live is None or not wanted.needs_depth:
             return Shown(frame, camera=camera)
-        heightmap, depth_ms = self._heightmap(frame, wanted)
-        misfit = self._misfit(frame, heightmap, wanted) if wanted.quality == "misfit" else None
+        raw, depth_ms = self._heightmap(frame, wanted)
+        done = self._process(raw, wanted.processing) if wanted.still else Processed(raw)
+        heightmap = done.heightmap
+        misfit = self._misfit(frame, raw, wanted) if wanted.quality == "misfit" else None
         misfit_top = 0.0 if misfit is None else self._steady_top(misfit, frame)
-        automatic = self.colour_range.update(heightmap.depth_mm, frame.time_s)
+        # A processed map has a range of its own, which the live images do not continue.
+        colours = ColourRange() if done.steps else self.colour_range
+        automatic = colours.update(heightmap.depth_mm, frame.time_s)
         range_mm = wanted.display.range_mm or automatic
-        shown = _Images(heightmap, wanted, range_mm, misfit, misfit_top)
+        shown = _Images(done, raw, wanted, range_mm, misfit, misfit_top)
         surface = shown.surface() if wanted.surface else None
         quality, top = shown.quality() if wanted.quality else (None, 0.0)
         return Shown(
             frame=frame,
             heightmap=heightmap,
+            raw=raw,
+            processed=done.steps,
+            refused=done.refused,
             range_mm=shown.range_mm,
             camera=camera,
             height=shown.height() if wanted.height else None,
@@ -235,12 +257,14 @@ class _Images:
 
     def __init__(
         self,
-        heightmap: HeightMap,
+        done: Processed,
+        raw: HeightMap,
         wanted: Wanted,
         range_mm: tuple[float, float],
         misfit: Misfit | None = None,
         misfit_top: float = 0.0,
     ) -> None:
+        heightmap, self._raw, self._steps = done.heightmap, raw, done.steps
         self._map, self._wanted, self._display = heightmap, wanted, wanted.display
         self._misfit, self._misfit_top = misfit, misfit_top
         self._px = STILL_PX if wanted.still else LIVE_PX
@@ -289,8 +313,8 @@ class _Images:
 
     def normals(self) -> NDArray[np.uint8]:
         """Return the normals or the slope as colours."""
-        assert self._map.normals is not None
-        normals = shading.fitted(self._map.normals, self._px)
+        assert self._raw.normals is not None
+        normals = shading.fitted(self._raw.normals, self._px)
         if self._wanted.normals == "slope":
             rgb = _in_colours(shading.steepness_deg(normals), slope_scale())
         else:
@@ -299,7 +323,7 @@ class _Images:
 
     def quality(self) -> tuple[NDArray[np.uint8] | None, float]:
         """Return the flags over the dimmed relief, or a quantity in colours, and its upper end."""
-        sd = self._map.depth_sd_mm
+        sd = self._raw.depth_sd_mm
         if self._misfit is not None:
             top = self._misfit_top
             rows, columns = self._depth.shape
@@ -323,7 +347,7 @@ class _Images:
         """Return the mesh nodes, their colours and the colour scale."""
         wanted, display = self._wanted, self._display
         if display.colour_by == "depth" and not wanted.still:
-            scale, texture = depth_scale(display.colours, self.range_mm), self._shaded()
+            scale, texture = self._depth_scale(), self._shaded()
         else:
             rgb, scale = self._quantity()
             texture = rgb if wanted.still else cv2.multiply(rgb, self._light(), scale=1 / 255.0)
@@ -357,11 +381,15 @@ class _Images:
             scale = uncertainty_scale(shown[self._outside == 0])
             return self._with_contours(_in_colours(shown, scale)), scale
         if display.colour_by == "difference" and reference is not None:
-            difference = shading.fitted(difference_to(self._map, reference.heightmap), self._px)
-            scale = difference_scale(difference[self._outside == 0])
-            return self._with_contours(_in_colours(np.nan_to_num(difference), scale)), scale
-        scale = depth_scale(display.colours, self.range_mm)
-        return self._with_contours(self._coloured()), scale
+            left = difference(self._raw, reference.heightmap)
+            values = shading.fitted(np.where(usable(left), left.depth_mm, np.nan), self._px)
+            scale = difference_scale(values[self._outside == 0])
+            return self._with_contours(_in_colours(np.nan_to_num(values), scale)), scale
+        return self._with_contours(self._coloured()), self._depth_scale()
+
+    def _depth_scale(self) -> ColourScale:
+        title = tr("processed [mm]") if self._steps else ""
+        return depth_scale(self._display.colours, self.range_mm, title)
 
     def _with_contours(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         step = self._display.contour_mm

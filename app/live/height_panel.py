@@ -12,6 +12,7 @@ from app.view2d.colour_bar import depth_counts
 from app.view2d.display import LIMITS_MM
 from app.view2d.map_view import MapView
 from app.widgets.naming import named
+from app.widgets.units import per_mm, unit_word
 from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
@@ -74,7 +75,7 @@ class HeightPanel(QWidget):
     ) -> None:
         """Show a height map as an image in these colours."""
         self.map.set_image(rgb, extent_of(heightmap))
-        self.map.show_colours(colours, *range_mm, tr("mm"))
+        self.map.show_colours(colours, *range_mm, unit_word(), factor=per_mm())
         if histogram:
             self._since_histogram.start()
             self.map.bar.show_histogram(depth_counts(heightmap, range_mm))

@@ -130,7 +130,7 @@ class Details(QTabWidget):
             self._answer is None or answer.heightmap is not self._answer.heightmap
         ):
             self._answer = answer
-            self._show_held()
+            self.show_held()
         self._answer = answer
 
     def show_tools(self, drawn: tuple[DrawnTool, ...], chosen: int) -> None:
@@ -154,7 +154,7 @@ class Details(QTabWidget):
             self._measurement = measurement
             self.surface.show_solid(None if measurement is None else partial(solid_of, measurement))
             if self._colour_by == "residual":
-                self._show_held()
+                self.show_held()
         profile = found.profile if isinstance(found, ToolResult) else self._cut(tool)
         self.section.setCurrentWidget(self._words if profile is None else self.plot)
         self.plot.show_profile(profile)
@@ -185,10 +185,10 @@ class Details(QTabWidget):
 
     def _on_tab(self) -> None:
         self.wanted_changed.emit()
-        self._show_held()
+        self.show_held()
         self.show_tools(self._drawn, self._chosen)
 
-    def _show_held(self) -> None:
+    def show_held(self) -> None:
         """Show the frozen image in the visible view."""
         answer = self._answer
         if answer is None:
@@ -214,7 +214,7 @@ class Details(QTabWidget):
     def _on_colour(self, quantity: str) -> None:
         self._colour_by = quantity
         self.surface.menu.set_colours(_quantities(), quantity)
-        self._show_held()
+        self.show_held()
 
     def _mark_camera(self) -> None:
         width, height = self.camera.image_size

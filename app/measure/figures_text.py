@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from app.widgets.units import figure_in_unit
 from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.translation import tr
 
@@ -46,5 +47,6 @@ def value_text(value: float, sd: float | None, unit: str) -> str:
 
 
 def figure_text(figure: Measured) -> str:
-    """Return a figure as text."""
+    """Return a figure as text, lengths in the preferred unit."""
+    figure = figure_in_unit(figure)
     return value_text(figure.value, figure.sd, figure.unit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 
 from app.context.context import AppContext
@@ -43,6 +43,7 @@ class MeasurePage(QWidget):
         named(self, "measure", tr("Measure"))
         self.setAcceptDrops(True)
         self.context = context
+        context.requests.preferences_changed.connect(self._show_again)
         self.jobs = Jobs("measure-jobs", self)
         self.press_view = PressView(self.jobs, context=context)
         self.tabs = named(QTabWidget(), "measure.tabs", tr("Sections of this page"))
@@ -96,6 +97,16 @@ class MeasurePage(QWidget):
                 part.leave()
         if shown in (self.press_view, self.protocol):
             shown.enter()
+
+    def export_actions(self) -> tuple[QAction, ...]:
+        """Return what the File menu offers to export from this page."""
+        return (self.results.export_action,)
+
+    def _show_again(self) -> None:
+        """Show the values in another unit."""
+        self.press_view.details.show_held()
+        self.press_view.work.image_changed.emit()
+        self.press_view.work.changed.emit()
 
     def may_close(self) -> bool:
         """Return True: all saved data is on disk."""

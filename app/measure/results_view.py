@@ -149,7 +149,10 @@ class ResultsView(QWidget):
             box.activated.connect(self._on_filter)
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._describe())
         self.remove.clicked.connect(self.remove_selected)
-        self.export.clicked.connect(self.choose_export)
+        self.export_action = make_action(
+            self, "records.export", tr("Records as CSV…"), self.choose_export
+        )
+        self.export.clicked.connect(self.export_action.trigger)
         stack = self._book.undo
         for name, text, slot, keys in (
             ("undo", tr("Undo in the records"), stack.undo, ("Ctrl+Z",)),
@@ -175,7 +178,8 @@ class ResultsView(QWidget):
             if record.id in chosen:
                 self.table.selectRow(row)
         self.stack.setCurrentIndex(1 if self.model.records else 0)
-        self.export.setEnabled(bool(self.model.records))
+        for control in (self.export, self.export_action):
+            control.setEnabled(bool(self.model.records))
 
     @staticmethod
     def _fill(box: QComboBox, everything: str, found: dict[str, str]) -> None:

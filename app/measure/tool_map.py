@@ -21,6 +21,7 @@ from app.view2d.display import Display
 from app.view2d.map_point import read_at
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
+from app.widgets.units import in_unit
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.tools import ToolResult
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -200,8 +201,8 @@ class ToolMap(QWidget):
         reading = None
         if heightmap is not None and math.isfinite(x_mm):
             reading = read_at(heightmap, x_mm, y_mm)
-        words = "" if reading is None else tr("x {x:.2f}  y {y:.2f}  depth {d:.3f} mm").format(
-            x=reading.x_mm, y=reading.y_mm, d=reading.depth_mm
+        words = "" if reading is None else tr("x {x:.2f} mm  y {y:.2f} mm  depth {d}").format(
+            x=reading.x_mm, y=reading.y_mm, d=in_unit(reading.depth_mm)
         )  # fmt: skip
         self.readout.setText(words)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
@@ -26,7 +28,7 @@ from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.quality import Verdict, verdict_word
 from gelpolight_core.translation import tr
 
-FACT_LINES = 5
+FACT_LINES = 6
 
 
 class Details(QWidget):
@@ -69,8 +71,8 @@ class Details(QWidget):
         layout.addWidget(self.busy)
         layout.addWidget(self._area, 1)
 
-    def show_entry(self, entry: Entry | None) -> None:
-        """Show a calibration, or none."""
+    def show_entry(self, entry: Entry | None, uses: str = "") -> None:
+        """Show a calibration, or none; and how often it was used, in one line."""
         if entry is None:
             self._title.setText("")
             self._facts.setText(tr("Select a calibration to see its quality."))
@@ -82,7 +84,7 @@ class Details(QWidget):
                 tr("This file cannot be read: {reason}").format(reason=entry.broken)
             )
         else:
-            self._facts.setText(facts(entry, entry.summary))
+            self._facts.setText(facts(entry, entry.summary, uses))
         self._area.setWidget(_stages(entry))
 
 
@@ -112,8 +114,17 @@ def _heading(title: str, verdict: Verdict) -> QWidget:
     return heading
 
 
-def facts(entry: Entry, summary: CalibrationSummary) -> str:
-    """Return the origin of a calibration, and its validation."""
+def uses_text(count: int, last: datetime | None) -> str:
+    """Return how many measurements were saved with a calibration: its gel was pressed for each."""
+    if last is None:
+        return tr("No measurement was saved with it")
+    return tr("Measurements saved with it: {n}, the last on {day}").format(
+        n=count, day=f"{last.astimezone():%Y-%m-%d %H:%M}"
+    )
+
+
+def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
+    """Return the origin of a calibration, its use and its validation."""
     width, height = summary.image_size
     lines = [
         tr("Sensor {serial}, model {model}, images of {w} x {h} px").format(
@@ -126,7 +137,7 @@ def facts(entry: Entry, summary: CalibrationSummary) -> str:
             version=summary.program_version,
         ),
     ]
-    return "\n".join((*lines, *trial_lines(entry)))
+    return "\n".join((*lines, *filter(None, (uses,)), *trial_lines(entry)))
 
 
 def trial_lines(entry: Entry) -> list[str]:

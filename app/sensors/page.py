@@ -20,7 +20,7 @@ from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
-from app.sensors.details import Details
+from app.sensors.details import Details, uses_text
 from app.sensors.model import LibraryModel
 from app.sensors.report_writer import ReportWriter
 from app.sensors.sessions_box import SessionsBox
@@ -31,6 +31,7 @@ from app.widgets.actions import make_action
 from app.widgets.naming import named
 from app.workspace.entries import Entry
 from app.workspace.workspace import ENDING
+from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.translation import tr
 
@@ -81,7 +82,6 @@ class SensorsPage(QWidget):
             "sensors.new",
             tr("&New sensor"),
             requests.new_sensor.emit,
-            keys=("Ctrl+N",),
             icon_name="add",
             tip=tr("Calibrate a sensor from its camera"),
         )
@@ -98,7 +98,6 @@ class SensorsPage(QWidget):
             "sensors.import",
             tr("&Import calibration"),
             self.choose_calibrations,
-            keys=("Ctrl+I",),
             icon_name="import",
             tip=tr("Copy calibration files into the library"),
         )
@@ -158,6 +157,10 @@ class SensorsPage(QWidget):
         for action in (self.new, self.session, self.demo):
             action.setVisible("calibrate" in there)
             action.setEnabled("calibrate" in there)
+
+    def export_actions(self) -> tuple[QAction, ...]:
+        """Return what the File menu offers to export from this page."""
+        return (self.report,)
 
     def _first_actions(self) -> tuple[QAction, ...]:
         first = (self.demo, self.new, self.session, self.import_, self.trash)
@@ -289,11 +292,20 @@ class SensorsPage(QWidget):
 
     def _show_chosen(self) -> None:
         entry = self.chosen()
-        self._details.show_entry(entry)
+        self._details.show_entry(entry, self._uses(entry))
         self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
         self.report.setEnabled(entry is not None and not entry.broken and not self._writing)
         self.reveal.setEnabled(entry is not None)
         self.remove.setEnabled(entry is not None)
+
+    def _uses(self, entry: Entry | None) -> str:
+        """Return how often a calibration was used, or why that is not known."""
+        if entry is None or entry.summary is None:
+            return ""
+        try:
+            return uses_text(*self._context.workspace.uses(entry.summary.identity))
+        except InputError as error:
+            return str(error)
 
     def _with_chosen(self, function: Callable[[Entry], None]) -> None:
         entry = self.chosen()

@@ -21,6 +21,7 @@ from gelpolight_core.translation import LANGUAGES
 APPLICATION = "gelpolight"
 THEMES = ("system", "light", "dark")
 RECENT = 8
+RECENT_KINDS = ("sessions", "calibrations", "recordings")
 # About ten minutes of a fast camera.
 RECORDING_LIMIT_GB = 20.0
 CAMERAS = 16
@@ -153,20 +154,26 @@ class Settings:
     def starts_where_it_ended(self, last: bool) -> None:
         self._store.setValue("first_page", "last" if last else "start")
 
-    @property
-    def recent_sessions(self) -> tuple[Path, ...]:
-        """Session folders, newest first."""
-        stored = self._text("recent_sessions")
+    def recent(self, kind: str) -> tuple[Path, ...]:
+        """Return the files of a kind that were used last, newest first.
+
+        Parameters
+        ----------
+        kind : str
+            One of RECENT_KINDS.
+        """
+        stored = self._text(f"recent_{kind}")
         return tuple(Path(text) for text in stored.split("\n") if text)
 
-    def add_recent_session(self, folder: Path) -> None:
-        """Put a session folder at the top of the recent ones."""
-        known = [folder, *(f for f in self.recent_sessions if f != folder)][:RECENT]
-        self._store.setValue("recent_sessions", "\n".join(map(str, known)))
+    def add_recent(self, kind: str, path: Path) -> None:
+        """Put a file or session folder at the top of the recent ones of its kind."""
+        known = [path, *(other for other in self.recent(kind) if other != path)][:RECENT]
+        self._store.setValue(f"recent_{kind}", "\n".join(map(str, known)))
 
-    def forget_recent_sessions(self) -> None:
-        """Clear the list of recent sessions."""
-        self._store.remove("recent_sessions")
+    def forget_recent(self) -> None:
+        """Clear the lists of recent files."""
+        for kind in RECENT_KINDS:
+            self._store.remove(f"recent_{kind}")
 
     @property
     def source(self) -> tuple[str, Path | None]:
@@ -221,6 +228,15 @@ class Settings:
     @reconstruction.setter
     def reconstruction(self, mode: tuple[str, str]) -> None:
         self._store.setValue("reconstruction", "/".join(mode))
+
+    @property
+    def length_unit(self) -> str:
+        """Unit in which measured lengths are shown: ``mm`` or ``um``."""
+        return "um" if self._text("length_unit") == "um" else "mm"
+
+    @length_unit.setter
+    def length_unit(self, unit: str) -> None:
+        self._store.setValue("length_unit", unit)
 
     def _cameras(self) -> dict[str, dict[str, str]]:
         try:

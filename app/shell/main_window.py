@@ -294,6 +294,10 @@ class MainWindow(QMainWindow):
             settings.keep_folder("session", Path(names[0]).parent)
             self.open_dropped(tuple(map(Path, names)))
 
+    def import_calibrations(self) -> None:
+        """Let the user choose calibration files, and copy them into the library."""
+        self._with_page("sensors", lambda page: _call(page, "choose_calibrations"))
+
     def open_session(self, folder: Path | str) -> None:
         """Calibrate from a session folder and remember it."""
         folder = Path(folder)
@@ -309,7 +313,7 @@ class MainWindow(QMainWindow):
             self.context.toasts.show(str(error), "fail")
             return
         self.context.settings.keep_folder("session", folder.parent)
-        self.context.settings.add_recent_session(folder)
+        self.context.settings.add_recent("sessions", folder)
         self.open_path_in("calibrate", str(folder))
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
@@ -351,6 +355,7 @@ class MainWindow(QMainWindow):
         dialog = PreferencesDialog(self.context.settings, self)
         dialog.theme_changed.connect(self.set_theme)
         dialog.workspace_changed.connect(self._set_workspace)
+        dialog.changed.connect(self.context.requests.preferences_changed)
         dialog.limits_changed.connect(self.context.requests.calibrations_changed)
         _show(dialog)
 

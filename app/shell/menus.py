@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtGui import QAction, QActionGroup
-from PySide6.QtWidgets import QMenu
 
 from app.shell.edit_menu import EditMenu
+from app.shell.file_menu import FileMenu
 from app.shell.preferences import THEME_NAMES
 from app.widgets.actions import make_action
-from app.widgets.label import plain_tip
-from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
 if TYPE_CHECKING:
@@ -24,54 +21,14 @@ class Menus:
 
     def __init__(self, window: MainWindow) -> None:
         self._window = window
-        self._recent = named(QMenu(tr("Recent sessions"), window), "file.recent", tr("Recent"))
-        self._recent.aboutToShow.connect(self._fill_recent)
         self.themes = self._build_themes()
-        self._build_file()
+        self.file = FileMenu(window)
+        window.menuBar().addMenu(self.file)
         self.edit = EditMenu(window)
         window.menuBar().addMenu(self.edit)
         self._build_view()
         self._build_tools()
         self._build_help()
-
-    def _build_file(self) -> None:
-        window = self._window
-        menu = window.menuBar().addMenu(tr("&File"))
-        if "calibrate" in window.entries:
-            menu.addAction(
-                make_action(
-                    window,
-                    "file.session",
-                    tr("&Open session folder…"),
-                    window.choose_session,
-                    keys=("Ctrl+O",),
-                    icon_name="folder",
-                )
-            )
-            menu.addAction(
-                make_action(
-                    window,
-                    "file.open",
-                    tr("Open &files…"),
-                    window.choose_files,
-                    keys=("Ctrl+Alt+O",),
-                )
-            )
-            menu.addMenu(self._recent)
-            menu.addSeparator()
-        menu.addAction(
-            make_action(
-                window,
-                "file.preferences",
-                tr("&Preferences…"),
-                window.show_preferences,
-                keys=("Ctrl+,",),
-            )
-        )
-        menu.addSeparator()
-        menu.addAction(
-            make_action(window, "file.quit", tr("&Quit"), window.close, keys=("Ctrl+Q",))
-        )
 
     def _build_view(self) -> None:
         window = self._window
@@ -154,24 +111,3 @@ class Menus:
             group.addAction(action)
             actions[key] = action
         return actions
-
-    def _fill_recent(self) -> None:
-        self._recent.clear()
-        sessions = self._window.context.settings.recent_sessions
-        for folder in sessions:
-            action = self._recent.addAction(_short(folder))
-            action.setToolTip(plain_tip(str(folder)))
-            action.triggered.connect(
-                lambda _=False, folder=folder: self._window.open_session(folder)
-            )
-        if sessions:
-            self._recent.addSeparator()
-            forget = self._recent.addAction(tr("Clear this list"))
-            forget.triggered.connect(self._window.context.settings.forget_recent_sessions)
-        else:
-            self._recent.addAction(tr("No recent sessions")).setEnabled(False)
-
-
-def _short(folder: Path) -> str:
-    """Return the names of a folder and its parent. An ampersand does not become a mnemonic."""
-    return f"{folder.name}  ({folder.parent})".replace("&", "&&")

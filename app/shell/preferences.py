@@ -1,4 +1,4 @@
-"""The preferences: theme, workspace folder and limits. Changes apply at once."""
+"""The preferences: theme, first page, mode, unit, folder, limits. Changes apply at once."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from app.theme.icons import icon
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.naming import named
+from app.widgets.units import use_length_unit
+from gelpolight_core.reconstruction.modes import MODES
 from gelpolight_core.translation import LANGUAGES, current_language, system_language, tr
 
 THEME_NAMES = {
@@ -37,6 +39,8 @@ class PreferencesDialog(QDialog):
     theme_changed = Signal(str)
     workspace_changed = Signal(str)
     limits_changed = Signal()
+    changed = Signal()
+    """Another mode of the live depth, or unit of lengths."""
 
     def __init__(self, settings: Settings, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -48,6 +52,8 @@ class PreferencesDialog(QDialog):
         self._build_theme()
         self._build_first_page()
         self._build_language()
+        self._build_mode()
+        self._build_unit()
         self._build_workspace()
         self._limits = {
             "age_days": self._number(
@@ -98,6 +104,41 @@ class PreferencesDialog(QDialog):
         self._language_note.hide()
         self._form.addRow(tr("&Language"), box)
         self._form.addRow(self._language_note)
+
+    def _build_mode(self) -> None:
+        box = named(
+            ComboBox(self), "preferences.mode", tr("Live depth"),
+            tr("Accuracy or speed of live images, as on the Inspect page. Frozen images always "
+               "have the full accuracy of the model"),
+        )  # fmt: skip
+        for mode in MODES:
+            box.addItem(mode.label, (mode.model, mode.effort))
+        kept = [(mode.model, mode.effort) for mode in MODES]
+        now = self._settings.reconstruction
+        box.setCurrentIndex(kept.index(now) if now in kept else 0)
+        box.currentIndexChanged.connect(lambda index: self._set_mode(kept[index]))
+        self._form.addRow(tr("&Live depth"), box)
+
+    def _set_mode(self, mode: tuple[str, str]) -> None:
+        self._settings.reconstruction = mode
+        self.changed.emit()
+
+    def _build_unit(self) -> None:
+        box = named(
+            ComboBox(self), "preferences.unit", tr("Unit of measured lengths"),
+            tr("Depths and measured lengths are shown in this unit. Positions, inputs, records and "
+               "files keep mm"),
+        )  # fmt: skip
+        for unit, text in (("mm", tr("mm")), ("um", tr("um"))):
+            box.addItem(text, unit)
+        box.setCurrentIndex(box.findData(self._settings.length_unit))
+        box.currentIndexChanged.connect(lambda _: self._set_unit(box.currentData()))
+        self._form.addRow(tr("&Unit of lengths"), box)
+
+    def _set_unit(self, unit: str) -> None:
+        self._settings.length_unit = unit
+        use_length_unit(unit)
+        self.changed.emit()
 
     def _build_workspace(self) -> None:
         self._folder = named(

@@ -80,8 +80,22 @@ class ColourBar(pg.ColorBarItem):  # type: ignore[misc]
         region = self.region
         return region is not None and (region.moving or any(line.moving for line in region.lines))
 
-    def show_range(self, colours: str, low: float, high: float, unit: str) -> None:
-        """Show the colours from `low` to `high`, except while the user drags them."""
+    def show_range(
+        self, colours: str, low: float, high: float, unit: str, *, factor: float = 1.0
+    ) -> None:
+        """Show the colours from `low` to `high`, except while the user drags them.
+
+        Parameters
+        ----------
+        colours : str
+            Name of the colour map.
+        low, high : float
+            Values of the first and the last colour.
+        unit : str
+            Of the numbers on the axis.
+        factor : float, optional
+            The numbers on the axis are the values times this.
+        """
         self.setVisible(True)
         if colours != self._colours:
             self._colours = colours
@@ -89,6 +103,7 @@ class ColourBar(pg.ColorBarItem):  # type: ignore[misc]
         if unit != self._unit:
             self._unit = unit
             self._write_unit()
+        self.axis.setScale(factor)
         # A single value gives no scale.
         high = high if high > low else low + 1.0
         if not self.dragged and (low, high) != self.values:

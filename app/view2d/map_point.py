@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.widgets.units import in_unit
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
@@ -44,7 +45,7 @@ class Reading:
         parts = [
             tr("x {x:.2f} mm").format(x=self.x_mm),
             tr("y {y:.2f} mm").format(y=self.y_mm),
-            tr("depth {d:.3f} mm").format(d=self.depth_mm),
+            tr("depth {d}").format(d=in_unit(self.depth_mm)),
             tr("slope {s:.1f}°").format(s=self.slope_deg),
         ]
         if math.isfinite(self.depth_sd_mm):

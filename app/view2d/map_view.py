@@ -152,10 +152,12 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
             self.box.setLimits(minXRange=0.2, xMin=-reach, xMax=reach, yMin=-reach, yMax=reach)
             self.fit()
 
-    def show_colours(self, colours: str, low: float, high: float, unit: str) -> None:
-        """Show the colour bar with a range."""
-        self.bar.show_range(colours, low, high, unit)
-        words = f"{low:.3g} … {high:.3g} {unit}"
+    def show_colours(
+        self, colours: str, low: float, high: float, unit: str, *, factor: float = 1.0
+    ) -> None:
+        """Show the colour bar with a range, its numbers times a factor."""
+        self.bar.show_range(colours, low, high, unit, factor=factor)
+        words = f"{low * factor:.3g} … {high * factor:.3g} {unit}"
         if words != self.accessibleDescription():
             self.setAccessibleDescription(words)
 

@@ -9,6 +9,7 @@ from PySide6.QtCore import QEvent, Qt, Signal
 from app.theme import theme
 from app.widgets.naming import named
 from app.widgets.plots import without_menus
+from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.translation import tr
 
@@ -34,7 +35,6 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         named(self, name, tr("Depth along the line"))
         self.setMinimumHeight(90)
         self.setLabel("bottom", tr("along the line (mm)"))
-        self.setLabel("left", tr("depth (mm)"))
         for side in ("bottom", "left"):
             self.getAxis(side).enableAutoSIPrefix(False)
         self.showGrid(x=True, y=True, alpha=0.2)
@@ -49,6 +49,8 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
             item.setVisible(False)
             self.addItem(item, ignoreBounds=True)
         self._take_theme()
+        self._unit = ""
+        self._take_unit()
 
     def allow_level(self) -> None:
         """Make the level draggable."""
@@ -60,6 +62,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
             self._curve.setData([], [])
             self.show_width(None)
             return
+        self._take_unit()
         self._curve.setData(profile.along_mm, profile.depth_mm)
         self._fit(profile.depth_mm)
 
@@ -85,6 +88,13 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         fits = shown_low <= low and shown_high >= high and shown_high - shown_low < 1.6 * span
         if not fits:
             self.setYRange(low - 0.12 * span, high + 0.12 * span, padding=0.0)
+
+    def _take_unit(self) -> None:
+        if self._unit == length_unit():
+            return
+        self._unit = length_unit()
+        self.getAxis("left").setScale(per_mm())
+        self.setLabel("left", tr("depth ({unit})").format(unit=unit_word()))
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102
         super().changeEvent(event)

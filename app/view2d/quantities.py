@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +11,6 @@ from app.view2d.display import colour_table
 from app.view2d.map_point import flag_words
 from app.view3d.surface import ColourScale
 from app.widgets.lengths import round_up
-from gelpolight_core.errors import InputError
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.translation import tr
 
@@ -53,9 +51,9 @@ class Reference:
     name: str = ""
 
 
-def depth_scale(colours: str, range_mm: tuple[float, float]) -> ColourScale:
+def depth_scale(colours: str, range_mm: tuple[float, float], title: str = "") -> ColourScale:
     """Return the scale of depths."""
-    return ColourScale(tr("depth [mm]"), colour_table(colours), *range_mm)
+    return ColourScale(title or tr("depth [mm]"), colour_table(colours), *range_mm)
 
 
 def slope_scale() -> ColourScale:
@@ -89,31 +87,3 @@ def difference_scale(difference_mm: Map, title: str = "") -> ColourScale:
     top = round_up(max(round(top, 5), LEAST_DIFFERENCE_MM))
     title = title or tr("difference [mm]")
     return ColourScale(title, colour_table("CET-D1"), -top, top)
-
-
-def difference_to(heightmap: HeightMap, reference: HeightMap) -> Map:
-    """Return depth minus the reference's depth on the grid of a height map. NaN where unknown.
-
-    Raises
-    ------
-    InputError
-        If the two do not overlap.
-    """
-    pitch = reference.pitch_mm
-    column = ((heightmap.x_mm - float(reference.x_mm[0])) / pitch).astype(np.float32)
-    row = ((heightmap.y_mm - float(reference.y_mm[0])) / pitch).astype(np.float32)
-    outside = reference.flags & Flag.OUTSIDE.value != 0
-    known = np.where(outside, np.float32(np.nan), reference.depth_mm).astype(np.float32)
-    columns, rows = np.meshgrid(column, row)
-    other = cv2.remap(
-        known, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT,
-        borderValue=float("nan"),
-    )  # fmt: skip
-    difference = heightmap.depth_mm - other
-    if not np.isfinite(difference).any():
-        raise InputError(
-            tr("The reference does not overlap this frame"),
-            where=tr("Difference"),
-            advice=tr("Choose a reference of the same sensor"),
-        )
-    return np.asarray(difference, np.float32)

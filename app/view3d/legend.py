@@ -84,9 +84,10 @@ def draw_scale(
         number + 0.5: name for number, (name, _) in enumerate(scale.names)
     }
     mapper.scalar_visibility = False  # the texture contains the colours
+    title = scale.title.replace(" [", "\n[")  # the unit on a line of its own, for narrow views
     bar = plotter.add_scalar_bar(
-        scale.title, mapper=mapper, vertical=True, n_labels=0 if scale.names else COLOUR_TICKS,
-        fmt="{:.3g}", color=ink.text, position_x=0.015, position_y=0.42, width=0.17, height=0.54,
+        title, mapper=mapper, vertical=True, n_labels=0 if scale.names else COLOUR_TICKS,
+        fmt="{:.4g}", color=ink.text, position_x=0.015, position_y=0.42, width=0.17, height=0.54,
         title_font_size=FONT + 1, label_font_size=FONT + 1, unconstrained_font_size=True,
         render=False,
     )  # fmt: skip

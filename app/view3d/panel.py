@@ -15,6 +15,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import (
     QHBoxLayout,
     QStackedWidget,
+    QToolBar,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -122,13 +123,16 @@ class SurfacePanel(QWidget):
         self._why = named(PlainLabel(), "view3d.reason", tr("Why 3D is not available"))
         self._why.setWordWrap(True)
         self._why.hide()
+        # A toolbar, because it has an arrow where it is too narrow for all buttons.
+        bar = named(QToolBar(), "view3d.bar", tr("View directions"))
+        bar.setContextMenuPolicy(Qt.ContextMenuPolicy.PreventContextMenu)
+        for name, (text, keys) in view_names().items():
+            bar.addWidget(self._button(name, text, f"{text} ({keys})"))
+        bar.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
         row = QHBoxLayout()
         row.setContentsMargins(4, 2, 4, 2)
         row.setSpacing(2)
-        for name, (text, keys) in view_names().items():
-            row.addWidget(self._button(name, text, f"{text} ({keys})"))
-        row.addWidget(self._button("fit", tr("Reset"), tr("Show the whole surface (double click)")))
-        row.addStretch(1)
+        row.addWidget(bar, 1)
         button = named(QToolButton(), "view3d.menu", tr("3D menu"), tr("Options of the 3D view"))
         button.setText(tr("3D options"))
         button.setAutoRaise(True)

@@ -123,7 +123,7 @@ class Scene:
         surface, style = self.surface, self.style
         if surface is None:
             return
-        scale = surface.scale
+        scale = surface.scale.in_unit()
         colours = (scale.title, scale.low, scale.high, scale.names, scale.table.tobytes())
         # By the extent, not the nodes: those of a live and a frozen frame differ.
         shown = (surface.extent_mm, surface.range_mm, colours, style, self._ink)

@@ -8,10 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 
 # A software renderer is fast enough for this many nodes per side. The texture carries the detail.
 LIVE_NODES = 128
+
+MM = "[mm]"
+"""At the end of the titles of scales of lengths, in all languages."""
 
 Rgb = tuple[int, int, int]
 
@@ -37,6 +41,13 @@ class ColourScale:
     low: float
     high: float
     names: tuple[tuple[str, Rgb], ...] = ()
+
+    def in_unit(self) -> ColourScale:
+        """Return it in the preferred unit if it is of lengths in mm, for a legend."""
+        if MM not in self.title or length_unit() == "mm":
+            return self
+        title = self.title.replace(MM, f"[{unit_word()}]")
+        return replace(self, title=title, low=self.low * per_mm(), high=self.high * per_mm())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

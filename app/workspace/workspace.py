@@ -75,6 +75,20 @@ class Workspace:
             self._records = Records.open(path)
         return self._records
 
+    def uses(self, calibration_id: str) -> tuple[int, datetime | None]:
+        """Return how many measurements were saved with a calibration, and when the last one was.
+
+        Raises
+        ------
+        InputError
+            If the records cannot be read.
+        """
+        from gelpolight_core.records.records import NAME
+
+        if not (self.folder / NAME).exists():
+            return 0, None
+        return self.records.uses(calibration_id)
+
     def close(self) -> None:
         """Close the records. The next use opens them again."""
         records, self._records = self._records, None

@@ -82,6 +82,7 @@ def write_npz(heightmap: HeightMap, file: BinaryIO) -> None:
         "calibration_id": np.array(heightmap.calibration_id),
         "model": np.array(heightmap.model),
         "source": np.array(heightmap.source),
+        "notes": np.array(heightmap.notes, dtype=np.str_),
     }
     if heightmap.normals is not None:
         arrays["normals"] = heightmap.normals.astype(np.float32, copy=False)
@@ -129,6 +130,7 @@ def read_npz(path: Path) -> HeightMap:
                 calibration_id=str(stored["calibration_id"]),
                 model=str(stored["model"]),
                 source=str(stored["source"]),
+                notes=tuple(map(str, stored["notes"])) if "notes" in known else (),
                 **{"normals": None} | optional,
             )
         if not heightmap.pitch_mm > 0.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, median_filter
@@ -106,7 +107,9 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     level, slope_x, slope_y = np.linalg.solve(terms, depth)
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     plane = level + slope_x * x + slope_y * y
-    return _without(heightmap, plane, tr("Levelled by three points."))
+    level = _without(heightmap, plane, tr("Levelled by three points."))
+    # The errors of the three depths tilt the whole map; they are not followed.
+    return _without_errors(level)
 
 
 def smooth_gaussian(heightmap: HeightMap, *, sigma_mm: float) -> HeightMap:
@@ -166,30 +169,42 @@ def smooth_median(heightmap: HeightMap, *, nodes: int) -> HeightMap:
 def difference(heightmap: HeightMap, earlier: HeightMap) -> HeightMap:
     """Return how much deeper a height map is than an earlier one of the same sensor.
 
+    The earlier map is read at the points of the first, linear between its own. Points without an
+    earlier depth are flagged as outside. The errors of both maps count as independent.
+
     Parameters
     ----------
     heightmap, earlier : HeightMap
-        On the same grid.
+        In the same sensor frame; their grids may differ.
 
     Raises
     ------
     InputError
-        If the grids differ.
+        If the two do not overlap.
     """
-    same = heightmap.depth_mm.shape == earlier.depth_mm.shape and all(
-        np.allclose(one, other, atol=1e-6)
-        for one, other in ((heightmap.x_mm, earlier.x_mm), (heightmap.y_mm, earlier.y_mm))
-    )
-    if not same:
+    outside = (earlier.flags & np.uint8(Flag.OUTSIDE)) != 0
+    other = _on_grid(heightmap, earlier, np.where(outside, np.nan, earlier.depth_mm))
+    there = np.isfinite(other)
+    if not (there & usable(heightmap)).any():
         raise InputError(
-            tr("the two height maps have different grids"),
+            tr("the two height maps do not overlap"),
             where=f"{heightmap.source}, {earlier.source}",
-            advice=tr("Compare two frames of one sensor with one calibration"),
+            advice=tr("Choose a reference of the same sensor"),
         )
-    left = _without(
-        heightmap, earlier.depth_mm, tr("Difference to {name}.").format(name=earlier.source)
+    note = tr("Difference to {name}.").format(name=earlier.source)
+    left = _without(heightmap, np.where(there, other, heightmap.depth_mm), note)
+    flags = left.flags | np.where(there, 0, np.uint8(Flag.OUTSIDE)).astype(np.uint8)
+    return replace(
+        left,
+        flags=flags,
+        depth_sd_mm=_root_sum_square(
+            heightmap, earlier, heightmap.depth_sd_mm, earlier.depth_sd_mm
+        ),
+        depth_model_sd_mm=_root_sum_square(
+            heightmap, earlier, heightmap.depth_model_sd_mm, earlier.depth_model_sd_mm
+        ),
+        noise_mm=None,
     )
-    return replace(left, flags=heightmap.flags | earlier.flags)
 
 
 def histogram(
@@ -213,6 +228,34 @@ def histogram(
     return counts, edges
 
 
+def _on_grid(
+    heightmap: HeightMap, other: HeightMap, values: NDArray[np.floating]
+) -> NDArray[np.float32]:
+    """Return values of another map's points at the points of this one; NaN beyond them."""
+    axes = (heightmap.x_mm, other.x_mm), (heightmap.y_mm, other.y_mm)
+    if all(own.size == its.size and np.allclose(own, its, atol=1e-6) for own, its in axes):
+        return np.asarray(values, np.float32)
+    column, row = (((own - float(its[0])) / other.pitch_mm).astype(np.float32) for own, its in axes)
+    columns, rows = np.meshgrid(column, row)
+    found = cv2.remap(
+        values.astype(np.float32), columns, rows, cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"),
+    )  # fmt: skip
+    return np.asarray(found, np.float32)
+
+
+def _root_sum_square(
+    heightmap: HeightMap,
+    earlier: HeightMap,
+    first: NDArray[np.float32] | None,
+    second: NDArray[np.float32] | None,
+) -> NDArray[np.float32] | None:
+    """Return the standard deviation of a difference; None where one of the two is not stated."""
+    if first is None or second is None:
+        return None
+    return np.asarray(np.hypot(first, _on_grid(heightmap, earlier, second)), np.float32)
+
+
 def _without(heightmap: HeightMap, plane: NDArray[np.floating], note: str) -> HeightMap:
     depth = (heightmap.depth_mm - plane).astype(np.float32)
     return replace(heightmap, depth_mm=depth, normals=None, notes=(*heightmap.notes, note))
@@ -220,16 +263,23 @@ def _without(heightmap: HeightMap, plane: NDArray[np.floating], note: str) -> He
 
 def _filtered(heightmap: HeightMap, depth_mm: NDArray[np.floating], note: str) -> HeightMap:
     """Return a smoothed map. Its errors are no longer those of the map before."""
-    return replace(
+    smooth = replace(
         heightmap,
         depth_mm=depth_mm.astype(np.float32),
         normals=None,
+        notes=(*heightmap.notes, note),
+    )
+    return _without_errors(smooth)
+
+
+def _without_errors(heightmap: HeightMap) -> HeightMap:
+    return replace(
+        heightmap,
         slope_sd=None,
         depth_sd_mm=None,
         slope_model_sd=None,
         depth_model_sd_mm=None,
         noise_mm=None,
-        notes=(*heightmap.notes, note),
     )
 
 

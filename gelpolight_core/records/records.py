@@ -295,6 +295,30 @@ class Records:
         except ValueError as error:
             raise self._no_measurement(error) from error
 
+    def uses(self, calibration_id: str) -> tuple[int, datetime | None]:
+        """Return the number of measurements with a calibration, and the time of the last one.
+
+        Parameters
+        ----------
+        calibration_id : str
+            Identity of the calibration.
+
+        Raises
+        ------
+        InputError
+            If they cannot be read.
+        """
+        with self._reading() as connection:
+            row = connection.execute(
+                "SELECT COUNT(*) AS n, MAX(time) AS last FROM measurements"
+                " WHERE calibration_id = ? AND removed IS NULL",
+                (calibration_id,),
+            ).fetchone()
+        try:
+            return int(row["n"]), row["last"] and datetime.fromisoformat(row["last"])
+        except (ValueError, TypeError) as error:
+            raise self._no_measurement(error) from error
+
     def know_calibration(
         self, identity: str, serial: str, *, model: str = "", made: str = "", verdict: str = ""
     ) -> None:

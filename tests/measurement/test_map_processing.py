@@ -77,7 +77,7 @@ def test_a_median_removes_a_single_wrong_point_and_keeps_an_edge() -> None:
             smooth_median(step, nodes=nodes)
 
 
-def test_a_difference_is_of_the_same_grid_and_valid_where_both_are() -> None:
+def test_a_difference_is_valid_where_both_maps_are() -> None:
     press = tilted_press()
     bare = made(lambda x, y: 0.02 * x - 0.01 * y + 0.1)
     flags = bare.flags.copy()
@@ -85,8 +85,30 @@ def test_a_difference_is_of_the_same_grid_and_valid_where_both_are() -> None:
     left = difference(press, replace(bare, flags=flags))
     assert float(left.depth_mm.max()) == pytest.approx(0.5, abs=1e-6)
     assert not usable(left)[0, 0]
-    with pytest.raises(InputError, match="different grids"):
-        difference(press, replace(bare, x_mm=bare.x_mm + 1.0))
+    with pytest.raises(InputError, match="overlap"):
+        difference(press, replace(bare, x_mm=bare.x_mm + 100.0))
+
+
+def test_the_reference_of_a_difference_may_have_a_coarser_grid() -> None:
+    plane = made(lambda x, y: 0.02 * x - 0.01 * y + 0.1)
+    coarse = replace(
+        plane, depth_mm=plane.depth_mm[::3, ::3] - np.float32(0.1), x_mm=plane.x_mm[::3],
+        y_mm=plane.y_mm[::3], flags=plane.flags[::3, ::3], pitch_mm=3 * plane.pitch_mm,
+    )  # fmt: skip
+    left = difference(plane, coarse)
+    assert left.depth_mm[usable(left)] == pytest.approx(0.1, abs=1e-5)
+    assert usable(left).mean() > 0.9
+
+
+def test_a_difference_has_the_errors_of_both_maps_and_three_points_leave_none() -> None:
+    press = tilted_press()
+    sd = np.full(press.depth_mm.shape, 0.003, np.float32)
+    one, other = replace(press, depth_sd_mm=sd), replace(press, depth_sd_mm=sd * 4.0 / 3.0)
+    left = difference(one, other)
+    assert left.depth_sd_mm is not None
+    np.testing.assert_allclose(left.depth_sd_mm, 0.005, rtol=1e-5)
+    assert difference(one, press).depth_sd_mm is None
+    assert level_by_points(one, ((-2.0, -2.0), (2.0, -2.0), (0.0, 2.0))).depth_sd_mm is None
 
 
 def test_a_histogram_counts_every_point_once() -> None:

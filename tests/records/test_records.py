@@ -104,6 +104,16 @@ def test_measurements_are_found_by_sensor_shape_and_time(records: Records) -> No
     assert records.sensors() == ("A-1", "B-2")
 
 
+def test_the_uses_of_a_calibration_are_counted_without_removed_ones(records: Records) -> None:
+    assert records.uses("c1") == (0, None)
+    records.add(cylinder(1.01, hours=2.0))
+    records.add(cylinder(1.02))
+    wrong = records.add(cylinder(9.0, hours=3.0))
+    records.remove(wrong)
+    records.add(replace(cylinder(1.03, hours=4.0), calibration_id="c2"))
+    assert records.uses("c1") == (2, NOON + timedelta(hours=2.0))
+
+
 def test_what_was_removed_can_be_brought_back(records: Records) -> None:
     kept, removed = records.add(cylinder(1.0)), records.add(cylinder(2.0))
     records.remove(removed)

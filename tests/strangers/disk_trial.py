@@ -104,7 +104,7 @@ def settings(folder: Path) -> str:
         kept.save()
 
     said = tried(keep)
-    if Settings(folder / "desktop.ini").recent_sessions != (Path("/kept"),):
+    if Settings(folder / "desktop.ini").recent("sessions") != (Path("/kept"),):
         return f"FAULT: settings are lost after {said}"
     return said
 
@@ -140,7 +140,7 @@ def begin(root: Path) -> None:
         for number in range(2):
             writer.append(noisy(number), number, float(number))
     kept = Settings(root / "settings" / "desktop.ini")
-    kept.add_recent_session(Path("/kept"))
+    kept.add_recent("sessions", Path("/kept"))
     kept.save()
 
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QPushButton
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
@@ -398,3 +398,46 @@ def test_leaving_while_zero_waits_for_frames_is_reported_as_zero_not_set(
     levels = [record.levelno for record in caplog.records if record.levelno > logging.INFO]
     assert levels == [logging.WARNING]
     assert context.workspace.in_use == path
+
+
+def test_a_frozen_map_is_processed_says_so_and_one_click_shows_it_as_reconstructed(
+    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_depth(page, qtbot)
+    line = page.findChild(QLabel, "inspect.processed.steps")
+    level = page.findChild(QComboBox, "inspect.processing.level")
+    reset = page.findChild(QPushButton, "inspect.processed.reset")
+    assert line is not None and level is not None and reset is not None
+    level.setCurrentIndex(level.findData("plane"))
+    assert not page.processed.isVisible()
+    page.pause(True)
+    qtbot.waitUntil(page.processed.isVisible, timeout=WAIT_MS)
+    last = page.depth.last
+    assert last is not None and last.raw is not None and last.heightmap is not None
+    assert last.processed[0] in line.text()
+    assert not np.array_equal(last.raw.depth_mm, last.heightmap.depth_mm)
+    assert "(processed)" in page.views.docks["surface"].windowTitle()
+    reset.click()
+    qtbot.waitUntil(lambda: not page.processed.isVisible(), timeout=WAIT_MS)
+    assert page.depth.last is not None and page.depth.last.heightmap is last.raw
+    assert "(processed)" not in page.views.docks["surface"].windowTitle()
+
+
+def test_the_held_reference_is_subtracted_as_it_was_reconstructed(
+    page: InspectPage, presses: Path, small_calibration: Calibration, qtbot: QtBot
+) -> None:
+    page.enter()
+    _use(page, small_calibration)
+    _wait_for_depth(page, qtbot)
+    page.pause(True)
+    hold = page.findChild(QPushButton, "inspect.processing.hold")
+    subtract = page.findChild(QCheckBox, "inspect.processing.subtract")
+    assert hold is not None and subtract is not None and not subtract.isEnabled()
+    hold.click()
+    subtract.setChecked(True)
+    qtbot.waitUntil(page.processed.isVisible, timeout=WAIT_MS)
+    last = page.depth.last
+    assert last is not None and last.heightmap is not None
+    assert np.abs(last.heightmap.depth_mm).max() == pytest.approx(0.0, abs=1e-6)

@@ -57,6 +57,17 @@ def test_every_mode_is_offered_with_its_measured_errors(
     assert errors == sorted(errors, key=lambda e: e.height_percent + e.size_percent, reverse=True)
 
 
+def test_the_mode_of_the_preferences_is_used_at_once(
+    choice: ModeChoice, full: Reconstructor, context: AppContext, qtbot: QtBot
+) -> None:
+    choice.offer(full, full)
+    context.settings.reconstruction = ("full", "best")
+    with qtbot.waitSignal(choice.chosen) as chosen:
+        context.requests.preferences_changed.emit()
+    assert chosen.args[0] is full
+    assert choice.box.currentData() == Mode("full", "best")
+
+
 def test_another_effort_is_used_at_once_and_saved(
     choice: ModeChoice, full: Reconstructor, context: AppContext, qtbot: QtBot
 ) -> None:

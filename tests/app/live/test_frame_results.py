@@ -13,9 +13,9 @@ from app.sources.source import Frame
 from app.view2d import shading
 from app.view2d.cuts import Section
 from app.view2d.display import QUANTITIES, SURROUND, Display, Light, colour_table
-from app.view2d.quantities import FLAG_COLOURS, Reference, difference_to
+from app.view2d.processing import Processing
+from app.view2d.quantities import FLAG_COLOURS, Reference
 from app.view3d.surface import LIVE_NODES
-from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.misfit import Misfit
@@ -143,21 +143,32 @@ def test_the_surface_shows_each_quantity_with_its_own_scale(
     assert largest == max(dome.depth_mm.shape) if still else largest <= LIVE_NODES
 
 
-def test_a_difference_is_depth_less_reference_where_both_are_known(dome: HeightMap) -> None:
-    step = 3  # the reference has another grid
-    coarse = replace(
-        dome, depth_mm=dome.depth_mm[::step, ::step] - np.float32(0.1), x_mm=dome.x_mm[::step],
-        y_mm=dome.y_mm[::step], flags=dome.flags[::step, ::step], normals=None,
-        pitch_mm=step * dome.pitch_mm,
-    )  # fmt: skip
-    difference = difference_to(dome, coarse)
-    inside = np.hypot(*np.meshgrid(dome.x_mm, dome.y_mm)) < 7.0
-    # A kink of the dome lies between nodes of the coarse grid.
-    assert difference[inside] == pytest.approx(0.1, abs=0.04)
-    assert np.median(difference[inside]) == pytest.approx(0.1, abs=1e-3)
-    assert np.isnan(difference[0, 0])
-    with pytest.raises(InputError):
-        difference_to(dome, replace(coarse, x_mm=coarse.x_mm + 100.0))
+def test_a_frozen_height_map_is_shown_and_measured_as_processed(
+    dome: HeightMap, frame: Frame
+) -> None:
+    tilt = 0.02 * dome.x_mm.astype(np.float32)
+    tilted = replace(dome, depth_mm=dome.depth_mm + tilt)
+    steps = Processing(reference=Reference(replace(dome, depth_mm=0.0 * dome.depth_mm + tilt)))
+    line = Section((-6.0, -1.0), (6.0, -1.0))
+    views = {"surface": True, "section": line, "quality": "flags", "processing": steps}
+    shown, _ = _made(tilted, frame, still=True, **views)
+    np.testing.assert_allclose(shown.heightmap.depth_mm, dome.depth_mm, atol=1e-6)
+    assert float(np.nanmax(shown.cut.profile.depth_mm)) == pytest.approx(0.8, abs=2e-3)
+    assert float(shown.surface.depth_mm.max()) == pytest.approx(0.8, abs=1e-3)
+    plain, _ = _made(tilted, frame, still=True, surface=True)
+    assert shown.surface.scale.title != plain.surface.scale.title
+    assert shown.processed and shown.raw is tilted
+    live, _ = _made(tilted, frame, **views)
+    assert live.heightmap is tilted and not live.processed
+
+
+def test_a_processing_that_is_refused_changes_nothing_and_is_reported(
+    dome: HeightMap, frame: Frame
+) -> None:
+    steps = Processing(level="points", points_mm=((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)))
+    shown, _ = _made(dome, frame, height=True, still=True, processing=steps)
+    assert shown.heightmap is dome and not shown.processed
+    assert "line" in shown.refused
 
 
 def test_without_a_reference_or_an_uncertainty_the_surface_shows_depth(

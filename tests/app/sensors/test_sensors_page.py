@@ -31,6 +31,8 @@ from app.widgets.question import Question
 from app.workspace.entries import read_entry
 from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.records.entry import MeasurementRecord, Quantity
+from gelpolight_core.records.records import NAME
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +83,25 @@ def test_an_imported_calibration_is_shown_with_every_stage(
     assert shown == [f"sensors.quality.{stage}" for stage in chosen.summary.quality]
     assert "Not validated" in words(page)
     assert "library" in context.toasts.shown()[0].text
+
+
+def test_the_details_count_the_measurements_with_the_calibration(
+    page: SensorsPage, source: Path, context: AppContext
+) -> None:
+    page.open_path(source)
+    assert "No measurement was saved" in words(page)
+    assert not (context.workspace.folder / NAME).exists()
+    chosen = page.chosen()
+    assert chosen is not None and chosen.summary is not None
+    for hours in range(3):
+        context.workspace.records.add(
+            MeasurementRecord(
+                chosen.serial, chosen.summary.identity, "ball", (Quantity("height_mm", 1.0, 0.01),),
+                time=datetime(2026, 3, 1, 10 + hours, tzinfo=UTC),
+            )
+        )  # fmt: skip
+    page.refresh()
+    assert "Measurements saved with it: 3" in words(page)
 
 
 def test_using_one_that_is_not_validated_warns(

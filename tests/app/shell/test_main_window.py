@@ -18,6 +18,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import (
     QApplication,
+    QComboBox,
     QDialog,
     QLabel,
     QPlainTextEdit,
@@ -44,6 +45,7 @@ from app.shell.log_window import LogWindow
 from app.shell.main_window import MainWindow
 from app.shell.preferences import PreferencesDialog
 from app.shell.shortcuts import ShortcutSheet, shortcuts_of
+from app.widgets.units import length_unit
 from gelpolight_core.errors import InputError
 
 
@@ -238,7 +240,7 @@ def test_an_invalid_settings_file_is_harmless(tmp_path: Path) -> None:
     settings = Settings(path)
     assert settings.theme == "system"
     assert settings.limits == Limits()
-    assert settings.recent_sessions == ()
+    assert settings.recent("sessions") == ()
     assert settings.window_state()[0].isEmpty()
 
 
@@ -248,14 +250,14 @@ def test_settings_survive(tmp_path: Path) -> None:
     settings.limits = Limits(age_days=12.0, height_percent=3.0, size_percent=2.0)
     settings.workspace_folder = tmp_path / "my, sensors; and=more"
     for number in range(12):
-        settings.add_recent_session(tmp_path / f"session {number}")
+        settings.add_recent("sessions", tmp_path / f"session {number}")
     settings.save()
     again = Settings(tmp_path / "desktop.ini")
     assert again.theme == "dark"
     assert again.limits == Limits(12.0, 3.0, 2.0)
     assert again.workspace_folder == settings.workspace_folder
-    assert again.recent_sessions[0] == tmp_path / "session 11"
-    assert len(again.recent_sessions) == 8
+    assert again.recent("sessions")[0] == tmp_path / "session 11"
+    assert len(again.recent("sessions")) == 8
 
 
 def drop_on(window: MainWindow, *paths: Path) -> bool:
@@ -276,7 +278,7 @@ def test_a_dropped_session_is_calibrated(window: MainWindow, session: Path) -> N
     assert drop_on(window, session)
     assert window.page_name == "calibrate"
     assert window.page("calibrate").opened == [session]
-    assert window.context.settings.recent_sessions == (session,)
+    assert window.context.settings.recent("sessions") == (session,)
 
 
 def test_a_dropped_description_opens_its_session(window: MainWindow, session: Path) -> None:
@@ -338,22 +340,12 @@ def test_a_folder_without_a_session_is_refused_in_one_sentence(
     window.open_session(tmp_path)
     assert "session.toml" in window.context.toasts.shown()[0].text
     assert window.page_name == "sensors"
-    assert window.context.settings.recent_sessions == ()
+    assert window.context.settings.recent("sessions") == ()
 
 
 def test_an_error_of_a_page_is_shown(window: MainWindow) -> None:
     window.open_path_in("calibrate", "/nowhere/bad")
     assert "it is bad" in window.context.toasts.shown()[0].text
-
-
-def test_recent_sessions_can_be_opened_and_cleared(window: MainWindow, session: Path) -> None:
-    window.open_session(session)
-    menu = window.menus._recent
-    menu.aboutToShow.emit()
-    menu.actions()[0].trigger()
-    assert window.page("calibrate").opened == [session, session]
-    next(a for a in menu.actions() if a.text() == "Clear this list").trigger()
-    assert window.context.settings.recent_sessions == ()
 
 
 def test_the_edit_menu_names_what_it_undoes(window: MainWindow) -> None:
@@ -465,6 +457,18 @@ def test_preferences_take_effect_at_once(window: MainWindow, tmp_path: Path) -> 
     assert window.context.settings.first_page == window.context.settings.last_page
     dialog._first.setCurrentIndex(0)
     assert window.context.settings.first_page == "start"
+    changed = []
+    window.context.requests.preferences_changed.connect(lambda: changed.append(1))
+    mode = dialog.findChild(QComboBox, "preferences.mode")
+    assert mode is not None
+    mode.setCurrentIndex(mode.findText("best", Qt.MatchFlag.MatchContains))
+    assert window.context.settings.reconstruction == ("full", "best")
+    unit = dialog.findChild(QComboBox, "preferences.unit")
+    assert unit is not None
+    unit.setCurrentIndex(unit.findData("um"))
+    assert window.context.settings.length_unit == length_unit() == "um"
+    unit.setCurrentIndex(unit.findData("mm"))
+    assert len(changed) == 3
     dialog._folder.setText("not/absolute")
     dialog._folder.editingFinished.emit()
     assert dialog._folder.text() == str(tmp_path / "elsewhere")

@@ -1,0 +1,102 @@
+"""A new session of a sensor that has an unfinished one is made only if the user wants it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from app.bench.virtual_session import virtual_session
+from app.calibrate.page import CalibratePage
+from app.context.context import AppContext
+from app.widgets.question import Question
+from gelpolight_core.session.description import create_session
+from gelpolight_core.session.session import Session
+
+SERIAL = "A-001"
+
+
+@pytest.fixture
+def page(context: AppContext, qtbot: QtBot) -> Iterator[CalibratePage]:
+    made = CalibratePage(context=context)
+    qtbot.addWidget(made)
+    yield made
+    made.may_close()
+
+
+@pytest.fixture
+def unfinished(context: AppContext) -> Path:
+    """Return a session of the sensor with one image and without a calibration."""
+    folder = context.workspace.sessions_folder(SERIAL) / "2026-01-02"
+    create_session(replace(stated(), folder=folder))
+    (folder / "checkerboard").mkdir(exist_ok=True)
+    cv2.imwrite(str(folder / "checkerboard" / "view_1.png"), np.zeros((48, 64, 3), np.uint8))
+    return folder
+
+
+def stated(serial: str = SERIAL) -> Session:
+    """Return what the form says of the sensor."""
+    session = virtual_session()
+    return replace(session, sensor=replace(session.sensor, serial=serial))
+
+
+def _begin(page: CalibratePage, serial: str = SERIAL) -> list[Question]:
+    """Start from the form, and return the questions that are asked."""
+    page.form.accepted.emit(stated(serial))
+    return [question for question in page.findChildren(Question) if question.isVisible()]
+
+
+def _answer(question: Question, name: str) -> None:
+    button = question.findChild(QPushButton, f"question.{name}")
+    assert button is not None
+    button.click()
+
+
+def _sessions(context: AppContext, serial: str = SERIAL) -> int:
+    return sum(session.serial == serial for session in context.workspace.sessions())
+
+
+def test_the_unfinished_session_is_continued_if_the_user_wants_it(
+    page: CalibratePage, unfinished: Path, context: AppContext
+) -> None:
+    (question,) = _begin(page)
+    assert page.wizard is None and _sessions(context) == 1
+    _answer(question, "answer0")
+    assert page.wizard is not None
+    assert page.wizard.model.project.session.folder == unfinished
+    assert _sessions(context) == 1
+
+
+def test_a_second_session_is_made_if_the_user_wants_it(
+    page: CalibratePage, unfinished: Path, context: AppContext
+) -> None:
+    (question,) = _begin(page)
+    _answer(question, "answer1")
+    assert page.wizard is not None
+    assert page.wizard.model.project.session.folder != unfinished
+    assert _sessions(context) == 2
+    assert (unfinished / "checkerboard" / "view_1.png").is_file()
+
+
+def test_nothing_is_made_if_the_question_is_cancelled(
+    page: CalibratePage, unfinished: Path, context: AppContext
+) -> None:
+    (question,) = _begin(page)
+    _answer(question, "cancel")
+    assert page.wizard is None and _sessions(context) == 1
+
+
+def test_an_empty_session_or_another_sensor_is_no_reason_to_ask(
+    page: CalibratePage, unfinished: Path, context: AppContext
+) -> None:
+    assert _begin(page, "B-002") == []
+    assert page.wizard is not None and _sessions(context, "B-002") == 1
+    (unfinished / "checkerboard" / "view_1.png").unlink()
+    assert _begin(page) == []
+    assert _sessions(context) == 2

@@ -1,0 +1,52 @@
+"""The steps that a user chooses for the height map of a frozen image."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.view2d.processing import Processing, Processor, processed
+from gelpolight_core.measurement.area import Rectangle
+from gelpolight_core.reconstruction.height_map import HeightMap
+
+
+@pytest.fixture
+def tilted(dome: HeightMap) -> HeightMap:
+    """Return the dome on a plane that falls along x."""
+    return replace(dome, depth_mm=dome.depth_mm + 0.02 * dome.x_mm.astype(np.float32))
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        Processing(level="plane"),
+        Processing(level="rectangle", rectangle=Rectangle((-5.0, 0.0), (2.0, 8.0))),
+        Processing(level="points", points_mm=((-5.0, -4.0), (-5.0, 4.0), (3.0, 5.0))),
+    ],
+    ids=lambda steps: steps.level,
+)
+def test_each_levelling_leaves_the_dome_on_a_level_surface(
+    dome: HeightMap, tilted: HeightMap, steps: Processing
+) -> None:
+    done = processed(tilted, steps)
+    assert done.refused == "" and len(done.steps) == 1
+    np.testing.assert_allclose(done.heightmap.depth_mm, dome.depth_mm, atol=2e-3)
+
+
+def test_a_median_removes_single_points_and_both_steps_are_named(tilted: HeightMap) -> None:
+    depth = tilted.depth_mm.copy()
+    depth[60, 60] = 3.0
+    done = processed(replace(tilted, depth_mm=depth), Processing(level="plane", filter="median"))
+    assert float(done.heightmap.depth_mm[60, 60]) == pytest.approx(0.0, abs=0.01)
+    assert len(done.steps) == 2
+
+
+def test_a_frozen_map_is_processed_once_for_the_same_steps(dome: HeightMap) -> None:
+    process = Processor()
+    steps = Processing(filter="gaussian", sigma_mm=0.2)
+    first = process(dome, steps)
+    assert process(dome, replace(steps)) is first
+    assert process(dome, replace(steps, sigma_mm=0.3)) is not first
+    assert process(dome, Processing()).heightmap is dome
