@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Places = NDArray[np.int32]
+Pixels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 LEAST_STEP = 0.03
@@ -34,7 +34,7 @@ class BadPixels:
 
     Attributes
     ----------
-    places : (N, 2) int32
+    pixels : (N, 2) int32
         Row and column.
     height, width : int
         Size of the image.
@@ -45,13 +45,13 @@ class BadPixels:
         If a place is not in the image.
     """
 
-    places: Places
+    pixels: Pixels
     height: int
     width: int
 
     def __post_init__(self) -> None:
         """Refuse places that no image has."""
-        p = self.places
+        p = self.pixels
         if p.ndim != 2 or p.shape[1] != 2 or p.dtype != np.int32:
             raise ValueError(f"bad pixels of shape {p.shape}, {p.dtype}")
         if p.size and (p.min() < 0 or (p >= np.array([self.height, self.width])).any()):
@@ -61,13 +61,13 @@ class BadPixels:
     def mask(self) -> Mask:
         """Whether a pixel is bad, (height, width)."""
         mask = np.zeros((self.height, self.width), np.bool_)
-        mask[self.places[:, 0], self.places[:, 1]] = True
+        mask[self.pixels[:, 0], self.pixels[:, 1]] = True
         return mask
 
     @cached_property
-    def _sources(self) -> tuple[Places, Places]:
+    def _sources(self) -> tuple[Pixels, Pixels]:
         """Return rows and columns (2, N) of the two good pixels that a bad one is replaced by."""
-        rows, columns = (np.ascontiguousarray(p, np.int64) for p in self.places.T)
+        rows, columns = (np.ascontiguousarray(p, np.int64) for p in self.pixels.T)
         best = np.full(rows.size, np.iinfo(np.int64).max)
         found = [np.stack([rows, rows]), np.stack([columns, columns])]
         # Where two lines cross, only the diagonals have good pixels.
@@ -106,7 +106,7 @@ class BadPixels:
         image : (height, width, 3)
             Any numbers; it is not changed. Returned as it is where no pixel is bad.
         """
-        if not self.places.size:
+        if not self.pixels.size:
             return image
         whole = image.copy()
         (row, other_row), (column, other_column) = self._sources
@@ -114,7 +114,7 @@ class BadPixels:
         mean = 0.5 * first + 0.5 * second
         # As the arrays' own kind: whole numbers are rounded.
         mean = np.rint(mean) if image.dtype.kind == "u" else mean
-        whole[self.places[:, 0], self.places[:, 1]] = mean.astype(image.dtype)
+        whole[self.pixels[:, 0], self.pixels[:, 1]] = mean.astype(image.dtype)
         return whole
 
 

@@ -255,7 +255,7 @@ class Calibration:
         if self.response is not None:
             arrays.append(self.response.curves)
         if self.bad is not None:
-            arrays.append(self.bad.places)
+            arrays.append(self.bad.pixels)
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
         return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"

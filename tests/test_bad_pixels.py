@@ -33,16 +33,16 @@ def test_lines_and_pixels_are_found_and_nothing_else() -> None:
     wanted = np.zeros((HEIGHT, WIDTH), bool)
     wanted[:, 30] = wanted[41, :] = wanted[10, 50] = wanted[20, 60] = True
     assert (found.mask == wanted).all()
-    assert not find_bad_pixels([scene(0), scene(1)], noise=0.004).places.size
+    assert not find_bad_pixels([scene(0), scene(1)], noise=0.004).pixels.size
 
 
 def test_dirt_in_one_scene_and_specks_are_no_bad_pixels() -> None:
     dirty, clean = scene(0), scene(1)
     dirty[10, 50] = 0.0
-    assert not find_bad_pixels([dirty, clean], noise=0.004).places.size
+    assert not find_bad_pixels([dirty, clean], noise=0.004).pixels.size
     for image in (dirty, clean):
         image[30:36, 40:46] *= 0.5
-    assert not find_bad_pixels([dirty, clean], noise=0.004).places.size
+    assert not find_bad_pixels([dirty, clean], noise=0.004).pixels.size
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.uint8, np.uint16])

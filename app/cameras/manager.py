@@ -97,7 +97,7 @@ class CameraManager(QObject):
         return tuple(
             SourceInfo(
                 "camera",
-                d.name if names.count(d.name) == 1 else f"{d.name} ({d.place})",
+                d.name if names.count(d.name) == 1 else f"{d.name} ({d.address})",
                 d.identity,
                 partial(self._source, d.identity),
             )

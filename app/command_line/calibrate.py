@@ -73,7 +73,7 @@ def in_place_lines(result: InPlaceRun) -> list[str]:
         ),
     ]
     lines += [tr("left out: {fault}").format(fault=e) for e in result.result.refused.values()]
-    x, y = result.result.next_place_mm
+    x, y = result.result.next_position_mm
     lines.append(tr("another ball helps most at ({x:.1f}, {y:.1f}) mm").format(x=x, y=y))
     return lines
 
@@ -102,7 +102,7 @@ def in_place_as_json(result: InPlaceRun) -> dict[str, Any]:
         ],
         "left_out": {name: str(fault) for name, fault in found.refused.items()},
         "error_by_balls": [list(point) for point in found.learning],
-        "next_ball_mm": list(found.next_place_mm),
+        "next_ball_mm": list(found.next_position_mm),
         "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
     }
 

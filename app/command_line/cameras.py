@@ -68,7 +68,7 @@ def _ask(
 def _lines(
     device: Device, formats: tuple[Format, ...], controls: tuple[Setting, ...], trouble: str
 ) -> list[str]:
-    lines = [f"{harmless(device.name)}  [{device.identity}]  {device.place}"]
+    lines = [f"{harmless(device.name)}  [{device.identity}]  {device.address}"]
     if trouble:
         return [*lines, f"  {trouble}"]
     best = best_format(formats)
@@ -101,7 +101,7 @@ def _entry(
         "name": device.name,
         "identity": device.identity,
         "model": device.model,
-        "place": device.place,
+        "place": device.address,
         "trouble": trouble or None,
         "formats": [
             {

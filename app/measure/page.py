@@ -177,8 +177,8 @@ class MeasurePage(QWidget):
 
     def _show_count(self) -> None:
         count = len(self.book.records)
-        place = self.tabs.indexOf(self.results)
-        self.tabs.setTabText(place, tr("Records ({n})").format(n=count) if count else tr("Records"))
+        tab = self.tabs.indexOf(self.results)
+        self.tabs.setTabText(tab, tr("Records ({n})").format(n=count) if count else tr("Records"))
 
     # Lists and limits
 

@@ -46,9 +46,9 @@ class ImageMap:
         directions = membrane_to_camera(np.asarray(points_mm, np.float64), c.plane, c.stack)
         return np.asarray(c.camera.project(directions))
 
-    def pixels_per_mm(self, place_mm: tuple[float, float]) -> float:
+    def pixels_per_mm(self, position_mm: tuple[float, float]) -> float:
         """Return the scale of the image at a point."""
-        x, y = place_mm
+        x, y = position_mm
         ends = self.to_image(np.array([[x - 0.5, y], [x + 0.5, y]]))
         return float(np.linalg.norm(ends[1] - ends[0]))
 
@@ -98,14 +98,14 @@ def make_target(press: PressWanted, image_map: ImageMap) -> Target:
     image_map : ImageMap
         Of the sensor's calibration.
     """
-    centre = np.array(press.place_mm)
+    centre = np.array(press.position_mm)
     u, v = image_map.to_image(centre[None])[0]
     return Target(
         press,
         image_map.to_image(centre + _face(press)),
         image_map.to_image(centre + _circle(TOLERANCE_MM)),
         (float(u), float(v)),
-        image_map.pixels_per_mm(press.place_mm),
+        image_map.pixels_per_mm(press.position_mm),
     )
 
 

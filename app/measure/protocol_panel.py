@@ -182,7 +182,7 @@ class RunPanel(QWidget):
             region = tr("{region}, press {n} of {all}").format(
                 region=region, n=press.repeat, all=repeats
             )
-        x, y = press.place_mm
+        x, y = press.position_mm
         text = tr("{region}: at ({x:.1f}, {y:.1f}) mm").format(region=region, x=x, y=y)
         if press.truth.shape == "cuboid":
             text += tr(", rotated as drawn")

@@ -142,7 +142,7 @@ class PressingView(QWidget):
         judged = judge_press(
             frames,
             self._bare,
-            place_px=target.centre_px,
+            position_px=target.centre_px,
             tolerance_px=TOLERANCE_MM * target.pixels_per_mm,
         )
         if not judged.accepted:

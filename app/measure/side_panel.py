@@ -79,7 +79,7 @@ class SidePanel(QScrollArea):
         self.reason = named(PlainLabel(), "measure.reason", tr("Why the result is doubtful"))
         self.reason.setWordWrap(True)
         self.truth = TruthForm()
-        self.operator = named(QLineEdit(), "measure.who", tr("Operator"))
+        self.operator = named(QLineEdit(), "measure.operator", tr("Operator"))
         self.note = named(QLineEdit(), "measure.note", tr("Note"))
         self.note.setPlaceholderText(tr("Any remark"))
         self.keep = _button("keep", tr("Sa&ve to records"), "keep", tr("(Ctrl+Return)"))

@@ -130,9 +130,9 @@ def facts(entry: Entry, summary: CalibrationSummary, uses: str) -> str:
         tr("Sensor {serial}, model {model}, images of {w} x {h} px").format(
             serial=summary.serial, model=summary.model, w=width, h=height
         ),
-        tr("Made {when} {who} from session {session}, program {version}").format(
+        tr("Made {when} {operator} from session {session}, program {version}").format(
             when=made_cell(entry).text,
-            who=tr("by {name}").format(name=summary.operator) if summary.operator else "",
+            operator=tr("by {name}").format(name=summary.operator) if summary.operator else "",
             session=summary.session,
             version=summary.program_version,
         ),

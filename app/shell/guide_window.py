@@ -76,8 +76,8 @@ class GuideText(QTextBrowser):
             if block.blockFormat().headingLevel() and words.casefold() in block.text().casefold():
                 cursor = QTextCursor(block)
                 self.setTextCursor(cursor)
-                place = self.document().documentLayout().blockBoundingRect(block).top()
-                self.verticalScrollBar().setValue(round(place))
+                top = self.document().documentLayout().blockBoundingRect(block).top()
+                self.verticalScrollBar().setValue(round(top))
                 return True
             block = block.next()
         return False

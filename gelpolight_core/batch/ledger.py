@@ -69,7 +69,7 @@ class FrameRow:
 
 
 @dataclass(slots=True)
-class _Place:
+class _Entry:
     """Position of a result's line in the file."""
 
     stamp: str
@@ -94,7 +94,7 @@ class BatchLedger:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._places: dict[str, _Place] = {}
+        self._entries: dict[str, _Entry] = {}
         self._end, self._torn = 0, False
         if not path.exists():
             return
@@ -107,8 +107,8 @@ class BatchLedger:
 
     def has(self, output: str, stamp: str) -> bool:
         """Return whether a frame has a result."""
-        place = self._places.get(output)
-        return place is not None and place.good and place.stamp == stamp
+        entry = self._entries.get(output)
+        return entry is not None and entry.good and entry.stamp == stamp
 
     def keep(self, rows: Sequence[FrameRow]) -> None:
         """Append rows to the file, and flush them to disk.
@@ -135,13 +135,13 @@ class BatchLedger:
         InputError
             If the file can no longer be read.
         """
-        places = sorted(self._places.values(), key=lambda place: place.order)
-        if not places:
+        entries = sorted(self._entries.values(), key=lambda entry: entry.order)
+        if not entries:
             return
         try:
             with self._path.open("rb") as file:
-                for place in places:
-                    file.seek(place.offset)
+                for entry in entries:
+                    file.seek(entry.offset)
                     row = _unpacked(file.readline())
                     assert row is not None
                     yield row
@@ -163,7 +163,7 @@ class BatchLedger:
         # Frames of a recording stay in order, whatever their number of digits.
         name = row.output if row.frame is None else row.input
         order = (folder, name, frame)
-        self._places[row.output] = _Place(row.stamp, self._end, not row.error, order)
+        self._entries[row.output] = _Entry(row.stamp, self._end, not row.error, order)
         self._end += size
 
 

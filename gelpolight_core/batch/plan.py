@@ -202,21 +202,21 @@ class _Found:
 
     def take(self, path: Path) -> None:
         """Add an input given by the user."""
-        place = path.resolve()
-        if not place.exists():
+        resolved = path.resolve()
+        if not resolved.exists():
             raise InputError(
                 tr("The file or folder does not exist"),
                 where=str(path),
                 advice=tr("Check the name"),
             )
-        if place.is_relative_to(self._out):
+        if resolved.is_relative_to(self._out):
             raise InputError(
                 tr("The input is inside the folder of the results"),
                 where=str(path),
                 advice=tr("Choose another folder for the results"),
             )
-        if place.is_dir():
-            self._take_folder(path, place.name)
+        if resolved.is_dir():
+            self._take_folder(path, resolved.name)
         elif _seems_recording(path):
             self._take_recording(path, "")
         elif self.sources and _goes_on(self.sources[-1], path):

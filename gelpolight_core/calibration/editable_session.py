@@ -253,18 +253,18 @@ class EditableSession(Generic[Described]):
             self.decide(replace(self._session.decisions, excluded=names))
             self._dropped += excluded
 
-    def place_spot(self, led: int, place: Point | None) -> None:
+    def place_spot(self, led: int, position: Point | None) -> None:
         """Set an LED's mirror spot by hand; None returns to the detected one.
 
         Parameters
         ----------
         led : int
             0, 1, 2: red, green, blue.
-        place : (u, v) or None
+        position : (u, v) or None
             In pixels of the mirror image.
         """
         with self._lock:
-            spots = _with(self._session.decisions.spots_px, led, place)
+            spots = _with(self._session.decisions.spots_px, led, position)
             self.decide(replace(self._session.decisions, spots_px=spots))
 
     def place_ball(self, name: str, circle: PlacedCircle | None) -> None:

@@ -186,7 +186,7 @@ def _arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
         arrays["camera_response"] = c.response.curves
     if c.bad is not None:
         # Older programs read this file too, and know arrays of floats only.
-        arrays[BAD_PIXELS] = c.bad.places.astype(np.float32)
+        arrays[BAD_PIXELS] = c.bad.pixels.astype(np.float32)
     return arrays
 
 
@@ -318,13 +318,13 @@ def _read_response(curves: NDArray[Any] | None) -> CameraResponse | None:
     return None if curves is None else CameraResponse(curves.astype(np.float64))
 
 
-def _read_bad_pixels(places: NDArray[Any] | None, height: int, width: int) -> BadPixels | None:
+def _read_bad_pixels(pixels: NDArray[Any] | None, height: int, width: int) -> BadPixels | None:
     """Return the bad pixels; None in files without, which older programs wrote."""
-    if places is None:
+    if pixels is None:
         return None
-    if not np.isfinite(places).all() or (places != np.rint(places)).any():
+    if not np.isfinite(pixels).all() or (pixels != np.rint(pixels)).any():
         raise ValueError("bad pixels are not whole numbers")
-    return BadPixels(places.astype(np.int32), height, width)
+    return BadPixels(pixels.astype(np.int32), height, width)
 
 
 def _read_provenance(entry: dict[str, Any]) -> Provenance:

@@ -148,7 +148,7 @@ def bare_calibration(session: Session, results: StageResults) -> Calibration:
         provenance=Provenance("", "", "", "", {}),
         full=results.full,
         response=need(results.response, where).response,
-        bad=results.bad if results.bad is not None and results.bad.places.size else None,
+        bad=results.bad if results.bad is not None and results.bad.pixels.size else None,
     )
 
 

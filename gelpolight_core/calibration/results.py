@@ -129,7 +129,7 @@ def judge_bad_pixels(bad: BadPixels) -> Figure:
     return judge(
         "bad_pixels_percent",
         tr("Dead and hot pixels, left out"),
-        100.0 * len(bad.places) / max(bad.height * bad.width, 1),
+        100.0 * len(bad.pixels) / max(bad.height * bad.width, 1),
         "%",
         warn=0.5,
         fail=5.0,

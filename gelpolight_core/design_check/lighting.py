@@ -71,7 +71,7 @@ def compare_lighting(
     *,
     diameter_mm: float = 5.0,
     depth_mm: float = 1.0,
-    place_mm: tuple[float, float] = (2.0, 1.0),
+    position_mm: tuple[float, float] = (2.0, 1.0),
     height_shares: Sequence[float] = HEIGHT_SHARES,
     elevations_deg: Sequence[float] = ELEVATIONS_DEG,
     progress: Progress | None = None,
@@ -85,7 +85,7 @@ def compare_lighting(
     ----------
     design : SensorDesign
         The sensor; its layers, camera and LEDs count.
-    diameter_mm, depth_mm, place_mm : optional
+    diameter_mm, depth_mm, position_mm : optional
         The cylinder, off the middle so that no symmetry helps.
     height_shares : sequence of float, optional
         LED heights over those of the design.
@@ -102,8 +102,8 @@ def compare_lighting(
     plain = _matt(design)
     surface = press(
         Cylinder(diameter_mm, depth_mm),
-        x_mm=place_mm[0],
-        y_mm=place_mm[1],
+        x_mm=position_mm[0],
+        y_mm=position_mm[1],
         decay_mm=plain.membrane.decay_length_mm,
     )
     lights = [("point", share) for share in height_shares]
@@ -152,9 +152,9 @@ def _point_row(
 ) -> LightingRow:
     leds = tuple(replace(led, height_mm=share * led.height_mm) for led in design.leds)
     lit = replace(design, leds=leds)
-    places = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in leds])
-    height = float(-places[:, 2].mean())
-    return _row(lit, lamps_of(lit), places, surface, ("point", height), depth_mm)
+    positions = np.array([[led.x_mm, led.y_mm, -led.height_mm] for led in leds])
+    height = float(-positions[:, 2].mean())
+    return _row(lit, lamps_of(lit), positions, surface, ("point", height), depth_mm)
 
 
 def _directional_row(
@@ -164,8 +164,8 @@ def _directional_row(
     heights = np.mean([led.height_mm for led in design.leds])
     towards = np.array([_direction(lamp) for lamp in lamps])
     # The near-light model has its LEDs in these directions, at the design's height.
-    places = towards * (heights / -towards[:, 2:])
-    return _row(design, lamps, places, surface, ("directional", elevation_deg), depth_mm)
+    positions = towards * (heights / -towards[:, 2:])
+    return _row(design, lamps, positions, surface, ("directional", elevation_deg), depth_mm)
 
 
 def _direction(lamp: ParallelLamp) -> tuple[float, float, float]:
@@ -187,9 +187,9 @@ def _row(
     _, any_dark, two_dark = shadow_areas(surface, lamps)
     pressed = float((surface.depth_mm > TOUCHED_MM).sum() * surface.pitch_mm**2)
     scores: list[tuple[float | None, float | None]] = []
-    for places in (leds_mm, far_mm):
+    for positions in (leds_mm, far_mm):
         try:
-            known = KnownSensor(sensor, exact_calibration(sensor, leds_mm=places))
+            known = KnownSensor(sensor, exact_calibration(sensor, leds_mm=positions))
             scores.append(_score(known, surface, depth_mm))
         except InputError:
             scores.append((None, None))

@@ -119,9 +119,9 @@ def write_ablation(ablations: Sequence[Ablation], folder: Path) -> list[Path]:
 
 
 def _calibration_cost(result: TermResult, everything: TermResult) -> float | None:
-    made_anew = result.variant.calibration != ALL_CALIBRATION_TERMS
+    recalibrated = result.variant.calibration != ALL_CALIBRATION_TERMS
     cost = everything.calibration_s - result.calibration_s
-    return cost if made_anew and math.isfinite(cost) else None
+    return cost if recalibrated and math.isfinite(cost) else None
 
 
 def _text_line(row: dict[str, Any]) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.experiments.plain_paper import plain_depth, plain_slopes
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
-from gelpolight_core.reconstruction.in_place.terms import design_rows, place_axes
+from gelpolight_core.reconstruction.in_place.terms import design_rows, position_axes
 from gelpolight_core.reconstruction.linear import as_linear
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.reconstruction.trace import Trace
@@ -154,7 +154,7 @@ def _plain_in_place(light: NDArray[Any], calibration: InPlaceCalibration) -> Non
     model = calibration.in_place
     change = model.change(as_linear(light)).change
     rows, columns = change.shape[:2]
-    x, y = np.meshgrid(*place_axes(rows, columns))
+    x, y = np.meshgrid(*position_axes(rows, columns))
     terms = design_rows(change.reshape(-1, 3), x.ravel(), y.ravel())
     slopes = (terms @ model.coefficients).reshape(rows, columns, 2)
     plain_depth(slopes[..., 0], slopes[..., 1], model.grid.pitch_mm)
@@ -168,7 +168,7 @@ def _traced_steps(traces: list[Trace]) -> tuple[Timing, ...]:
         if step.milliseconds is not None:
             times.setdefault(step.name, []).append(step.milliseconds)
             sizes[step.name] = step.bytes
-    return tuple(_timing(name, taken, sizes[name]) for name, taken in times.items())
+    return tuple(_timing(name, seconds, sizes[name]) for name, seconds in times.items())
 
 
 def _time_in_turn(actions: dict[str, Callable[[], object]], repeats: int) -> dict[str, list[float]]:

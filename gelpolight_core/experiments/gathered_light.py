@@ -131,8 +131,8 @@ def gathered(
     wide = widened(surface)
     middle = facets(wide, leds_mm, membrane, WIDE * side_mm)
     far = facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
-    place = np.stack(np.nonzero(where), axis=-1)
-    at = np.concatenate([*(part[where] for part in surface[:3]), place], -1).astype(np.float32)
+    position = np.stack(np.nonzero(where), axis=-1)
+    at = np.concatenate([*(part[where] for part in surface[:3]), position], -1).astype(np.float32)
     result = np.empty((len(at), 3), np.float32)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
     gather_rows(0, len(at), at, near, middle, far, gloss, result)

@@ -194,14 +194,14 @@ def _figure(
     for frame in frames:
         for turn in range(1 + repeats):
             found = []
-            for solver, taken, everywhere in (
+            for solver, times_ms, everywhere in (
                 (usual, times[0], False),
                 (other, times[1], rule.everywhere),
             ):
                 begin = time.perf_counter()
                 found.append(_depth(solver, frame, effort, everywhere))
                 if turn:
-                    taken.append(1e3 * (time.perf_counter() - begin))
+                    times_ms.append(1e3 * (time.perf_counter() - begin))
             if turn == 0:
                 change = 1e3 * np.abs(found[0].depth_mm - found[1].depth_mm)
                 largest = max(largest, float(change.max()))

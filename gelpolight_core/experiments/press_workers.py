@@ -137,7 +137,7 @@ def placed_by_hand(press: PressWanted, seed: int = 0) -> tuple[float, float, flo
     """
     rng = np.random.default_rng([seed, *press.file.encode()])
     dx, dy, turn = rng.standard_normal(3) * (HAND_MM, HAND_MM, HAND_DEG)
-    return press.place_mm[0] + dx, press.place_mm[1] + dy, press.yaw_deg + turn
+    return press.position_mm[0] + dx, press.position_mm[1] + dy, press.yaw_deg + turn
 
 
 def work_through(

@@ -39,7 +39,7 @@ class ModeSeen:
         ``best``, ``balanced``, ``fast`` or ``paper``.
     error_um, bound_um : float or None
         As in :class:`Seen`; None where nothing was measured.
-    doubt : str
+    warning : str
         What the result says of itself where it is not to be trusted; empty where it trusts itself.
     said : str
         What happened, in a few words.
@@ -48,7 +48,7 @@ class ModeSeen:
     mode: str
     error_um: float | None
     bound_um: float | None
-    doubt: str = ""
+    warning: str = ""
     said: str = ""
 
     @property
@@ -58,7 +58,7 @@ class ModeSeen:
             math.inf if self.bound_um is None else self.bound_um
         ):
             return Outcome.PASSED
-        return Outcome.REFUSED if self.doubt else Outcome.FAILED
+        return Outcome.REFUSED if self.warning else Outcome.FAILED
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class Seen:
         Largest condition number of the light directions.
     rounds : int or None
         Near-light rounds, or those of the solver.
-    doubt : str
+    warning : str
         What the result says of itself where it is not to be trusted; empty where it trusts itself.
     modes : tuple of ModeSeen
         What each mode made of it, where several were run; the case ends as the worst of them.
@@ -96,7 +96,7 @@ class Seen:
     flags: tuple[tuple[str, float], ...] = ()
     condition: float | None = None
     rounds: int | None = None
-    doubt: str = ""
+    warning: str = ""
     modes: tuple[ModeSeen, ...] = ()
 
 
@@ -184,15 +184,16 @@ def _outcome(case: Case) -> tuple[Outcome, str, Seen | None]:
     wrong = [mode for mode in seen.modes if mode.outcome is not Outcome.PASSED]
     if seen.right and not wrong and (seen.modes or _within_bound(seen)):
         return Outcome.PASSED, seen.said, seen
-    if seen.doubt:
-        return Outcome.REFUSED, f"{seen.said}; {seen.doubt}", seen
+    if seen.warning:
+        return Outcome.REFUSED, f"{seen.said}; {seen.warning}", seen
     failed = [mode.mode for mode in wrong if mode.outcome is Outcome.FAILED]
     if failed or not wrong or not seen.right:
         said = seen.said
         if failed:
             said += "; " + tr("wrong without a note: {modes}").format(modes=", ".join(failed))
         return Outcome.FAILED, said, seen
-    return Outcome.REFUSED, f"{seen.said}; {'; '.join(dict.fromkeys(m.doubt for m in wrong))}", seen
+    warnings = "; ".join(dict.fromkeys(m.warning for m in wrong))
+    return Outcome.REFUSED, f"{seen.said}; {warnings}", seen
 
 
 def _within_bound(seen: Seen) -> bool:

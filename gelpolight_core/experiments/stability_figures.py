@@ -29,14 +29,14 @@ def draw_outcomes(results: Sequence[CaseResult]) -> Drawing:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        for place, result in enumerate(shown):
+        for row, result in enumerate(shown):
             seen = result.seen
             assert seen is not None and seen.error_um is not None
             colour = COLOURS[result.outcome]
             error = max(seen.error_um, LEAST_UM)
-            axes.plot(error, place, MARKERS[result.outcome], color=colour, markersize=4)
+            axes.plot(error, row, MARKERS[result.outcome], color=colour, markersize=4)
             if seen.bound_um is not None:
-                axes.plot(seen.bound_um, place, "|", color="0.3", markersize=8)
+                axes.plot(seen.bound_um, row, "|", color="0.3", markersize=8)
         axes.set_yticks(range(len(shown)), [r.case.name for r in shown], fontsize=6)
         axes.set_ylim(len(shown) - 0.4, -0.6)
         axes.set_xscale("log")
@@ -56,17 +56,17 @@ def draw_tornado(found: Sequence[Sensitivity]) -> Drawing:
 
     def paint(figure: Figure) -> None:
         axes = figure.subplots()
-        places = np.arange(len(found))
-        axes.barh(places, [s.low_percent for s in found], color=LOW, label=tr("parameter too low"))
+        rows = np.arange(len(found))
+        axes.barh(rows, [s.low_percent for s in found], color=LOW, label=tr("parameter too low"))
         axes.barh(
-            places,
+            rows,
             [s.high_percent for s in found],
             color=HIGH,
             height=0.5,
             label=tr("parameter too high"),
         )
         labels = [f"{s.parameter.label} ({s.parameter.stated})" for s in found]
-        axes.set_yticks(places, labels, fontsize=6.5)
+        axes.set_yticks(rows, labels, fontsize=6.5)
         axes.invert_yaxis()
         axes.axvline(0.0, color="0.3", lw=0.7)
         axes.grid(axis="x", color="0.9")

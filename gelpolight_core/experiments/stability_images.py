@@ -15,7 +15,6 @@ from gelpolight_core.experiments.stability_trial import (
     BALL_AT_MM,
     condition_of,
     depth_error,
-    doubts_of,
     flag_shares,
     flagged,
     is_finite,
@@ -24,6 +23,7 @@ from gelpolight_core.experiments.stability_trial import (
     rms_um,
     standard_press,
     standard_sensor,
+    warnings_of,
 )
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
@@ -174,10 +174,10 @@ def _not_of_this_sensor(frame: NDArray[Any]) -> Seen:
     """Reconstruct what cannot be right; each model has to say so."""
     known, press = standard_sensor(), standard_press()
     found = maps_of(known, frame)
-    doubts = {model: doubts_of(found[model]) for model in MODELS}
+    warnings = {model: warnings_of(found[model]) for model in MODELS}
     best = found["full"]
     error = rms_um(depth_error(best, press.truth, radius_mm=12.0))
-    silent = [model for model in MODELS if not doubts[model]]
+    silent = [model for model in MODELS if not warnings[model]]
     said = tr("{e:.0f} um RMS").format(e=error)
     if silent:
         said += "; " + tr("no note by the model {names}").format(names=", ".join(silent))
@@ -188,7 +188,7 @@ def _not_of_this_sensor(frame: NDArray[Any]) -> Seen:
         error_um=error,
         flags=flag_shares(best),
         condition=condition_of(known.calibration),
-        doubt="" if silent else doubts["full"][0],
+        warning="" if silent else warnings["full"][0],
     )
 
 

@@ -204,7 +204,7 @@ def _lens(design: SensorDesign) -> Seen:
 
 
 def _wall_cases() -> list[Case]:
-    required = tr("right, or the map says that what stands on the walls may be too low")
+    required = tr("right, or the map says that features on the walls may be too low")
     cases = []
     matt = matt_design(FINE)
     for degrees, decay_mm in ((57, 0.7), (71, 0.35), (76, 0.25), (80, 0.18), (84, 0.1)):

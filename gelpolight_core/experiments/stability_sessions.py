@@ -260,7 +260,7 @@ def _measured(change: Change, scale: float = SCALE) -> Seen:
         error_um=modes[0].error_um,
         bound_um=modes[0].bound_um,
         condition=_joint_condition(run),
-        doubt="" if verdict is Verdict.PASS else _judged_figures(run),
+        warning="" if verdict is Verdict.PASS else _judged_figures(run),
         modes=modes,
     )
 

@@ -172,7 +172,7 @@ def judged(
             mode,
             error_of(heightmap),
             bound_um + (0.0 if mode == "best" else own_share(heightmap) * peak_um),
-            "; ".join([*doubts_of(heightmap), *_raised(heightmap, needs)]),
+            "; ".join([*warnings_of(heightmap), *_raised(heightmap, needs)]),
         )
         for mode, heightmap in maps.items()
     )
@@ -193,7 +193,7 @@ def judged(
         condition=condition_of(calibration),
         rounds=rounds_of(by["full"], image) if "full" in found else None,
         # A note counts for the mode that gives it, and for no other.
-        doubt="",
+        warning="",
         modes=modes,
     )
 
@@ -215,7 +215,7 @@ def own_share(heightmap: HeightMap) -> float:
     return min(math.hypot(own.depth, own.depth_per_slope * BALL_SLOPE), MOST_OWN_SHARE)
 
 
-def doubts_of(found: HeightMap) -> tuple[str, ...]:
+def warnings_of(found: HeightMap) -> tuple[str, ...]:
     """Return the notes of a map that say its depth is not to be trusted."""
     harmless = {free_boundary_note()}
     if found.health is not None:

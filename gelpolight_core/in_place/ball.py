@@ -144,8 +144,8 @@ def _profiles(ball: Ball, radius: Array, smoothing: float) -> tuple[Array, Array
     smooth = cv2.GaussianBlur(
         flat, (0, 0), sigmaX=smoothing / step, sigmaY=1e-6, borderType=cv2.BORDER_REPLICATE
     )
-    place = np.clip(radius / step, 0, len(fine) - 2)
-    low = place.astype(np.intp)
-    part = place - low
+    position = np.clip(radius / step, 0, len(fine) - 2)
+    low = position.astype(np.intp)
+    part = position - low
     at = smooth[:, low] * (1.0 - part) + smooth[:, low + 1] * part
     return at.reshape(len(contacts), len(DECAYS), -1), contacts

@@ -34,7 +34,7 @@ from gelpolight_core.in_place.held_out import (
     error_curve,
     held_out_presses,
 )
-from gelpolight_core.in_place.next_ball import learning_curve, next_place
+from gelpolight_core.in_place.next_ball import learning_curve, next_position
 from gelpolight_core.in_place.press import find_contact
 from gelpolight_core.in_place.same_view import refuse_other_view
 from gelpolight_core.parallel import in_parallel
@@ -130,7 +130,7 @@ class InPlaceResult:
         Chosen by presses that were left out.
     learning : tuple of (int, float)
         Number of balls, and root mean square slope error of other presses with so many.
-    next_place_mm : tuple of 2 floats
+    next_position_mm : tuple of 2 floats
         Where the next ball would help most: farthest from all presses.
     """
 
@@ -139,7 +139,7 @@ class InPlaceResult:
     refused: Mapping[str, InputError] = field(default_factory=dict)
     ridge: Ridge = FIRST_RIDGE
     learning: tuple[tuple[int, float], ...] = ()
-    next_place_mm: tuple[float, float] = (0.0, 0.0)
+    next_position_mm: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -231,7 +231,7 @@ def calibrate_in_place(
         work.refused,
         ridge,
         learning_curve(sums, ridge),
-        next_place(work.balls, grid, base.known),
+        next_position(work.balls, grid, base.known),
     )
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.in_place.ball import Ball, ball_slopes, distances
 from gelpolight_core.reconstruction.in_place.change import ColourChange
-from gelpolight_core.reconstruction.in_place.terms import design_rows, penalty, place_axes
+from gelpolight_core.reconstruction.in_place.terms import design_rows, penalty, position_axes
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
@@ -72,19 +72,19 @@ class Ridge:
     ----------
     strength : float
         Relative to the data.
-    place_growth, colour_growth : float
+    position_growth, colour_growth : float
         As for :func:`~gelpolight_core.reconstruction.in_place.terms.penalty`.
     """
 
     strength: float
-    place_growth: float
+    position_growth: float
     colour_growth: float
 
     @property
     def penalty(self) -> Array:
         """What it costs each term."""
         return self.strength * penalty(
-            place_growth=self.place_growth, colour_growth=self.colour_growth
+            position_growth=self.position_growth, colour_growth=self.colour_growth
         )
 
 
@@ -120,7 +120,7 @@ def press_sums(seen: ColourChange, ball: Ball) -> PressSums:
 
 def _terms(change: Map, chosen: NDArray[np.intp]) -> Map:
     rows, columns = change.shape[:2]
-    x, y = place_axes(rows, columns)
+    x, y = position_axes(rows, columns)
     row, column = np.divmod(chosen, columns)
     return design_rows(change[row, column], x[column], y[row])
 

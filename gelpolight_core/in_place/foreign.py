@@ -133,12 +133,12 @@ def _annotations(folder: Path, table: Path) -> ForeignFolder:
             where=str(about),
             advice=tr("Annotate the folder with its own library first"),
         ) from error
-    places: dict[tuple[str, str], Path] = {}
+    paths: dict[tuple[str, str], Path] = {}
     for number, row in _rows(table, ("img_name", "x_mm", "y_mm")):
         where = f"{table}, {tr('line {n}').format(n=number)}"
         image = _inside(folder / "probe_images", row["img_name"], where)
-        places.setdefault((row["x_mm"], row["y_mm"]), _image(image, where))
-    images = list(places.values())
+        paths.setdefault((row["x_mm"], row["y_mm"]), _image(image, where))
+    images = list(paths.values())
     chosen = np.linspace(0, len(images) - 1, min(MOST_FRAMES, len(images))).round().astype(int)
     return ForeignFolder(
         table.name,
@@ -163,8 +163,8 @@ def _annotate(folder: Path, table: Path) -> ForeignFolder:
             )
         # The table holds the paths of the computer on which it was made.
         name = PureWindowsPath(PurePosixPath(row[0]).name).name
-        places = (folder / name, folder / "images" / name)
-        image = next((path for path in places if path.is_file()), places[0])
+        paths = (folder / name, folder / "images" / name)
+        image = next((path for path in paths if path.is_file()), paths[0])
         circle = PlacedCircle(*(_number(value, where, 0.0, 1e5) for value in row[1:]))
         presses.append(ForeignPress(_image(image, where), None, circle))
     return ForeignFolder(table.name, tuple(presses), _if_there(folder / "background.png"))

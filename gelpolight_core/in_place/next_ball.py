@@ -43,7 +43,7 @@ def learning_curve(sums: Sequence[PressSums], ridge: Ridge) -> tuple[tuple[int, 
     return tuple(curve)
 
 
-def next_place(balls: Sequence[Ball], grid: WorkingGrid, lit: Mask) -> tuple[float, float]:
+def next_position(balls: Sequence[Ball], grid: WorkingGrid, lit: Mask) -> tuple[float, float]:
     """Return the place (x, y) in mm that is farthest from all presses, a contact off the border.
 
     Parameters

@@ -48,12 +48,12 @@ class RunLock:
             # The system releases the lock with the process, even if it is killed.
             _lock(self._handle)
         except OSError as error:
-            who = _holder(self._handle)
+            holder = _holder(self._handle)
             self.release()
             if error.errno not in (errno.EAGAIN, errno.EACCES):
                 raise cannot_write(error, path) from error
             raise InputError(
-                tr("This run is being written by {who}").format(who=who),
+                tr("This run is being written by {holder}").format(holder=holder),
                 where=str(folder),
                 advice=tr("Stop the other run first, or choose a new folder"),
             ) from error

@@ -37,7 +37,7 @@ def array_of(data: bytes) -> NDArray[Any]:
         raise ValueError("the header of an array is damaged") from error
     if by_columns or kind.str not in KINDS or len(shape) > MOST_DIMENSIONS:
         raise ValueError(f"an array has the type {kind.str[:40]} and {len(shape)} dimensions")
-    place = stream.tell()
-    if min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != len(data) - place:
+    offset = stream.tell()
+    if min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != len(data) - offset:
         raise ValueError("an array has another size than its header declares")
-    return np.frombuffer(data, kind, offset=place).reshape(shape)
+    return np.frombuffer(data, kind, offset=offset).reshape(shape)

@@ -29,7 +29,7 @@ COLOUR_SHARES = (0.5, 0.15)
 COLOUR_PIXELS = 5
 # A position read from a detected spot identifies that spot; a click in a magnified image is this
 # accurate.
-SAME_PLACE_PX = 0.05
+SAME_SPOT_PX = 0.05
 PLACED_SD_PX = 0.5
 
 
@@ -137,7 +137,7 @@ def find_mirror_spots(
 
 
 def spot_near(
-    image: LinearImage, place_px: tuple[float, float], *, reach_px: float = 8.0
+    image: LinearImage, position_px: tuple[float, float], *, reach_px: float = 8.0
 ) -> tuple[float, float] | None:
     """Return the centroid of the spot near a position, of any colour, or None if there is none.
 
@@ -145,15 +145,15 @@ def spot_near(
     ----------
     image : LinearImage
         The mirror.
-    place_px : (u, v)
+    position_px : (u, v)
         Position set by the user.
     reach_px : float, optional
         Largest distance of the centroid.
     """
     rgb = image.rgb.astype(np.float64)
     centres = [spot.centre_px for spot in _find_candidates(rgb, _noise(rgb))]
-    near = min(centres, key=lambda centre: math.dist(centre, place_px), default=None)
-    return near if near is not None and math.dist(near, place_px) <= reach_px else None
+    near = min(centres, key=lambda centre: math.dist(centre, position_px), default=None)
+    return near if near is not None and math.dist(near, position_px) <= reach_px else None
 
 
 def _refuse_hopeless(brightest: Array, where: str) -> None:
@@ -260,7 +260,7 @@ def _dominant(spot: Spot) -> int:
 def _placed_spot(candidates: list[Spot], position: tuple[float, float], rgb: Array) -> Spot:
     """Return the spot set by the user; its colour is unknown if none was detected there."""
     for spot in candidates:
-        if math.dist(spot.centre_px, position) < SAME_PLACE_PX:
+        if math.dist(spot.centre_px, position) < SAME_SPOT_PX:
             return spot
     rows, columns = rgb.shape[:2]
     v = min(max(round(position[1]), 0), rows - 1)

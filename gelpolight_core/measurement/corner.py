@@ -99,8 +99,8 @@ def _table() -> Array:
     spline = spline_filter(values, order=3, mode="mirror")
     rows = _MARGIN + np.arange(_FINER * (_RADII - 1) + 1) / _FINER
     columns = np.arange(_FINER * (_ANGLES - 1) + 1) / _FINER
-    places = np.meshgrid(rows, columns, indexing="ij")
-    return np.asarray(map_coordinates(spline, places, order=3, prefilter=False, mode="mirror"))
+    positions = np.meshgrid(rows, columns, indexing="ij")
+    return np.asarray(map_coordinates(spline, positions, order=3, prefilter=False, mode="mirror"))
 
 
 def _wedge_drape(radii: Array, angle: float) -> Array:

@@ -138,13 +138,13 @@ def circle_at_steepest(heightmap: HeightMap, drawn: FittedCircle) -> FittedCircl
     reach = min(REACH_SHARE * drawn.radius_mm, REACH_MM)
     turns = np.linspace(0.0, 2.0 * np.pi, LINES, endpoint=False)
 
-    def place(offset: Array) -> Array:
+    def points_at(offset: Array) -> Array:
         radius = drawn.radius_mm + offset
         x = drawn.centre_mm[0] + radius * np.cos(turns)[:, None]
         y = drawn.centre_mm[1] + radius * np.sin(turns)[:, None]
         return np.stack([x, y], axis=-1)
 
-    offset, there = _edge_offsets(heightmap, place, reach)
+    offset, there = _edge_offsets(heightmap, points_at, reach)
     radius = drawn.radius_mm + offset[there]
     centre = np.array(drawn.centre_mm)
     away = radius[:, None] * np.stack([np.cos(turns[there]), np.sin(turns[there])], axis=1)
@@ -179,13 +179,13 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
     shifts, turns, spreads, points = [], [], [], []
     for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
         along = np.asarray(np.linspace(-MIDDLE, MIDDLE, LINES // 4) * half[1 - axis], np.float64)
-        place = _side_place(drawn, axis, sign * half[axis], sign, along)
+        points_at = _side_points(drawn, axis, sign * half[axis], sign, along)
         reach = min(REACH_SHARE * half[axis], REACH_MM)
-        offset, there = _edge_offsets(heightmap, place, reach)
+        offset, there = _edge_offsets(heightmap, points_at, reach)
         found = np.asarray(offset[there], np.float64)
         slope, shift = _robust_line(along[there], found)
         left = found - shift - slope * along[there]
-        edge = place(offset[:, None])[there, 0]
+        edge = points_at(offset[:, None])[there, 0]
         shifts.append(sign * shift)
         # Outwards along +y at growing x turns the rectangle the other way than along +x.
         turns.append(sign * slope * (-1.0 if axis == 0 else 1.0))
@@ -210,29 +210,29 @@ def _rectangle_round(heightmap: HeightMap, drawn: Rectangle) -> FittedRectangle:
     return FittedRectangle(fitted, sd, np.concatenate(points))
 
 
-def _side_place(
+def _side_points(
     drawn: Rectangle, axis: int, level: float, sign: float, along: Array
 ) -> Callable[[Array], Array]:
     """Return the function from offsets outwards (lines, n) to places (lines, n, 2)."""
 
-    def place(offset: Array) -> Array:
+    def points_at(offset: Array) -> Array:
         outwards = level + sign * offset + np.zeros((along.size, 1))
         beside = along[:, None] + np.zeros_like(outwards)
         return drawn.place(outwards, beside) if axis == 0 else drawn.place(beside, outwards)
 
-    return place
+    return points_at
 
 
 def _edge_offsets(
-    heightmap: HeightMap, place: Callable[[Array], Array], reach: float
+    heightmap: HeightMap, points_at: Callable[[Array], Array], reach: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return the offset of the edge on each line, and which lines cross one."""
     step = float(0.5 * heightmap.pitch_mm)
     steps = max(math.ceil(reach / step), 4)
     offsets = np.asarray(step * np.arange(-steps, steps + 1), np.float64)
-    places = place(offsets[None, :])
-    depth = depth_at(heightmap, places[..., 0].ravel(), places[..., 1].ravel())
-    depth = depth.reshape(places.shape[:2])
+    points = points_at(offsets[None, :])
+    depth = depth_at(heightmap, points[..., 0].ravel(), points[..., 1].ravel())
+    depth = depth.reshape(points.shape[:2])
     # Bilinear depths have slopes that jump at the nodes; two steps smooth over one node.
     smooth = gaussian_filter1d(depth, 2.0, axis=1, mode="nearest")
     steep = np.nan_to_num(np.abs(np.gradient(smooth, step, axis=1)))

@@ -359,15 +359,15 @@ def region_kinds(results: Sequence[PressResult]) -> dict[str, list[PressResult]]
     """
     kinds: dict[str, list[PressResult]] = {ALL: list(results)}
     for presses in _by_object(results).values():
-        places: dict[str, list[PressResult]] = defaultdict(list)
+        regions: dict[str, list[PressResult]] = defaultdict(list)
         for result in presses:
             if result.press.region:
-                places[result.press.region].append(result)
-        for place, here in places.items():
-            said = place.lower()
-            if said != "random" and (said == "same" or len(here) > 1):
+                regions[result.press.region].append(result)
+        for region, here in regions.items():
+            name = region.lower()
+            if name != "random" and (name == "same" or len(here) > 1):
                 kinds.setdefault(SAME, []).extend(here)
-            if said == "random" or (said != "same" and len(places) > 1):
+            if name == "random" or (name != "same" and len(regions) > 1):
                 kinds.setdefault(RANDOM, []).extend(here)
     return kinds
 
@@ -427,18 +427,18 @@ def _repeatability(results: Sequence[PressResult]) -> tuple[Repeatability, ...]:
 
 def _variances(results: Sequence[PressResult], direction: str) -> tuple[float, float]:
     """Return the variances (mm**2) within a region and between regions."""
-    objects = [lengths_by_place(own, direction) for own in _by_object(results).values()]
-    within = variance_within([place for places in objects for place in places])
-    moved = [places for places in objects if len(places) > 1]
+    objects = [lengths_by_region(own, direction) for own in _by_object(results).values()]
+    within = variance_within([region for regions in objects for region in regions])
+    moved = [regions for regions in objects if len(regions) > 1]
     if not moved:
         return within, math.nan
     noise = 0.0 if math.isnan(within) else within
-    degrees = sum(len(places) - 1 for places in moved)
-    between = sum((len(places) - 1) * variance_between(places, noise) for places in moved)
+    degrees = sum(len(regions) - 1 for regions in moved)
+    between = sum((len(regions) - 1) * variance_between(regions, noise) for regions in moved)
     return within, max(between / degrees, 0.0)
 
 
-def lengths_by_place(results: Iterable[PressResult], direction: str) -> list[list[float]]:
+def lengths_by_region(results: Iterable[PressResult], direction: str) -> list[list[float]]:
     """Return the measured lengths (mm) of an object, a list for each place it was pressed at.
 
     Parameters
@@ -448,15 +448,15 @@ def lengths_by_place(results: Iterable[PressResult], direction: str) -> list[lis
     direction : str
         ``planar`` (its size) or ``depth`` (its height).
     """
-    places: dict[str, list[float]] = defaultdict(list)
+    regions: dict[str, list[float]] = defaultdict(list)
     for result in results:
         value = _measured_mm(result, direction)
         # "random" names no place: two such presses are not repeats of each other.
         if math.isfinite(value) and result.press.region:
-            said = result.press.region
-            key = f"{said} {result.press.file}" if said.lower() == "random" else said
-            places[key].append(value)
-    return list(places.values())
+            name = result.press.region
+            key = f"{name} {result.press.file}" if name.lower() == "random" else name
+            regions[key].append(value)
+    return list(regions.values())
 
 
 def _measured_mm(result: PressResult, direction: str) -> float:

@@ -286,7 +286,7 @@ def _panel(axes: Axes, results: Sequence[PressResult], direction: str, regions: 
     top = PAPER_PERCENT[direction]
     for k, shape in enumerate(shapes):
         offset = (k - (len(shapes) - 1) / 2.0) * BAR_WIDTH
-        for place, dimension in enumerate(dimensions):
+        for x, dimension in enumerate(dimensions):
             errors = np.array(
                 [
                     abs(r.error_percent(direction))
@@ -296,7 +296,7 @@ def _panel(axes: Axes, results: Sequence[PressResult], direction: str, regions: 
             )
             errors = errors[np.isfinite(errors)]
             if errors.size:
-                _bar(axes, place + offset, errors, COLOURS[shape])
+                _bar(axes, x + offset, errors, COLOURS[shape])
                 top = max(top, float(errors.max()))
         axes.bar(0.0, 0.0, color=COLOURS[shape], alpha=0.55, label=shape)
     axes.axhline(
@@ -318,14 +318,14 @@ def _panel(axes: Axes, results: Sequence[PressResult], direction: str, regions: 
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _bar(axes: Axes, place: float, errors: NDArray[np.float64], colour: str) -> None:
+def _bar(axes: Axes, x: float, errors: NDArray[np.float64], colour: str) -> None:
     """Draw the mean, its spread and the presses of one dimension and shape."""
     mean = float(errors.mean())
-    axes.bar(place, mean, width=0.9 * BAR_WIDTH, color=colour, alpha=0.55)
+    axes.bar(x, mean, width=0.9 * BAR_WIDTH, color=colour, alpha=0.55)
     if errors.size > 1:
         spread = float(errors.std(ddof=1))
         axes.errorbar(
-            place,
+            x,
             mean,
             yerr=[[min(spread, mean)], [spread]],
             color="0.15",
@@ -333,4 +333,4 @@ def _bar(axes: Axes, place: float, errors: NDArray[np.float64], colour: str) -> 
             linewidth=1.2,
         )
     jitter = np.linspace(-0.25, 0.25, errors.size) * BAR_WIDTH if errors.size > 1 else [0.0]
-    axes.plot(place + np.asarray(jitter), errors, ".", color=colour, markersize=5)
+    axes.plot(x + np.asarray(jitter), errors, ".", color=colour, markersize=5)

@@ -316,13 +316,13 @@ def _bounds(names: tuple[str, ...], start: Array) -> tuple[Array, Array]:
 def _solve(problem: _Problem, vector: Array, scale: Array) -> tuple[Array, Array, bool]:
     """Return the parameters, the slopes of the scaled residuals, and whether it converged."""
     keys = list(problem.prior)
-    places = [problem.names.index(key) for key in keys]
+    positions = [problem.names.index(key) for key in keys]
     means = np.array([problem.prior[key][0] for key in keys])
     widths = np.array([problem.prior[key][1] for key in keys])
 
     def residuals(p: Array) -> Array:
         data = (problem.depth(p, problem.x_mm, problem.y_mm) - problem.depth_mm) * scale
-        return np.concatenate([data, (p[places] - means) / widths])
+        return np.concatenate([data, (p[positions] - means) / widths])
 
     low, high = _bounds(problem.names, vector)
     inside = np.clip(vector, low + 1e-9, high - 1e-9)

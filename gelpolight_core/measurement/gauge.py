@@ -14,7 +14,7 @@ from gelpolight_core.measurement.evaluation import (
     SAME,
     Evaluation,
     PressResult,
-    lengths_by_place,
+    lengths_by_region,
     region_kinds,
 )
 from gelpolight_core.measurement.result import Truth
@@ -88,8 +88,8 @@ def gauge_rows(evaluation: Evaluation) -> tuple[GaugeRow, ...]:
         )
         objects = sorted({*same, *random}, key=lambda t: (t.shape, t.size_mm, t.height_mm))
         for truth in objects:
-            repeated = lengths_by_place(same.get(truth, []), direction)
-            regions = lengths_by_place(random.get(truth, []), direction)
+            repeated = lengths_by_region(same.get(truth, []), direction)
+            regions = lengths_by_region(random.get(truth, []), direction)
             rows.append(_row(direction, truth, repeated, regions))
     return tuple(rows)
 

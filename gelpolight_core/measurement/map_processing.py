@@ -87,15 +87,15 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     InputError
         If there are not three points with a depth, or they lie on a line.
     """
-    places = np.asarray(points_mm, np.float64)
-    if places.shape != (3, 2):
+    positions = np.asarray(points_mm, np.float64)
+    if positions.shape != (3, 2):
         raise InputError(
-            tr("{n} points for a plane").format(n=len(places)),
+            tr("{n} points for a plane").format(n=len(positions)),
             where=tr("levelling"),
             advice=tr("Choose three points"),
         )
-    depth = depth_at(heightmap, places[:, 0], places[:, 1])
-    (ax, ay), (bx, by) = places[1] - places[0], places[2] - places[0]
+    depth = depth_at(heightmap, positions[:, 0], positions[:, 1])
+    (ax, ay), (bx, by) = positions[1] - positions[0], positions[2] - positions[0]
     longest = max(ax**2 + ay**2, bx**2 + by**2, 1e-12)
     if not np.isfinite(depth).all() or abs(ax * by - ay * bx) < MOST_NEAR_LINE * longest:
         raise InputError(
@@ -103,7 +103,7 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
             where=tr("levelling"),
             advice=tr("Choose three points inside the working area, far from each other"),
         )
-    terms = np.column_stack([np.ones(3), places])
+    terms = np.column_stack([np.ones(3), positions])
     level, slope_x, slope_y = np.linalg.solve(terms, depth)
     x, y = np.meshgrid(heightmap.x_mm, heightmap.y_mm)
     plane = level + slope_x * x + slope_y * y

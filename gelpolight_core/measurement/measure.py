@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.measurement.doubt import find_doubt, no_anchor
 from gelpolight_core.measurement.fit import (
     EdgePrior,
     FitResult,
@@ -19,6 +18,7 @@ from gelpolight_core.measurement.fit import (
     fit_indenter,
     near_wall,
 )
+from gelpolight_core.measurement.fit_checks import describe_fit_problems, no_anchor
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.result import Measurement
 from gelpolight_core.measurement.segmentation import (
@@ -127,7 +127,7 @@ def measure_object(
     )
     window, region, prior = found.window, found.region, found.edge
     fit = _fit(shape, window, region, prior)
-    reasons = (find_doubt(shape, fit, window, region, prior), no_anchor(flags, region))
+    reasons = (describe_fit_problems(shape, fit, window, region, prior), no_anchor(flags, region))
     reason = "; ".join(found for found in reasons if found)
     face = _face(shape, fit, window)
     noise = (

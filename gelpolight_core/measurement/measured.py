@@ -131,8 +131,8 @@ def map_errors(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> MapErrors | No
     column, row = index_of(heightmap, x_mm, y_mm)
     factor = round(heightmap.x_mm.size / noise.shape[2])
     first = 0.5 * (factor - 1)
-    place = np.stack([row - first, column - first]) / factor
-    examples = np.array([map_coordinates(e, place, order=1, mode="nearest") for e in noise])
+    position = np.stack([row - first, column - first]) / factor
+    examples = np.array([map_coordinates(e, position, order=1, mode="nearest") for e in noise])
     model_sd = value_at(heightmap, heightmap.depth_model_sd_mm, x_mm, y_mm)
     examples = examples + model_sd * _smooth_fields(len(noise), x_mm, y_mm)
     return MapErrors(examples, heightmap.depth_scale_sd or 0.0, heightmap.lateral_scale_sd or 0.0)
@@ -196,8 +196,8 @@ def value_at(heightmap: HeightMap, values: NDArray[np.floating], x_mm: Array, y_
         Places in the sensor frame.
     """
     column, row = index_of(heightmap, x_mm, y_mm)
-    place = np.stack([row, column])
-    return np.asarray(map_coordinates(values, place, order=1, mode="nearest"), np.float64)
+    position = np.stack([row, column])
+    return np.asarray(map_coordinates(values, position, order=1, mode="nearest"), np.float64)
 
 
 def depth_at(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
@@ -240,6 +240,6 @@ def _smooth_fields(examples: int, x_mm: Array, y_mm: Array) -> Array:
     random = np.random.default_rng(0)
     waves = random.standard_normal((examples, WAVES, 2)) / MODEL_REACH_MM
     phases = random.uniform(0.0, 2.0 * np.pi, (examples, WAVES, 1))
-    places = np.stack([x_mm, y_mm])
-    fields = [np.cos(w @ places + p).sum(axis=0) for w, p in zip(waves, phases, strict=True)]
+    positions = np.stack([x_mm, y_mm])
+    fields = [np.cos(w @ positions + p).sum(axis=0) for w, p in zip(waves, phases, strict=True)]
     return np.asarray(np.sqrt(2.0 / WAVES) * np.array(fields))

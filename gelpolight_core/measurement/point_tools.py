@@ -58,9 +58,9 @@ class Distance:
         def deeper(d: Array, stretch: float) -> float:
             return float(d[1] - d[0])
 
-        places = np.stack([x, y], axis=1)
+        positions = np.stack([x, y], axis=1)
 
-        def by_places(at: Array, d: Array) -> tuple[float, ...]:
+        def by_positions(at: Array, d: Array) -> tuple[float, ...]:
             away = math.hypot(*(at[1] - at[0]))
             return away, math.hypot(away, float(d[1] - d[0])), float(d[1] - d[0])
 
@@ -71,8 +71,8 @@ class Distance:
         )
         return tool_result(
             self,
-            with_placing(figures, by_places, places, heightmap),
-            (places,),
+            with_placing(figures, by_positions, positions, heightmap),
+            (positions,),
             flags_at(heightmap, x, y),
         )
 
@@ -142,15 +142,15 @@ class Angle:
         InputError
             If two of the places are one, or one lies outside the map.
         """
-        places = np.array([self.first_mm, self.apex_mm, self.second_mm])
-        arms = places[[0, 2]] - places[1]
+        positions = np.array([self.first_mm, self.apex_mm, self.second_mm])
+        arms = positions[[0, 2]] - positions[1]
         if not (np.isfinite(arms).all() and np.hypot(*arms.T).min() > 0.0):
             raise InputError(
                 tr("an arm of the angle has no length"),
                 where=tr("angle"),
                 advice=tr("Place three different points, the apex first"),
             )
-        x, y = places.T
+        x, y = positions.T
         depth = _known_depth(heightmap, x, y)
         errors = map_errors(heightmap, x, y)
 
@@ -164,7 +164,7 @@ class Angle:
             )
             return _angle_deg(first, second)
 
-        def by_places(at: Array, d: Array) -> tuple[float, ...]:
+        def by_positions(at: Array, d: Array) -> tuple[float, ...]:
             to_first, to_second = at[0] - at[1], at[2] - at[1]
             first, second = np.array([*to_first, d[0] - d[1]]), np.array([*to_second, d[2] - d[1]])
             return _angle_deg(to_first, to_second), _angle_deg(first, second)
@@ -175,8 +175,8 @@ class Angle:
         )
         return tool_result(
             self,
-            with_placing(figures, by_places, places, heightmap),
-            (places,),
+            with_placing(figures, by_positions, positions, heightmap),
+            (positions,),
             flags_at(heightmap, x, y),
         )
 
@@ -184,7 +184,7 @@ class Angle:
 def with_placing(
     figures: tuple[Measured, ...],
     compute: Callable[[Array, Array], tuple[float, ...]],
-    places_mm: Array,
+    positions_mm: Array,
     heightmap: HeightMap,
 ) -> tuple[Measured, ...]:
     """Return figures with what placing adds: nobody places a point better than to one node.
@@ -198,7 +198,7 @@ def with_placing(
         With the standard deviations of the depth alone.
     compute : callable (places (N, 2), depths (N,)) -> values
         The same figures from places.
-    places_mm : (N, 2)
+    positions_mm : (N, 2)
         Where the points are.
     heightmap : HeightMap
         What was measured on.
@@ -207,11 +207,11 @@ def with_placing(
         return figures
     pitch = heightmap.pitch_mm
     spread = np.zeros(len(figures))
-    for point in range(len(places_mm)):
+    for point in range(len(positions_mm)):
         for axis in range(2):
             there = []
             for step in (-pitch, pitch):
-                moved = np.array(places_mm, np.float64)
+                moved = np.array(positions_mm, np.float64)
                 moved[point, axis] += step
                 depth = value_at(heightmap, heightmap.depth_mm, *moved.T)
                 there.append(compute(moved, depth))

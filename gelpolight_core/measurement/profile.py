@@ -223,7 +223,7 @@ def width_at(
 
     def compute(depth: Array, stretch: float) -> float:
         level = level_mm if level_mm is not None else _half_level(left, depth)
-        return stretch * (right.place(depth, level) - left.place(depth, level))
+        return stretch * (right.position(depth, level) - left.position(depth, level))
 
     found = measured("width", "mm", compute, profile.depth_mm, profile.errors)
     if found.sd is None:
@@ -239,7 +239,7 @@ def width_ends(
     Parameters and errors are those of :func:`width_at`.
     """
     left, right, level = _crossings(profile, level_mm, between)
-    return left.place(profile.depth_mm, level), right.place(profile.depth_mm, level), level
+    return left.position(profile.depth_mm, level), right.position(profile.depth_mm, level), level
 
 
 def slope(profile: Profile, a: float, b: float) -> Measured:
@@ -318,7 +318,7 @@ class _Crossing:
     extremes: tuple[int, int]
     """Points of least and greatest depth."""
 
-    def place(self, depth: Array, level_mm: float) -> float:
+    def position(self, depth: Array, level_mm: float) -> float:
         """Return the crossing's place, the profile's slope there taken as it was found."""
         return self.along_mm + (level_mm - float(depth[self.index])) * self.length_mm / self.rise_mm
 
@@ -337,8 +337,8 @@ def _crossings(
     extremes = (int(points[depth.argmin()]), int(points[depth.argmax()]))
     level = 0.5 * float(depth.min() + depth.max()) if level_mm is None else level_mm
     above = depth > level
-    places = np.flatnonzero(above[1:] != above[:-1])
-    if places.size < 2 or above[0] != above[-1]:
+    crossings = np.flatnonzero(above[1:] != above[:-1])
+    if crossings.size < 2 or above[0] != above[-1]:
         raise InputError(
             tr("the profile does not cross {level:.4f} mm and come back").format(level=level),
             where=tr("width of a profile"),
@@ -352,7 +352,7 @@ def _crossings(
             float(depth[k + 1] - depth[k]),
             extremes,
         )
-        for k in (places[0], places[-1])
+        for k in (crossings[0], crossings[-1])
     ]
     return found[0], found[1], level
 

@@ -101,11 +101,11 @@ def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> ProfileRou
     used = slice(first, first + sections * section)
     errors = _part(profile.errors, inside)
     depth = profile.depth_mm[inside]
-    place = slice(used.start - inside.start, used.stop - inside.start)
+    central = slice(used.start - inside.start, used.stop - inside.start)
 
     def figure(name: str, parameter: Callable[[Array], float]) -> Measured:
         def compute(depths: Array, stretch: float) -> float:
-            return UM * parameter((depths - _waves(depths, step, cutoff_mm))[place])
+            return UM * parameter((depths - _waves(depths, step, cutoff_mm))[central])
 
         return measured(name, "um", compute, depth, errors)
 
@@ -117,8 +117,8 @@ def profile_roughness(profile: Profile, *, cutoff_mm: float = 0.8) -> ProfileRou
         cutoff_mm=cutoff_mm,
         sections=int(sections),
         along_mm=profile.along_mm[used],
-        roughness_mm=(depth - waves)[place],
-        waviness_mm=waves[place],
+        roughness_mm=(depth - waves)[central],
+        waviness_mm=waves[central],
     )
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gelpolight_core.measurement.doubt import BETTER_SHAPE, POOR_RESIDUAL
 from gelpolight_core.measurement.fit import fit_indenter
+from gelpolight_core.measurement.fit_checks import BETTER_SHAPE, POOR_RESIDUAL
 from gelpolight_core.measurement.indenter import MODELS
 from gelpolight_core.measurement.measure import OUTSIDE_FLAG, find_object
 from gelpolight_core.measurement.segmentation import PressedRegion, find_pressed_regions

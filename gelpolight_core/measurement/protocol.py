@@ -37,7 +37,7 @@ class PressWanted:
     ----------
     truth : Truth
         The object: shape, size and height.
-    place_mm : (float, float)
+    position_mm : (float, float)
         Where its middle goes, (x, y) in the sensor frame.
     yaw_deg : float
         How a cuboid is turned, from x to y; 0 for a cylinder.
@@ -48,7 +48,7 @@ class PressWanted:
     """
 
     truth: Truth
-    place_mm: tuple[float, float]
+    position_mm: tuple[float, float]
     yaw_deg: float
     region: str
     repeat: int
@@ -129,20 +129,20 @@ class Protocol:
         ]
         for number in range(1, self.regions + 1):
             region = f"r{number:02d}"
-            place, yaw = self._random_place(truth, region)
-            wanted.append(PressWanted(truth, place, yaw, region, 1))
+            position, yaw = self._random_position(truth, region)
+            wanted.append(PressWanted(truth, position, yaw, region, 1))
         return wanted
 
-    def _random_place(self, truth: Truth, region: str) -> tuple[tuple[float, float], float]:
+    def _random_position(self, truth: Truth, region: str) -> tuple[tuple[float, float], float]:
         """Return a place that is equally likely anywhere with room, and a turn for a cuboid."""
         name = f"{truth.shape} {truth.size_mm:.3f} {truth.height_mm:.3f} {region}"
         rng = np.random.default_rng([self.seed, zlib.crc32(name.encode())])
         away = room_mm(truth, self.reach_mm) * math.sqrt(rng.random())
         angle = 2.0 * math.pi * rng.random()
         # To hundredths of a millimetre, as they are shown and written.
-        place = (round(away * math.cos(angle), 2), round(away * math.sin(angle), 2))
+        position = (round(away * math.cos(angle), 2), round(away * math.sin(angle), 2))
         yaw = round(90.0 * rng.random() - 45.0, 1)
-        return place, yaw if truth.shape == "cuboid" else 0.0
+        return position, yaw if truth.shape == "cuboid" else 0.0
 
 
 def room_mm(truth: Truth, reach_mm: float) -> float:

@@ -302,7 +302,7 @@ def _row(press: PressWanted) -> list[str]:
     truth = press.truth
     size = repr(truth.size_mm)
     sizes = ["", size] if truth.shape == "cuboid" else [size, ""]
-    places = [repr(press.place_mm[0]), repr(press.place_mm[1]), repr(press.yaw_deg)]
+    positions = [repr(press.position_mm[0]), repr(press.position_mm[1]), repr(press.yaw_deg)]
     return [
         press.file,
         truth.shape,
@@ -310,7 +310,7 @@ def _row(press: PressWanted) -> list[str]:
         repr(truth.height_mm),
         press.region,
         str(press.repeat),
-        *places,
+        *positions,
         _now(),
     ]
 

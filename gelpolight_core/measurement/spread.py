@@ -108,10 +108,10 @@ def noise_of_fit(
         first = 0.5 * (factor - 1)
         column = (window.x_mm[pixels] - x_mm[0]) / (x_mm[1] - x_mm[0])
         row = (window.y_mm[pixels] - y_mm[0]) / (y_mm[1] - y_mm[0])
-        places, weights = _bilinear((row - first) / factor, (column - first) / factor, noise_mm)
+        nodes, weights = _bilinear((row - first) / factor, (column - first) / factor, noise_mm)
         size = examples.shape[1]
         spread = [
-            np.bincount(places.ravel(), (weights * share).ravel(), minlength=size)
+            np.bincount(nodes.ravel(), (weights * share).ravel(), minlength=size)
             for share in shares
         ]
         return np.asarray(examples @ np.array(spread).T, np.float64)
@@ -134,11 +134,11 @@ def _bilinear(
     left = np.minimum(column.astype(np.intp), max(columns - 2, 0))
     down, right = row - above, column - left
     below, beside = np.minimum(above + 1, rows - 1), np.minimum(left + 1, columns - 1)
-    places = [above * columns + left, above * columns + beside]
-    places += [below * columns + left, below * columns + beside]
+    nodes = [above * columns + left, above * columns + beside]
+    nodes += [below * columns + left, below * columns + beside]
     weights = [(1.0 - down) * (1.0 - right), (1.0 - down) * right]
     weights += [down * (1.0 - right), down * right]
-    return np.array(places), np.array(weights)
+    return np.array(nodes), np.array(weights)
 
 
 def calibration_sd(

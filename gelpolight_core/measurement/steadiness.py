@@ -106,7 +106,7 @@ def judge_press(
     frames: Sequence[Frame],
     bare: Frame,
     *,
-    place_px: tuple[float, float] | None = None,
+    position_px: tuple[float, float] | None = None,
     tolerance_px: float = math.inf,
 ) -> PressJudgement:
     """Judge whether consecutive frames show a press that is held still.
@@ -117,7 +117,7 @@ def judge_press(
         At least two, in their order.
     bare : (rows, columns, 3)
         The bare membrane, of the same size and depth.
-    place_px : (float, float), optional
+    position_px : (float, float), optional
         Where to press, (u, v) in pixels.
     tolerance_px : float, optional
         How far beside it the middle of the press may be.
@@ -132,12 +132,12 @@ def judge_press(
     pairs = [*pairwise(frames), (frames[0], frames[-1])]
     moving = max(moving_share(*pair) for pair in pairs)
     contact = find_contact(bare, frames[-1])
-    reason = _reason(contact, moving, place_px, tolerance_px)
+    reason = _reason(contact, moving, position_px, tolerance_px)
     return PressJudgement(not reason, reason, moving, contact)
 
 
 def _reason(
-    contact: Contact, moving: float, place_px: tuple[float, float] | None, tolerance_px: float
+    contact: Contact, moving: float, position_px: tuple[float, float] | None, tolerance_px: float
 ) -> str:
     """Return why a press is refused; empty where it is not."""
     if not contact.pressed:
@@ -146,8 +146,8 @@ def _reason(
         return tr("It moved ({share:.1f} % of the image changed): hold it still.").format(
             share=100.0 * moving
         )
-    if place_px is not None:
-        away = math.dist(contact.centre_px, place_px)
+    if position_px is not None:
+        away = math.dist(contact.centre_px, position_px)
         if away > tolerance_px:
             return tr("It is beside the circle by {px:.0f} pixels: move it there.").format(px=away)
     return ""

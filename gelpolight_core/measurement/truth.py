@@ -87,7 +87,7 @@ def read_truth(path: Path) -> TruthTable:
             )
         if file in seen:
             raise InputError(
-                tr("{file} stands here a second time").format(file=file),
+                tr("{file} is listed twice").format(file=file),
                 where=where,
                 advice=tr("Keep one row for each image"),
             )

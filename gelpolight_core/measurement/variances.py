@@ -8,29 +8,29 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def variance_within(places: Sequence[Sequence[float]]) -> float:
+def variance_within(groups: Sequence[Sequence[float]]) -> float:
     """Return the variance (mm**2) of repeats at one place, pooled; NaN without repeats.
 
     Parameters
     ----------
-    places : sequence of sequences of float
+    groups : sequence of sequences of float
         Lengths (mm) by place, of one object or of several.
     """
-    freedom = sum(len(values) - 1 for values in places)
-    squares = sum(float(np.var(values)) * len(values) for values in places)
+    freedom = sum(len(values) - 1 for values in groups)
+    squares = sum(float(np.var(values)) * len(values) for values in groups)
     return squares / freedom if freedom else math.nan
 
 
-def variance_between(places: Sequence[Sequence[float]], within: float) -> float:
+def variance_between(groups: Sequence[Sequence[float]], within: float) -> float:
     """Return the variance (mm**2) that going to another place adds, below 0 where it adds none.
 
     Parameters
     ----------
-    places : sequence of sequences of float
+    groups : sequence of sequences of float
         Lengths (mm) of one object, of two places or more.
     within : float
         Variance (mm**2) of repeats at one place.
     """
     # The means of few repeats scatter by themselves; only what exceeds that is due to the place.
-    share = float(np.mean([1.0 / len(values) for values in places]))
-    return float(np.var([np.mean(values) for values in places], ddof=1)) - share * within
+    share = float(np.mean([1.0 / len(values) for values in groups]))
+    return float(np.var([np.mean(values) for values in groups], ddof=1)) - share * within

@@ -118,7 +118,7 @@ def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float)
         notes.append(
             tr(
                 "{percent:.0f} % of what is pressed lies in the shadow of an LED, which the "
-                "paper's model does not know: what stands on steep walls may come out too low; "
+                "paper's model does not know: features on steep walls may come out too low; "
                 "use the full model"
             ).format(percent=100.0 * share)
         )
@@ -161,7 +161,7 @@ def unsolved_note(share: float) -> str:
         return ""
     return tr(
         "{percent:.1f} % of the membrane is lit by less than two LEDs or turned away from the "
-        "camera, as on steep walls: what stands on them may come out too low"
+        "camera, as on steep walls: features on them may come out too low"
     ).format(percent=100.0 * share)
 
 

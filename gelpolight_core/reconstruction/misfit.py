@@ -140,7 +140,7 @@ def _image_misfit(
 
 
 def direct_light(
-    full: FullModel, places_mm: Array, depth_mm: Array, normals: Array, ray_slope: Array
+    full: FullModel, positions_mm: Array, depth_mm: Array, normals: Array, ray_slope: Array
 ) -> Array:
     """Return the direct brightness (..., 3) over the flat membrane's (PHYSICS, shading).
 
@@ -148,7 +148,7 @@ def direct_light(
     ----------
     full : FullModel
         Lights and membrane.
-    places_mm : (..., 2)
+    positions_mm : (..., 2)
         Where the surface is.
     depth_mm : (...)
         How deep.
@@ -158,9 +158,9 @@ def direct_light(
         Sideways move of the ray per mm of depth.
     """
     shape = depth_mm.shape
-    there = np.concatenate([places_mm, -depth_mm[..., None]], axis=-1).reshape(-1, 1, 3)
+    there = np.concatenate([positions_mm, -depth_mm[..., None]], axis=-1).reshape(-1, 1, 3)
     flat = np.concatenate(
-        [places_mm - ray_slope * depth_mm[..., None], 0.0 * depth_mm[..., None]], -1
+        [positions_mm - ray_slope * depth_mm[..., None], 0.0 * depth_mm[..., None]], -1
     )
     to_led = full.led_positions_mm - there
     from_flat = full.led_positions_mm - flat.reshape(-1, 1, 3)

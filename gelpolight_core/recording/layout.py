@@ -30,7 +30,7 @@ _SHORT, _LONG, _ASCII, _LONG8 = 3, 4, 2, 16
 class Strip:
     """Position of a compressed strip of a frame in the file."""
 
-    place: int
+    offset: int
     size: int
     crc: int
 
@@ -72,7 +72,7 @@ class FrameMark:
         )
         body = head + struct.pack(
             f"<{2 * n}Q{n}I",
-            *(strip.place for strip in self.strips),
+            *(strip.offset for strip in self.strips),
             *(strip.size for strip in self.strips),
             *(strip.crc for strip in self.strips),
         )
@@ -151,7 +151,7 @@ def pack_frame(
     time_s: float,
     shape: tuple[int, int],
     bits: int,
-    place: int,
+    offset: int,
 ) -> FrameBlock:
     """Return a frame's bytes.
 
@@ -161,20 +161,20 @@ def pack_frame(
         Compressed strips, from the top.
     number, time_s, shape, bits
         Properties of the frame; `shape` is (rows, columns).
-    place : int
+    offset : int
         Start position in the file.
     """
     text = json.dumps({"number": number, "time_s": time_s}).encode() + b"\0"
-    directory_at = place + padded(_mark_size(len(strips)))
+    directory_at = offset + padded(_mark_size(len(strips)))
     text_at = directory_at + _DIRECTORY_SIZE
-    places = [text_at + padded(len(text))]
+    offsets = [text_at + padded(len(text))]
     for strip in strips:
-        places.append(places[-1] + padded(len(strip)))
+        offsets.append(offsets[-1] + padded(len(strip)))
     mark = FrameMark(
-        number, time_s, places[-1] - place, *shape, bits,
-        tuple(Strip(p, len(s), zlib.crc32(s)) for p, s in zip(places, strips, strict=False)),
+        number, time_s, offsets[-1] - offset, *shape, bits,
+        tuple(Strip(p, len(s), zlib.crc32(s)) for p, s in zip(offsets, strips, strict=False)),
     )  # fmt: skip
-    directory = _directory(mark, place, (len(text), text_at))
+    directory = _directory(mark, offset, (len(text), text_at))
     blocks = (mark.pack(), directory, text, *strips)
     data = b"".join(block.ljust(padded(len(block)), b"\0") for block in blocks)
     return FrameBlock(data, directory_at, directory_at + 8 + 20 * _ENTRIES)
@@ -184,10 +184,10 @@ _ENTRIES = 12
 _DIRECTORY_SIZE = padded(8 + 20 * _ENTRIES + 8)
 
 
-def _directory(mark: FrameMark, place: int, text: tuple[int, int]) -> bytes:
+def _directory(mark: FrameMark, offset: int, text: tuple[int, int]) -> bytes:
     """Return the TIFF directory of a frame, not yet linked to the next one."""
     n = len(mark.strips)
-    tables_at = place + _MARK.size
+    tables_at = offset + _MARK.size
     bits = int.from_bytes(struct.pack("<3H", *(mark.bits,) * 3), "little")
     entries = (
         (256, _LONG, 1, mark.columns),
@@ -196,7 +196,7 @@ def _directory(mark: FrameMark, place: int, text: tuple[int, int]) -> bytes:
         (259, _SHORT, 1, 8),  # Deflate
         (262, _SHORT, 1, 2),  # RGB
         (270, _ASCII, *text),
-        (273, _LONG8, n, tables_at if n > 1 else mark.strips[0].place),
+        (273, _LONG8, n, tables_at if n > 1 else mark.strips[0].offset),
         (277, _SHORT, 1, 3),
         (278, _LONG, 1, mark.rows_per_strip),
         (279, _LONG8, n, tables_at + 8 * n if n > 1 else mark.strips[0].size),

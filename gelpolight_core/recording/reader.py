@@ -120,7 +120,7 @@ class Recording:
         rows = strip_rows(mark.rows, len(mark.strips))
         for strip, part in zip(mark.strips, rows, strict=True):
             try:
-                data = os.pread(self._file, strip.size, strip.place)
+                data = os.pread(self._file, strip.size, strip.offset)
             except OSError as error:
                 raise unreadable(error, self.path) from error
             if zlib.crc32(data) != strip.crc or not unpack_strip(data, rgb[part]):
@@ -197,37 +197,37 @@ def _read_header(path: Path, file: int, size: int) -> tuple[RecordingHeader, int
 def _find_frames(file: int, begin: int, size: int) -> list[FrameMark]:
     """Return the marks of all complete frames in the file, in order."""
     marks: list[FrameMark] = []
-    place = begin
-    while place < size:
-        mark = layout.unpack_mark(os.pread(file, layout.MARK_LIMIT, place))
-        if mark is not None and _fits(mark, place, size, marks):
+    offset = begin
+    while offset < size:
+        mark = layout.unpack_mark(os.pread(file, layout.MARK_LIMIT, offset))
+        if mark is not None and _fits(mark, offset, size, marks):
             marks.append(mark)
-            place += mark.size
+            offset += mark.size
         else:
-            place = _next_magic(file, place + 8, size)
+            offset = _next_magic(file, offset + 8, size)
     return marks
 
 
-def _next_magic(file: int, place: int, size: int) -> int:
+def _next_magic(file: int, offset: int, size: int) -> int:
     """Return the possible start of the next frame after damage; `size` if there is none."""
     overlap = len(layout.FRAME_MAGIC) - 1
-    while place + overlap < size:
+    while offset + overlap < size:
         # Not memory-mapped: if the file shrank meanwhile, the program would crash.
-        part = os.pread(file, SEARCH_BYTES, place)
+        part = os.pread(file, SEARCH_BYTES, offset)
         found = part.find(layout.FRAME_MAGIC)
         if found >= 0:
-            return place + found
+            return offset + found
         if len(part) <= overlap:
             break
-        place += len(part) - overlap
+        offset += len(part) - overlap
     return size
 
 
-def _fits(mark: FrameMark, place: int, size: int, before: list[FrameMark]) -> bool:
+def _fits(mark: FrameMark, offset: int, size: int, before: list[FrameMark]) -> bool:
     """Return whether a mark is plausible: inside the file, and like the frames before it."""
-    end = place + mark.size
+    end = offset + mark.size
     inside = end <= size and all(
-        place < strip.place and strip.place + strip.size <= end for strip in mark.strips
+        offset < strip.offset and strip.offset + strip.size <= end for strip in mark.strips
     )
     # The last strip may be shorter; an incompressible strip is slightly larger than its data.
     most = _most_bytes(mark) if mark.strips else 0

@@ -106,7 +106,7 @@ class RecordingWriter:
             time_s=float(time_s),
             shape=(rgb.shape[0], rgb.shape[1]),
             bits=self._bits,
-            place=self.size_bytes,
+            offset=self.size_bytes,
         )
         self._append(block.data)
         # Other readers see the frame only from now on.
@@ -179,13 +179,13 @@ class RecordingWriter:
             raise
         self.size_bytes += len(data)
 
-    def _write(self, data: bytes, place: int) -> None:
+    def _write(self, data: bytes, offset: int) -> None:
         assert self._file is not None
         view = memoryview(data)
         try:
             while view:
-                written = os.pwrite(self._file, view, place)
-                view, place = view[written:], place + written
+                written = os.pwrite(self._file, view, offset)
+                view, offset = view[written:], offset + written
         except OSError as error:
             raise cannot_write(error, self.path) from error
 

@@ -215,10 +215,10 @@ def _curve(press: BallPress, pixels: _PressPixels) -> Array:
     curve = np.full((3, len(BINS) - 1), np.nan)
     for k in range(3):
         known = pixels.known[:, k]
-        place = np.digitize(cosines[known, k], BINS) - 1
+        bin_of = np.digitize(cosines[known, k], BINS) - 1
         value = pixels.value[known, k]
         for b in range(len(BINS) - 1):
-            inside = place == b
+            inside = bin_of == b
             if inside.sum() >= LEAST_IN_BIN:
                 curve[k, b] = np.median(value[inside])
     return curve

@@ -242,8 +242,8 @@ def fit_edge(scaled: Array32, valid: Mask, start: Circle) -> Contour:
     if contour.residual_px > 0.06 * contour.circle.radius:
         smooth = trace_contour(table(circle, 0.35, 12.0), circle, margin=0.25)
         # So much noise may favour a wrong ring, which the scatter about that ring cannot show.
-        doubt = max(contour.centre_sd_px, smooth.residual_px)
-        return replace(smooth, circle=circle, centre_sd_px=doubt)
+        sd_px = max(contour.centre_sd_px, smooth.residual_px)
+        return replace(smooth, circle=circle, centre_sd_px=sd_px)
     if contour.residual_px < 0.01 * contour.circle.radius:
         return trace_contour(table(contour.circle, 0.15), contour.circle, margin=0.1)
     return contour

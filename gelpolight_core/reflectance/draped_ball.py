@@ -55,8 +55,8 @@ def draped_ball(
     for _ in range(ROUNDS):  # each round shrinks the error by slope times ray slope, about a tenth
         away = points_mm + depth[:, None] * ray_slope - centre
         depth = profile(np.hypot(away[:, 0], away[:, 1]))
-    place = points_mm + depth[:, None] * ray_slope
-    away = place - centre
+    position = points_mm + depth[:, None] * ray_slope
+    away = position - centre
     r = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
     outside, inside = np.maximum(r, contact), np.minimum(r, contact)
     drape = -ring / decay_mm * k1e(outside / decay_mm) / scale
@@ -64,4 +64,4 @@ def draped_ball(
     slope = np.where(r < contact, -inside / np.sqrt(radius**2 - inside**2), drape)
     normals = np.concatenate([-slope[:, None] * away / r[:, None], -np.ones((len(r), 1))], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.concatenate([place, -depth[:, None]], axis=1), normals, r < contact
+    return np.concatenate([position, -depth[:, None]], axis=1), normals, r < contact

@@ -374,8 +374,8 @@ def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple
         systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * contour.residual_px)
         sd = float(np.hypot(contour.centre_sd_px, systematic))
         return replace(contour, centre_sd_px=sd), "edge"
-    doubt = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart, 0.5 * radius))
-    sd = float(np.hypot(shading.centre_sd_px, doubt))
+    model_sd = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart, 0.5 * radius))
+    sd = float(np.hypot(shading.centre_sd_px, model_sd))
     turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
     x = rough.x + radius * np.cos(turns)
     y = rough.y + radius * np.sin(turns)

@@ -172,20 +172,20 @@ def draw_misfits(presses: Sequence[BallPress], joint: JointResult) -> Drawing:
         With the misfit of each press after the joint refinement.
     """
     names = [printable(PurePath(press.name).name) for press in presses]
-    places = np.arange(len(names))
+    bars = np.arange(len(names))
 
     def paint(figure: Figure) -> None:
         left, right = figure.subplots(1, 2, width_ratios=(1.5, 1.0))
         alone = [100.0 * press.shading_misfit for press in presses]
-        left.bar(places - 0.2, alone, 0.38, color="0.75", label=tr("each ball alone"))
+        left.bar(bars - 0.2, alone, 0.38, color="0.75", label=tr("each ball alone"))
         left.bar(
-            places + 0.2,
+            bars + 0.2,
             100.0 * joint.ball_misfits,
             0.38,
             color="0.25",
             label=tr("all together, with their drapes"),
         )
-        left.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")
+        left.set_xticks(bars, names, rotation=45, ha="right", rotation_mode="anchor")
         left.set_ylabel(tr("misfit of the shading (%)"))
         left.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=2)
         right.axhline(0.0, color="0.7", lw=0.6)
@@ -197,12 +197,10 @@ def draw_misfits(presses: Sequence[BallPress], joint: JointResult) -> Drawing:
             ]
         )
         deeper = [a.depth_mm - p.pose.depth_mm for a, p in zip(joint.balls, presses, strict=True)]
-        right.plot(places, 1e3 * moved[:, 0], "o", color="#d55e00", markersize=3, label="x")
-        right.plot(places, 1e3 * moved[:, 1], "s", color="#0072b2", markersize=3, label="y")
-        right.plot(
-            places, 1e3 * np.array(deeper), "^", color="0.2", markersize=3, label=tr("depth")
-        )
-        right.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")
+        right.plot(bars, 1e3 * moved[:, 0], "o", color="#d55e00", markersize=3, label="x")
+        right.plot(bars, 1e3 * moved[:, 1], "s", color="#0072b2", markersize=3, label="y")
+        right.plot(bars, 1e3 * np.array(deeper), "^", color="0.2", markersize=3, label=tr("depth"))
+        right.set_xticks(bars, names, rotation=45, ha="right", rotation_mode="anchor")
         right.set_ylabel(tr("shift of the ball (\N{MICRO SIGN}m)"))
         right.legend(loc="upper left", bbox_to_anchor=(0.0, 1.22), ncols=3)
 

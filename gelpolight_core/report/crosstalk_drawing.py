@@ -28,10 +28,10 @@ def draw_crosstalk(crosstalk: NDArray[np.float64]) -> Drawing:
         axes = figure.subplots()
         for channel in range(3):
             shares = 100.0 * crosstalk[channel]
-            places = np.arange(3) + 0.25 * (channel - 1)
+            bars = np.arange(3) + 0.25 * (channel - 1)
             others = np.arange(3) != channel
             axes.bar(
-                places[others],
+                bars[others],
                 shares[others],
                 width=0.22,
                 color=COLOURS[channel],

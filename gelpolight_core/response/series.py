@@ -19,8 +19,8 @@ Mask = NDArray[np.bool_]
 
 # Denser at small values, where most camera curves bend.
 CORNERS = (np.arange(1, 13) / 12.0) ** 2
-_PLACES = np.log(CORNERS)
-_GAPS = np.diff(_PLACES)
+_LOG_CORNERS = np.log(CORNERS)
+_GAPS = np.diff(_LOG_CORNERS)
 LEAST_EXPONENT, LARGEST_EXPONENT = 0.05, 20.0
 # From corner to corner the exponent of sRGB changes by 0.1 on average and by 0.4 at most; without
 # data, the exponent is expected to change by this.
@@ -252,8 +252,8 @@ def _within(log_value: Array) -> tuple[NDArray[np.intp], Array, Array]:
 
     Below the lowest corner its exponent continues; the highest corner is 0, where values end.
     """
-    below = np.clip(np.searchsorted(_PLACES, log_value) - 1, 0, len(CORNERS) - 2)
-    along = log_value - _PLACES[below]
+    below = np.clip(np.searchsorted(_LOG_CORNERS, log_value) - 1, 0, len(CORNERS) - 2)
+    along = log_value - _LOG_CORNERS[below]
     return below, along, 0.5 * along * np.maximum(along, 0.0) / _GAPS[below]
 
 

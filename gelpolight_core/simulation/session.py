@@ -312,13 +312,13 @@ def truth_grid(
     rows = np.arange(
         math.ceil(surface.y_mm[0] / step - 1e-9), math.floor(surface.y_mm[-1] / step + 1e-9) + 1
     )
-    place = np.meshgrid(
+    position = np.meshgrid(
         (rows * step - surface.y0_mm) / surface.pitch_mm,
         (columns * step - surface.x0_mm) / surface.pitch_mm,
         indexing="ij",
     )
-    depth = map_coordinates(surface.depth_mm, place, order=1, mode="nearest")
-    contact = map_coordinates(surface.contact.astype(np.float32), place, order=1, mode="nearest")
+    depth = map_coordinates(surface.depth_mm, position, order=1, mode="nearest")
+    contact = map_coordinates(surface.contact.astype(np.float32), position, order=1, mode="nearest")
     return depth.astype(np.float32), contact > 0.5, float(columns[0] * step), float(rows[0] * step)
 
 

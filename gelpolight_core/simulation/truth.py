@@ -43,7 +43,7 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
     """
     design = sensor.design
     camera, layers, membrane = design.camera, design.layers, design.membrane
-    places = [
+    positions = [
         camera_points(layers, np.array([led.x_mm, led.y_mm, -led.height_mm])) for led in design.leds
     ]
     return {
@@ -59,8 +59,8 @@ def truth_table(sensor: VirtualSensor, stages: Sequence[str]) -> dict[str, Any]:
             "offset_mm": layers.top_distance_mm,
         },
         "leds": {
-            name: {"camera_mm": place.tolist(), "relative_power": led.power}
-            for name, place, led in zip("RGB", places, design.leds, strict=True)
+            name: {"camera_mm": position.tolist(), "relative_power": led.power}
+            for name, position, led in zip("RGB", positions, design.leds, strict=True)
         },
         "crosstalk_camera_from_led": [list(row) for row in design.photometry.crosstalk],
         "balls": [

@@ -41,8 +41,8 @@ def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
     session = read_session(spoilt)
     results = run_stage(Stage.BACKGROUND, session, virtual_results)
     assert results.bad is not None
-    assert {int(c) for c in results.bad.places[:, 1]} == {COLUMN}
-    assert len(results.bad.places) == results.bad.height
+    assert {int(c) for c in results.bad.pixels[:, 1]} == {COLUMN}
+    assert len(results.bad.pixels) == results.bad.height
     assert results.bare_membrane is not None
     assert "bad_pixels_percent" in [f.key for f in results.bare_membrane.figures]
     # The captures are those of another camera: the fingerprints of earlier stages differ.
@@ -60,7 +60,7 @@ def test_a_dead_column_is_found_and_left_out_of_background_and_presses(
 
 def test_a_camera_without_bad_pixels_has_none(virtual_results: StageResults) -> None:
     assert virtual_results.bad is not None
-    assert not virtual_results.bad.places.size
+    assert not virtual_results.bad.pixels.size
 
 
 def test_the_map_is_kept_in_the_file_and_files_without_one_are_read(
@@ -72,12 +72,12 @@ def test_the_map_is_kept_in_the_file_and_files_without_one_are_read(
     write_calibration(kept, tmp_path / "kept.gplcal")
     again = read_calibration(tmp_path / "kept.gplcal")
     assert again.bad is not None
-    assert np.array_equal(again.bad.places, bad.places)
+    assert np.array_equal(again.bad.pixels, bad.pixels)
     assert again.identity == kept.identity != small_calibration.identity
     write_calibration(small_calibration, tmp_path / "without.gplcal")
     without = read_calibration(tmp_path / "without.gplcal")
     assert without.bad is None
-    assert not without.bad_pixels.places.size
+    assert not without.bad_pixels.pixels.size
     assert without.identity == small_calibration.identity
 
 

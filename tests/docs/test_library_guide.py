@@ -9,6 +9,7 @@ import sys
 import types
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chapter import DOCS, blocks
 
@@ -57,7 +58,12 @@ def test_the_examples_for_contributors_run(guide: types.ModuleType, folder: Path
     (folder / "press.png").symlink_to(image)
     examples = _run("../CONTRIBUTING.md", folder)
     assert [frame.number for frame in examples.seen] == [0, 1, 2]
-    assert len((folder / "surface.xyz").read_text("ascii").splitlines()) > 1000
+    lines = (folder / "surface.asc").read_text("ascii").splitlines()
+    header = dict(line.split() for line in lines[:6])
+    grid = np.loadtxt(lines[6:])
+    assert grid.shape == (int(header["nrows"]), int(header["ncols"]))
+    assert grid.max() == pytest.approx(examples.height_map.depth_mm.max(), abs=1e-4)
+    assert -9999.0 in grid
 
 
 def test_the_readme_script_is_part_of_the_guide() -> None:

@@ -101,9 +101,9 @@ def test_a_crash_is_a_row_that_failed_and_the_next_case_runs() -> None:
     [
         (Seen(True, "", error_um=1.0, bound_um=2.0), Outcome.PASSED),
         (Seen(True, "", error_um=3.0, bound_um=2.0), Outcome.FAILED),
-        (Seen(True, "", error_um=3.0, bound_um=2.0, doubt="do not trust it"), Outcome.REFUSED),
+        (Seen(True, "", error_um=3.0, bound_um=2.0, warning="do not trust it"), Outcome.REFUSED),
         (Seen(True, "", error_um=float("nan"), bound_um=2.0), Outcome.FAILED),
-        (Seen(True, "", finite=False, doubt="do not trust it"), Outcome.FAILED),
+        (Seen(True, "", finite=False, warning="do not trust it"), Outcome.FAILED),
         (Seen(False, ""), Outcome.FAILED),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.in_place.ball import Ball, contact_by_slopes, placed_by_slopes
-from gelpolight_core.in_place.next_ball import next_place
+from gelpolight_core.in_place.next_ball import next_position
 from gelpolight_core.in_place.scale import scale_from_pins
 from gelpolight_core.reconstruction.in_place.depth import depth_of, normals
 from gelpolight_core.reconstruction.in_place.grid import ImageSize, WorkingGrid
@@ -20,7 +20,7 @@ from gelpolight_core.reconstruction.in_place.model import (
     colour_cells,
     evaluate,
 )
-from gelpolight_core.reconstruction.in_place.terms import TERMS, design_rows, place_axes
+from gelpolight_core.reconstruction.in_place.terms import TERMS, design_rows, position_axes
 from gelpolight_core.reflectance.contour import Circle
 
 
@@ -47,7 +47,7 @@ def test_the_pass_over_a_frame_is_the_polynomial_of_the_fit() -> None:
     change = random.normal(0.0, 0.4, (12, 17, 3)).astype(np.float32)
     coefficients = random.normal(0.0, 1.0, (TERMS, 2))
     found = np.stack(evaluate(coefficients, change), axis=-1)
-    x, y = np.meshgrid(*place_axes(12, 17))
+    x, y = np.meshgrid(*position_axes(12, 17))
     wanted = design_rows(change.reshape(-1, 3), x.ravel(), y.ravel()) @ coefficients
     assert found.reshape(-1, 2) == pytest.approx(wanted, abs=2e-4)
 
@@ -102,10 +102,10 @@ def test_the_next_ball_is_asked_for_where_the_membrane_is_seen() -> None:
     grid = WorkingGrid(ImageSize(100, 80), 0.1)
     lit = np.ones((80, 100), np.bool_)
     ball = Ball(20.0, 20.0, 10.0, 30.0)
-    x_mm, y_mm = next_place([ball], grid, lit)
+    x_mm, y_mm = next_position([ball], grid, lit)
     assert x_mm > 3.0 and y_mm > 2.0
     lit[:, 60:] = False
-    x_mm, y_mm = next_place([ball], grid, lit)
+    x_mm, y_mm = next_position([ball], grid, lit)
     assert x_mm < 1.1 and y_mm > 2.0
 
 

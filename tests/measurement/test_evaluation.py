@@ -240,7 +240,7 @@ def test_a_folder_of_presses_is_evaluated_from_end_to_end(tmp_path: Path) -> Non
         (HEADER + "a.png,ball,nan,,1\n", "diameter_mm is 'nan'"),
         (HEADER + "a.png,ball,0,,1\n", "diameter_mm is '0'"),
         (HEADER + "a.png,ball,6,,-1\n", "height_mm is '-1'"),
-        (HEADER + "a.png,ball,6,,1\n\na.png,ball,6,,1\n", "line 4: a.png stands here a second"),
+        (HEADER + "a.png,ball,6,,1\n\na.png,ball,6,,1\n", "line 4: a.png is listed twice"),
         (HEADER + ",ball,6,,1\n", "names no file"),
         (HEADER + "a.png,coin,,,1\n", "no row with a cylinder"),
         ("", "is missing"),

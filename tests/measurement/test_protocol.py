@@ -48,7 +48,7 @@ def test_the_whole_protocol_is_the_papers() -> None:
     }
     of_one = [p for p in presses if p.truth == presses[0].truth]
     assert [p.region for p in of_one[:5]] == ["same"] * 5
-    assert len({p.place_mm for p in of_one[5:]}) == 25
+    assert len({p.position_mm for p in of_one[5:]}) == 25
 
 
 @settings(max_examples=25, deadline=None)
@@ -58,12 +58,12 @@ def test_every_object_lies_within_reach_with_the_ground_around_it(seed: int, rea
         half = 0.5 * press.truth.size_mm
         corner = half * math.sqrt(2.0) if press.truth.shape == "cuboid" else half
         # Places are rounded to hundredths of a millimetre.
-        assert math.hypot(*press.place_mm) + corner + ROOM_MM <= reach + 0.01
+        assert math.hypot(*press.position_mm) + corner + ROOM_MM <= reach + 0.01
 
 
 def test_random_places_fill_the_room_evenly() -> None:
     away = [
-        math.hypot(*press.place_mm)
+        math.hypot(*press.position_mm)
         for seed in range(40)
         for press in Protocol(
             ("cylinder",), (4.0,), (), repeats=0, reach_mm=14.0, seed=seed

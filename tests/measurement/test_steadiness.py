@@ -37,7 +37,9 @@ def shot(shift_px: float | None, seed: int, *, noise: float = 0.01) -> np.ndarra
 @given(noise=st.sampled_from([0.002, 0.01, 0.03]), seed=st.integers(0, 1000))
 def test_a_still_press_is_accepted_whatever_the_cameras_noise(noise: float, seed: int) -> None:
     frames = [shot(0.0, seed + k, noise=noise) for k in range(3)]
-    judged = judge_press(frames, shot(None, seed + 9, noise=noise), place_px=PLACE, tolerance_px=9)
+    judged = judge_press(
+        frames, shot(None, seed + 9, noise=noise), position_px=PLACE, tolerance_px=9
+    )
     assert judged.accepted
     assert judged.reason == ""
     assert judged.contact.centre_px == pytest.approx(PLACE, abs=8.0)
@@ -67,7 +69,7 @@ def test_a_press_that_slides_is_refused_even_if_no_two_frames_in_a_row_differ() 
 def test_a_press_beside_the_circle_is_refused_with_how_far() -> None:
     frames = [shot(40.0, k) for k in range(3)]
     bare = shot(None, 9)
-    judged = judge_press(frames, bare, place_px=PLACE, tolerance_px=15.0)
+    judged = judge_press(frames, bare, position_px=PLACE, tolerance_px=15.0)
     assert not judged.accepted
     assert "beside the circle by" in judged.reason
     assert judge_press(frames, bare).accepted

@@ -152,8 +152,8 @@ def test_a_strip_that_unpacks_to_more_than_a_frame_is_refused(whole: bytes, plac
     strip = mark.strips[0]
     assert len(bomb) <= strip.size
     content = bytearray(whole)
-    content[strip.place : strip.place + len(bomb)] = bomb
-    crc = zlib.crc32(content[strip.place : strip.place + strip.size])
+    content[strip.offset : strip.offset + len(bomb)] = bomb
+    crc = zlib.crc32(content[strip.offset : strip.offset + strip.size])
     struct.pack_into("<I", content, begin + 48 + 64, crc)
     struct.pack_into("<I", content, begin + 128, zlib.crc32(content[begin : begin + 128]))
     place.write_bytes(content)

@@ -70,7 +70,7 @@ def progress_of(run: InPlaceRun) -> Progress:
         float(np.mean(errors)),
         gain,
         tuple((n, math.degrees(math.atan(error))) for n, error in result.learning),
-        None if settled else to_px(*result.next_place_mm, result.model.grid),
+        None if settled else to_px(*result.next_position_mm, result.model.grid),
     )
 
 

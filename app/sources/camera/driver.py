@@ -33,14 +33,14 @@ class Device:
         Name shown to the user.
     model : str
         Vendor and product, ``046d:081b``; empty if they are not known.
-    place : str
+    address : str
         Address that the driver opens; changes when the camera is plugged in again.
     """
 
     identity: str
     name: str
     model: str
-    place: str
+    address: str
 
 
 @dataclass(frozen=True, slots=True)

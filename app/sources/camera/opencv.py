@@ -59,7 +59,7 @@ class OpenCvDriver:
         """Return the listed formats of a camera that OpenCV can read."""
         if not self._is_v4l2:
             return ()
-        found = V4l2(device.place)
+        found = V4l2(device.address)
         try:
             known = UNCOMPRESSED + COMPRESSED
             return tuple(f for f in found.formats() if f.code in known)
@@ -68,8 +68,8 @@ class OpenCvDriver:
 
     def open(self, device: Device, wanted: Format | None) -> OpenCvCamera:
         """Open a camera, which may take seconds."""
-        controls: V4l2 | None = V4l2(device.place) if self._is_v4l2 else None
-        address = device.place if not device.place.isdigit() else int(device.place)
+        controls: V4l2 | None = V4l2(device.address) if self._is_v4l2 else None
+        address = device.address if not device.address.isdigit() else int(device.address)
         capture = self._capture(address, self._interface)
         if not capture.isOpened():
             if controls is not None:

@@ -48,12 +48,12 @@ def paint_depth_error(figure: Figure, points: Sequence[Point]) -> None:
     axes = figure.subplots()
     _curves(axes, points, "rms_um")
     for number, width in enumerate(dict.fromkeys(p.width for p in points)):
-        places = [measured(p) for p in fronts([p for p in points if p.width == width])]
-        if not places:
+        points_shown = [measured(p) for p in fronts([p for p in points if p.width == width])]
+        if not points_shown:
             continue
         axes.step(
-            [ms for ms, _ in places],
-            [um for _, um in places],
+            [ms for ms, _ in points_shown],
+            [um for _, um in points_shown],
             where="post",
             color="black",
             lw=0.7,
@@ -61,7 +61,7 @@ def paint_depth_error(figure: Figure, points: Sequence[Point]) -> None:
         )
         axes.annotate(
             str(width),
-            places[0],
+            points_shown[0],
             fontsize=6,
             xytext=(-4, 4),
             textcoords="offset points",

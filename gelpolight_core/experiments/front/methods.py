@@ -156,7 +156,7 @@ def _rival(rivals: Rivals, kind: str, wrong: bool, scene: Scene) -> Solve:
     """Return a rival on the scene's grid, with a correct integrator or with the common faults."""
     predict, background, table = rivals.predict(kind, scene), scene.background, scene.full.table
     valid, grid = table.valid, table.grid
-    place = grid.points_mm()[valid].astype(np.float32)
+    position = grid.points_mm()[valid].astype(np.float32)
     solver = PoissonSolver(*grid.shape, pitch_mm=grid.pitch_mm, workers=THREADS)
     border = np.zeros(grid.shape, bool)
     border[[0, -1], :] = border[:, [0, -1]] = True
@@ -164,7 +164,7 @@ def _rival(rivals: Rivals, kind: str, wrong: bool, scene: Scene) -> Solve:
     def solve(frame: NDArray[Any]) -> tuple[Map, Slopes]:
         change = relative_change(table.apply(as_linear(frame)), background)
         slopes = np.zeros((*grid.shape, 2), np.float32)
-        slopes[valid] = predict(change[valid], place)
+        slopes[valid] = predict(change[valid], position)
         slope_x, slope_y = (np.ascontiguousarray(slopes[..., k]) for k in (0, 1))
         if wrong:
             depth = shifted_cosine_transform(slope_x, slope_y, grid.pitch_mm)

@@ -51,18 +51,18 @@ def paint_integrators(figure: Figure, points: Sequence[IntegratorPoint]) -> None
             (p for p in points if p.name == name and p.scene == "bump"), key=lambda p: p.side
         )
         colour, marker = LOOKS[name]
-        places = [(p.median_ms, max(p.mean_um, LEAST_UM)) for p in mine]
+        shown = [(p.median_ms, max(p.mean_um, LEAST_UM)) for p in mine]
         axes.plot(
-            *zip(*places, strict=True),
+            *zip(*shown, strict=True),
             marker=marker,
             color=colour,
             markersize=4,
             lw=0.9,
             label=mine[0].label,
         )
-        for point, place in ((mine[0], places[0]), (mine[-1], places[-1])):
+        for point, at in ((mine[0], shown[0]), (mine[-1], shown[-1])):
             axes.annotate(
-                str(point.side), place, fontsize=5.5, xytext=(3, 3), textcoords="offset points"
+                str(point.side), at, fontsize=5.5, xytext=(3, 3), textcoords="offset points"
             ).set_in_layout(False)
     axes.set_xscale("log")
     axes.set_yscale("log")

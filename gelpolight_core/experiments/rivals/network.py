@@ -42,12 +42,12 @@ class Network:
     middle: Map
     spread: Map
 
-    def __call__(self, change: Map, place_mm: Map) -> Map:
+    def __call__(self, change: Map, position_mm: Map) -> Map:
         """Return the slopes (N, 2) of relative changes (N, 3) at places (N, 2)."""
         slopes = np.empty((len(change), 2), np.float32)
         for begin in range(0, len(change), BLOCK):
             part = slice(begin, begin + BLOCK)
-            given = np.concatenate([change[part], place_mm[part]], axis=1)
+            given = np.concatenate([change[part], position_mm[part]], axis=1)
             angles = _values(self.layers, (given - self.middle) / self.spread)[-1]
             slopes[part] = np.tan(np.clip(angles, -MOST_ANGLE, MOST_ANGLE))
         return slopes
@@ -84,7 +84,7 @@ def fit_network(samples: BallSamples, *, seed: int = 0, steps: int = STEPS) -> N
     """
     require_pixels(samples)
     some = samples.some(MOST_SAMPLES, seed)
-    inputs = np.concatenate([some.change, some.place_mm], axis=1)
+    inputs = np.concatenate([some.change, some.position_mm], axis=1)
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0) + np.float32(1e-9)
     layers = _trained((inputs - middle) / spread, np.arctan(some.slopes), seed, steps)
     return Network(layers, middle, spread)

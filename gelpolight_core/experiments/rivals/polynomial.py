@@ -36,7 +36,7 @@ def fit_polynomial(samples: BallSamples) -> Predict:
         If the balls show too few pixels.
     """
     require_pixels(samples)
-    inputs = np.concatenate([samples.change, samples.place_mm], axis=1)
+    inputs = np.concatenate([samples.change, samples.position_mm], axis=1)
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0) + np.float32(1e-9)
     sums = []
     for number in np.unique(samples.ball):
@@ -46,11 +46,11 @@ def fit_polynomial(samples: BallSamples) -> Predict:
         sums.append((terms.T @ terms, terms.T @ slopes, float((slopes**2).sum())))
     weights = _fitted(sums, _best_penalty(sums)).astype(np.float32)
 
-    def predict(change: Map, place_mm: Map) -> Map:
+    def predict(change: Map, position_mm: Map) -> Map:
         slopes = np.empty((len(change), 2), np.float32)
         for begin in range(0, len(change), BLOCK):
             part = slice(begin, begin + BLOCK)
-            given = (np.concatenate([change[part], place_mm[part]], axis=1) - middle) / spread
+            given = (np.concatenate([change[part], position_mm[part]], axis=1) - middle) / spread
             slopes[part] = _terms(np.clip(given, -CLIP, CLIP)) @ weights
         return slopes
 

@@ -25,7 +25,8 @@ AWAY_MM = 4.0
 LEAST_PIXELS = 200
 DARK = 0.01
 """A background below this share of full scale has no ratio."""
-_FIELDS = ("change", "place_mm", "slopes", "ball")
+_FIELDS = ("change", "position_mm", "slopes", "ball")
+_KEYS = ("change", "place_mm", "slopes", "ball")  # of the npz files
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,7 @@ class BallSamples:
     ----------
     change : (N, 3) float32
         I / I0 - 1: image over background, linear light as the camera sees it.
-    place_mm : (N, 2) float32
+    position_mm : (N, 2) float32
         Position on the membrane.
     slopes : (N, 2) float32
         d(depth)/dx and d(depth)/dy; 0 beside the contact.
@@ -45,7 +46,7 @@ class BallSamples:
     """
 
     change: Map
-    place_mm: Map
+    position_mm: Map
     slopes: Map
     ball: NDArray[np.int16]
 
@@ -53,7 +54,7 @@ class BallSamples:
         """Return at most `count` of the pixels, chosen at random."""
         kept = np.random.default_rng(seed).permutation(len(self.ball))[:count]
         return BallSamples(
-            self.change[kept], self.place_mm[kept], self.slopes[kept], self.ball[kept]
+            self.change[kept], self.position_mm[kept], self.slopes[kept], self.ball[kept]
         )
 
 
@@ -112,17 +113,17 @@ def _samples_of(number: int, press: BallPress, change: Map, table: ResamplingTab
     beside = np.random.default_rng(0).permutation(beside)[:FLAT_PIXELS]
     rows = np.concatenate([contact[0], beside[:, 0]])
     columns = np.concatenate([contact[1], beside[:, 1]])
-    place = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
+    position = np.stack([table.grid.x_mm[columns], table.grid.y_mm[rows]], axis=-1)
     slopes = np.zeros((rows.size, 2))
     inside = slice(0, contact[0].size)
     if contact[0].size:
         ray_slope = table.ray_slope[contact].mean(axis=0).astype(np.float64)
-        away = place[inside] - press.seen_centre_mm(ray_slope)
+        away = position[inside] - press.seen_centre_mm(ray_slope)
         below = np.sqrt(np.maximum(press.pose.radius_mm**2 - (away**2).sum(axis=1), 1e-6))
         slopes[inside] = -away / below[:, None]
     return BallSamples(
         change[rows, columns],
-        place.astype(np.float32),
+        position.astype(np.float32),
         slopes.astype(np.float32),
         np.full(rows.size, number, np.int16),
     )
@@ -136,11 +137,11 @@ def write_samples(samples: BallSamples, path: Path) -> None:
     InputError
         If the file cannot be written.
     """
-    arrays = {name: getattr(samples, name) for name in _FIELDS}
+    arrays = {key: getattr(samples, name) for key, name in zip(_KEYS, _FIELDS, strict=True)}
     write_atomically(path, lambda stream: np.savez(stream, **arrays))
 
 
 def read_samples(path: Path) -> BallSamples:
     """Read samples that :func:`write_samples` wrote."""
     with np.load(path, allow_pickle=False) as arrays:
-        return BallSamples(*(arrays[name] for name in _FIELDS))
+        return BallSamples(*(arrays[key] for key in _KEYS))

@@ -62,14 +62,14 @@ class WorkingGrid:
     @property
     def x_mm(self) -> NDArray[np.float64]:
         """Places of the columns."""
-        return self._places(self.shape[1], self.image.width)
+        return self._positions(self.shape[1], self.image.width)
 
     @property
     def y_mm(self) -> NDArray[np.float64]:
         """Places of the rows."""
-        return self._places(self.shape[0], self.image.height)
+        return self._positions(self.shape[0], self.image.height)
 
-    def _places(self, count: int, pixels: int) -> NDArray[np.float64]:
+    def _positions(self, count: int, pixels: int) -> NDArray[np.float64]:
         index = self.factor * np.arange(count) + 0.5 * (self.factor - 1)
         return np.asarray((index - 0.5 * (pixels - 1)) * self.mm_per_px)
 
@@ -90,7 +90,7 @@ class WorkingGrid:
     def on_nodes(self, circle: Circle) -> Circle:
         """Return a circle in camera pixels as one in nodes."""
         shift = 0.5 * (self.factor - 1)
-        x, y = ((place - shift) / self.factor for place in (circle.x, circle.y))
+        x, y = ((centre - shift) / self.factor for centre in (circle.x, circle.y))
         return Circle(x, y, circle.radius / self.factor)
 
     def table(self) -> ResamplingTable:

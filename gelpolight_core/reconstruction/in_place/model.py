@@ -19,7 +19,7 @@ from gelpolight_core.reconstruction.in_place.grid import WorkingGrid
 from gelpolight_core.reconstruction.in_place.terms import (
     POWERS,
     evaluate_rows,
-    place_axes,
+    position_axes,
     row_coefficients,
 )
 from gelpolight_core.reconstruction.threads import RowWorkers
@@ -105,7 +105,7 @@ class InPlaceModel:
 
     @cached_property
     def _rows(self) -> Map:
-        return row_coefficients(self.coefficients, place_axes(*self.grid.shape)[1])
+        return row_coefficients(self.coefficients, position_axes(*self.grid.shape)[1])
 
     def extrapolated(self, change: Map, slope_x: Map, slope_y: Map) -> Mask:
         """Return where slope or colour is beyond what the balls have shown."""
@@ -137,7 +137,7 @@ def evaluate(
     rows : array, optional
         The polynomial of each row, where it is known already.
     """
-    x, y = place_axes(*change.shape[:2])
+    x, y = position_axes(*change.shape[:2])
     rows = row_coefficients(coefficients, y) if rows is None else rows
     slope_x = np.empty(change.shape[:2], np.float32)
     slope_y = np.empty_like(slope_x)
@@ -160,10 +160,10 @@ def colour_cells(change: Map) -> NDArray[np.int32]:
 
 @numba.njit(nogil=True, cache=True)
 def _cell(value, low, scale, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    place = (value - low) * scale
-    if not place > np.float32(0.0):  # also what is no number
+    position = (value - low) * scale
+    if not position > np.float32(0.0):  # also what is no number
         return 0
-    return min(int(min(place, np.float32(last))), last)
+    return min(int(min(position, np.float32(last))), last)
 
 
 @numba.njit(nogil=True, cache=True)

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 
 COLOUR_DEGREE = 3
-PLACE_DEGREE = 3
+POSITION_DEGREE = 3
 COLOUR_TERMS = tuple(
     sorted(
         (p for p in product(range(COLOUR_DEGREE + 1), repeat=3) if 0 < sum(p) <= COLOUR_DEGREE),
@@ -24,12 +24,14 @@ COLOUR_TERMS = tuple(
     )
 )
 """Powers of the three channels."""
-PLACE_TERMS = tuple((i, j) for i in range(PLACE_DEGREE + 1) for j in range(PLACE_DEGREE + 1 - i))
+POSITION_TERMS = tuple(
+    (i, j) for i in range(POSITION_DEGREE + 1) for j in range(POSITION_DEGREE + 1 - i)
+)
 """Powers of x and y, both -1..1 over the longer side."""
-TERMS = len(COLOUR_TERMS) * len(PLACE_TERMS)
+TERMS = len(COLOUR_TERMS) * len(POSITION_TERMS)
 
 
-def place_axes(rows: int, columns: int) -> tuple[Map, Map]:
+def position_axes(rows: int, columns: int) -> tuple[Map, Map]:
     """Return x of the columns and y of the rows, -1..1 over the longer side."""
     half = 0.5 * max(rows, columns)
     x = (np.arange(columns) - 0.5 * (columns - 1)) / half
@@ -48,10 +50,10 @@ def design_rows(change: Map, x: Map, y: Map) -> Map:
         Places, -1..1.
     """
     red, green, blue = (_powers(channel, COLOUR_DEGREE) for channel in change.T)
-    along, across = _powers(x, PLACE_DEGREE), _powers(y, PLACE_DEGREE)
+    along, across = _powers(x, POSITION_DEGREE), _powers(y, POSITION_DEGREE)
     colours = np.stack([red[i] * green[j] * blue[k] for i, j, k in COLOUR_TERMS], axis=1)
-    places = np.stack([along[i] * across[j] for i, j in PLACE_TERMS], axis=1)
-    return np.asarray((colours[:, :, None] * places[:, None, :]).reshape(len(x), -1), np.float32)
+    positions = np.stack([along[i] * across[j] for i, j in POSITION_TERMS], axis=1)
+    return np.asarray((colours[:, :, None] * positions[:, None, :]).reshape(len(x), -1), np.float32)
 
 
 def _powers(values: Map, most: int) -> list[Map]:
@@ -62,21 +64,23 @@ def _powers(values: Map, most: int) -> list[Map]:
     return found
 
 
-def penalty(*, place_growth: float, colour_growth: float) -> Array:
+def penalty(*, position_growth: float, colour_growth: float) -> Array:
     """Return how much the ridge costs each term (`TERMS`,), 1 for the simplest.
 
     Parameters
     ----------
-    place_growth, colour_growth : float
+    position_growth, colour_growth : float
         By how much it grows with each degree in place, and in colour beyond the first.
     """
     colour = np.array([sum(p) for p in COLOUR_TERMS], float)
-    place = np.array([i + j for i, j in PLACE_TERMS], float)
-    return np.asarray((colour_growth ** (colour[:, None] - 1.0) * place_growth**place).ravel())
+    position = np.array([i + j for i, j in POSITION_TERMS], float)
+    return np.asarray(
+        (colour_growth ** (colour[:, None] - 1.0) * position_growth**position).ravel()
+    )
 
 
 def row_coefficients(coefficients: Array, y: Map) -> Map:
-    """Return the polynomials in x of each row: (rows, 2, colour terms, `PLACE_DEGREE` + 1).
+    """Return the polynomials in x of each row: (rows, 2, colour terms, `POSITION_DEGREE` + 1).
 
     Parameters
     ----------
@@ -85,9 +89,9 @@ def row_coefficients(coefficients: Array, y: Map) -> Map:
     y : (rows,)
         Places of the rows, -1..1.
     """
-    by_term = coefficients.reshape(len(COLOUR_TERMS), len(PLACE_TERMS), 2)
-    rows = np.zeros((len(y), 2, len(COLOUR_TERMS), PLACE_DEGREE + 1))
-    for index, (i, j) in enumerate(PLACE_TERMS):
+    by_term = coefficients.reshape(len(COLOUR_TERMS), len(POSITION_TERMS), 2)
+    rows = np.zeros((len(y), 2, len(COLOUR_TERMS), POSITION_DEGREE + 1))
+    for index, (i, j) in enumerate(POSITION_TERMS):
         rows[..., i] += y.astype(np.float64)[:, None, None] ** j * by_term[:, index].T[None]
     return np.ascontiguousarray(rows, np.float32)
 

@@ -208,13 +208,13 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
     camera, table = calibration.camera, calibration.table
     grid = table.grid
     block = max(round(BLOCK_MM / grid.pitch_mm), 1)
-    places = _points(calibration)
+    positions = _points(calibration)
     u, v = (
         np.arange(n, dtype=np.float32) / np.float32(STRIDE) for n in (camera.width, camera.height)
     )
     map_u, map_v = np.meshgrid(u, v)
     points: Map = np.asarray(
-        cv2.remap(places.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR), np.float32
+        cv2.remap(positions.astype(np.float32), map_u, map_v, cv2.INTER_LINEAR), np.float32
     )
     origin = np.array([grid.x_mm[0], grid.y_mm[0]])
     index = ((points - origin) / grid.pitch_mm).astype(np.float32)

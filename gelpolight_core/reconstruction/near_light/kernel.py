@@ -71,10 +71,12 @@ def _least(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 def _curve(c, p, table, k):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return the diffuse share at a cosine, and its derivative."""
     if table is not None:
-        place = c * _single(table.shape[1] - 1)
-        below = min(int(place), table.shape[1] - 2)
+        position = c * _single(table.shape[1] - 1)
+        below = min(int(position), table.shape[1] - 2)
         rise = table[k, below + 1] - table[k, below]
-        return table[k, below] + (place - _single(below)) * rise, rise * _single(table.shape[1] - 1)
+        return table[k, below] + (position - _single(below)) * rise, rise * _single(
+            table.shape[1] - 1
+        )
     v = p[7]
     s = v
     v = v * c + p[6]
@@ -159,7 +161,7 @@ def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 
 
 @_part
-def _told(ratio, around, sigma, sat, scale, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _direct_light(ratio, around, sigma, sat, scale, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0)."""
     direct = ratio if bounce is None else ratio - bounce * around * _HALF * (_1 + nz)
     direct = direct * scale
@@ -252,27 +254,27 @@ def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cov
 
 @_part
 def _channels(w, j, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return what `_told` says of a node's three channels."""
+    """Return what `_direct_light` says of a node's three channels."""
     r0, r1, r2 = _triple(w, _RATIO, j)
     a0, a1, a2 = _triple(w, _AROUND, j)
     g0, g1, g2 = _triple(w, _NOISE, j)
     b0, b1, b2 = _triple(w, _MARKS, j)
     s0, s1, s2 = _triple(w, _SCALED, j)
     return (
-        _told(r0, a0, g0, b0, s0, dark[0], bounce, nz, shadows),
-        _told(r1, a1, g1, b1, s1, dark[1], bounce, nz, shadows),
-        _told(r2, a2, g2, b2, s2, dark[2], bounce, nz, shadows),
+        _direct_light(r0, a0, g0, b0, s0, dark[0], bounce, nz, shadows),
+        _direct_light(r1, a1, g1, b1, s1, dark[1], bounce, nz, shadows),
+        _direct_light(r2, a2, g2, b2, s2, dark[2], bounce, nz, shadows),
     )
 
 
 @_part
-def _begin_block(w, rays, place, leds, dark, curves, table, gloss, bounce, shadows, warm):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _begin_block(w, rays, position, leds, dark, curves, table, gloss, bounce, shadows, warm):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Find lights, view and a first normal of a block's nodes.
 
     Started `warm`, the stored normals are used where all three lights count.
     """
     flat = (_0, _0, -_1)
-    y, x_first, pitch = place
+    y, x_first, pitch = position
     for j in range(_B):
         d, at = w[_DEPTH * _B + j], _single(j)
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
@@ -418,15 +420,15 @@ def _ramp(rays, k, y, x, last, share):  # type: ignore[no-untyped-def]  # pragma
 
 
 @_part
-def ray_ramps(scale, row, place, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def ray_ramps(scale, row, position, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return ray slope and its derivatives along a block of nodes: value and step of each.
 
-    Over a block they are straight lines within 1e-4. `row` and `place` are the first node's.
+    Over a block they are straight lines within 1e-4. `row` and `position` are the first node's.
     """
     rays, step = scale.rays, scale.ray_step
     y = (row + 0.5) * step - 0.5
-    x = (place + 0.5) * step - 0.5
-    last = (place + count - 0.5) * step - 0.5
+    x = (position + 0.5) * step - 0.5
+    last = (position + count - 0.5) * step - 0.5
     share = _1 / _single(max(count - 1, 1))
     a, a1 = _ramp(rays, 0, y, x, last, share)
     b, b1 = _ramp(rays, 1, y, x, last, share)
@@ -440,7 +442,7 @@ def ray_ramps(scale, row, place, count):  # type: ignore[no-untyped-def]  # prag
 @_part
 def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Copy a block of row `i` into the work array."""
-    row, place = i + corner[0], begin + corner[1]
+    row, position = i + corner[0], begin + corner[1]
     # Plain indices: a view of a row is counted, and threads would wait for the counter.
     ratio, noise, around, marks = image.ratio, image.noise, image.around, image.marks
     flat, kind = scale.flat, scale.kind
@@ -451,7 +453,7 @@ def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # typ
         for j in range(count):
             w[(_NOISE + k) * _B + j] = noise[k, i, begin + j]
         for j in range(count):
-            w[(_SCALE + k) * _B + j] = flat[k, row, place + j]
+            w[(_SCALE + k) * _B + j] = flat[k, row, position + j]
         if from_around:
             for j in range(count):
                 w[(_AROUND + k) * _B + j] = around[k, i, begin + j]
@@ -463,7 +465,7 @@ def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # typ
         w[(_MARKS + 1) * _B + j] = _single((bits >> 1) & 1)
         w[(_MARKS + 2) * _B + j] = _single((bits >> 2) & 1)
         w[(_MARKS + 3) * _B + j] = _single((bits >> 3) & 1)
-        w[_KIND * _B + j] = _single(kind[row, place + j])
+        w[_KIND * _B + j] = _single(kind[row, position + j])
     if warm:
         for j in range(count):
             w[_NORMAL * _B + j] = slopes.normal_x[i, begin + j]
@@ -505,10 +507,10 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
         y = _single(scale.y_mm + scale.pitch_mm * (i + corner[0]))
         for begin in range(0, columns, _B):
             count = min(_B, columns - begin)
-            place = corner[1] + begin
+            position = corner[1] + begin
             _load(w, image, depth, scale, corner, slopes, warm, i, begin, count)
-            at = (y, _single(scale.x_mm + scale.pitch_mm * place), pitch)
-            rays = ray_ramps(scale, i + corner[0], place, count)
+            at = (y, _single(scale.x_mm + scale.pitch_mm * position), pitch)
+            rays = ray_ramps(scale, i + corner[0], position, count)
             _begin_block(w, rays, at, leds, dark, curves, table, gloss, bounce, shadows, begun)
             for _ in range(most):
                 if _step_block(w, dark, curves, table, gloss, bounce, shadows) < settled:

@@ -106,12 +106,12 @@ class SensorMaps:
         grid = self.calibration.table.grid
         kind = kinds(self.usable, self.inside, factor)
         x, y = (middles(axis, factor) for axis in (grid.x_mm, grid.y_mm))
-        place = (factor, float(x[0]), float(y[0]), grid.pitch_mm * factor)
+        position = (factor, float(x[0]), float(y[0]), grid.pitch_mm * factor)
         if factor < COARSE:
             # The flat membrane's brightness and the rays change little from node to node.
             coarse = self.scale(COARSE)
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
-            return Scale(*place, flat, kind, coarse.rays, factor / COARSE)
+            return Scale(*position, flat, kind, coarse.rays, factor / COARSE)
         ray_slope = np.moveaxis(block_average(self.calibration.table.ray_slope, factor), -1, 0)
         return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor)
 
@@ -144,9 +144,9 @@ def sensor_scale(
     whole = _whole(np.asarray(ray_slope, np.float64), x, y)
     rays = np.empty((6, y.size, x.size), np.float32)
     rays[:2] = whole
-    for place, axis in ((2, 1), (4, 0)):
+    for position, axis in ((2, 1), (4, 0)):
         for k in range(2):
-            rays[place + k] = np.gradient(whole[k], pitch, axis=axis)
+            rays[position + k] = np.gradient(whole[k], pitch, axis=axis)
     flat = _flat_brightness(full, x, y, whole)
     return Scale(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0)
 

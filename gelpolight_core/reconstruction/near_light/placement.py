@@ -30,7 +30,7 @@ def _between(values, c, r, fc, fr):  # type: ignore[no-untyped-def]  # pragma: n
 
 @_whole
 def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    first, last, depth, scale, corner, true_positions, flags, hidden, placed, marks, place
+    first, last, depth, scale, corner, true_positions, flags, hidden, placed, marks, position
 ):
     """Find the ray that sees each true position, and the depth there.
 
@@ -47,7 +47,7 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         Flag of positions that no ray sees.
     placed, marks : (rows, columns)
         Depth and flags at the true positions, written.
-    place : (2, rows, columns)
+    position : (2, rows, columns)
         Column and row of the ray that sees each position, written.
     """
     rows, columns = depth.shape
@@ -91,7 +91,7 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
                 placed[i, j] = d
                 near = flags[min(int(y + _HALF), rows - 1), min(int(x + _HALF), columns - 1)]
                 marks[i, j] = near | (hidden if missed > FOLDED else 0)
-                place[0, i, j], place[1, i, j] = x, y
+                position[0, i, j], position[1, i, j] = x, y
 
 
 @_whole
@@ -124,7 +124,7 @@ def show_depth(first, last, placed, placed_flags, factor, corner, outside, depth
 
 
 @_whole
-def show_normals(first, last, normal_x, normal_y, place, factor, corner, normals):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def show_normals(first, last, normal_x, normal_y, position, factor, corner, normals):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Bring normals to their true positions on rows of the whole grid."""
     rows, columns = normal_x.shape
     share = _1 / _single(factor)
@@ -134,8 +134,8 @@ def show_normals(first, last, normal_x, normal_y, place, factor, corner, normals
         for j in range(columns * factor):
             x = min(max((_single(j) + _HALF) * share - _HALF, _0), _single(columns - 1))
             n = min(int(x), columns - 2)
-            u = _between(place[0], n, m, x - _single(n), y - _single(m))[0]
-            v = _between(place[1], n, m, x - _single(n), y - _single(m))[0]
+            u = _between(position[0], n, m, x - _single(n), y - _single(m))[0]
+            v = _between(position[1], n, m, x - _single(n), y - _single(m))[0]
             c, r = min(int(u), columns - 2), min(int(v), rows - 2)
             nx = _between(normal_x, c, r, u - _single(c), v - _single(r))[0]
             ny = _between(normal_y, c, r, u - _single(c), v - _single(r))[0]

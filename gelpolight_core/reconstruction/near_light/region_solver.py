@@ -69,7 +69,7 @@ class Solved(NamedTuple):
         Of the integration.
     boundary : Boundary
         Where depth 0 is held.
-    place : (2, rows, columns) float32
+    position : (2, rows, columns) float32
         Room for column and row of the ray that sees each true position.
     integration_rounds : int
         Of the last integration.
@@ -84,7 +84,7 @@ class Solved(NamedTuple):
     weight: Map
     hold: Map | None
     boundary: Boundary
-    place: Map
+    position: Map
     integration_rounds: int
 
 

@@ -449,7 +449,7 @@ class NearLightSolver:
         normals: Map | None,
     ) -> None:
         """Bring a region to true positions, and to the scale of the whole grid."""
-        scale, slopes, place = solved.scale, solved.slopes, solved.place
+        scale, slopes, position = solved.scale, solved.slopes, solved.position
         corner, shape = solved.region.at(COARSE // scale.factor)
         placed, marks = self._take("placed", shape), self._take("marks", shape, np.uint8)
         self.workers.run(
@@ -463,14 +463,14 @@ class NearLightSolver:
             int(Flag.NOT_OBSERVABLE),
             placed,
             marks,
-            place,
+            position,
         )
         at, whole = solved.region.at(COARSE)
         outside, factor = int(Flag.OUTSIDE), scale.factor
         self.workers.run(whole[0], show_depth, placed, marks, factor, at, outside, depth, flags)
         if normals is not None:
             x, y = slopes.normal_x, slopes.normal_y
-            self.workers.run(whole[0], show_normals, x, y, place, factor, at, normals)
+            self.workers.run(whole[0], show_normals, x, y, position, factor, at, normals)
 
 
 def _nothing_pressed(record: TraceRecorder) -> None:

@@ -151,11 +151,11 @@ def depth_noise(
     # Bringing normals to true positions averages them once more.
     slope_sd = np.sqrt((moves.moved**2).sum(axis=0)) * share_placed / share
     slope_model_sd = np.sqrt(((moves.moved * times) ** 2).sum(axis=0))
-    result.slope_sd[here] = _at(slope_sd, answer.place)
-    result.slope_model_sd[here] = _at(slope_model_sd, answer.place)
+    result.slope_sd[here] = _at(slope_sd, answer.position)
+    result.slope_model_sd[here] = _at(slope_model_sd, answer.position)
     result.depth_sd_mm[here] = _root_mean_square(placed, (rows, columns))
     model_sd = _root_mean_square(placed_model, (rows, columns))
-    one_sided = answer.boundary.depth_sd * np.abs(_at(answer.depth_mm, answer.place))
+    one_sided = answer.boundary.depth_sd * np.abs(_at(answer.depth_mm, answer.position))
     level_sd = np.hypot(one_sided, answer.boundary.level_sd_mm)
     if light_sd is not None:
         shares = light_sd.astype(np.float32)[:, None, None]
@@ -201,9 +201,9 @@ def _noise_of_ratio(first, last, ratio, base, mix, unmix, table, share, sd):  # 
                 seen = np.float32(0.0)
                 for c in range(3):
                     seen += mix[k, c] * ratio[c, i, j] * base[i, j, c]
-                place = min(max(seen, np.float32(0.0)), np.float32(1.0)) * np.float32(top)
-                n = min(int(place), top - 1)
-                rest = place - np.float32(n)
+                position = min(max(seen, np.float32(0.0)), np.float32(1.0)) * np.float32(top)
+                n = min(int(position), top - 1)
+                rest = position - np.float32(n)
                 variance[k] = table[k, n] + rest * (table[k, n + 1] - table[k, n])
             for k in range(3):
                 own = np.float32(0.0)
@@ -394,17 +394,19 @@ def place_examples(examples_mm: Map, answer: Solved, coarse: Scale) -> Map:
     # A ray's point slides along the surface as it goes deeper: D(P0 + d w) = d.
     stretch = np.abs((down - normal_x * ray_x - normal_y * ray_y) / down)
     first = np.float32(0.5 * (COARSE - 1))
-    at = np.stack([(block_average(p, COARSE) - first) / np.float32(COARSE) for p in answer.place])
+    at = np.stack(
+        [(block_average(p, COARSE) - first) / np.float32(COARSE) for p in answer.position]
+    )
     return np.stack([_at(e * stretch, at) for e in examples_mm])
 
 
-def _at(values: Map, place: Map) -> Map:
+def _at(values: Map, position: Map) -> Map:
     """Return values of the rays at true positions."""
     return np.asarray(
         cv2.remap(
             np.asarray(values, np.float32),
-            place[0],
-            place[1],
+            position[0],
+            position[1],
             cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_REPLICATE,
         )

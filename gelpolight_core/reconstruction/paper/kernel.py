@@ -136,16 +136,16 @@ def _resample(pixel, raw, pairs, right, below, words, w):  # type: ignore[no-unt
 
 
 @_part
-def _limited(place, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _limited(position, last):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a place within the table, whether it was no number or below, and whether beyond."""
-    bad = not (place >= _0)
-    place = _0 if bad else place
-    far = place > last
-    return last if far else place, bad, far
+    bad = not (position >= _0)
+    position = _0 if bad else position
+    far = position > last
+    return last if far else position, bad, far
 
 
 @_part
-def _places(i, block, static, scale, size, w, entry):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _positions(i, block, static, scale, size, w, entry):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Divide by light and factor (Eq. 7), and find the place in each channel's table."""
     last, top = _single(size - 1), _int(size - 2)
     one, two = _int(size), _int(2 * size)
@@ -284,7 +284,7 @@ def solve_row(i, image, sensor, work, slope_x, slope_y, flags, length_error):  #
         if lit[i, block]:
             _pixels(i, block, static, width, height, w, pixel)
             _resample(pixel, raw, pairs, right, below, words, w)
-            _places(i, block, static, scale, entries, w, entry)
+            _positions(i, block, static, scale, entries, w, entry)
             _look_up(entry, table, found)
             x = _single(x_first + pitch * begin)
             step, y = _single(pitch), y_mm[i]

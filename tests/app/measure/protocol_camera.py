@@ -18,14 +18,14 @@ WALL_MM = 0.25
 
 
 def image(
-    calibration: Calibration, place_mm: tuple[float, float] | None, size_mm: float = 5.0
+    calibration: Calibration, position_mm: tuple[float, float] | None, size_mm: float = 5.0
 ) -> NDArray[np.float64]:
     """Return the camera image (240, 320, 3), 0..1, of a round press 0.5 mm high, or of none."""
 
     def slopes(points: NDArray[np.float64]) -> NDArray[np.float64]:
-        if place_mm is None:
+        if position_mm is None:
             return np.zeros_like(points)
-        away = points - np.array(place_mm)
+        away = points - np.array(position_mm)
         radius = np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-9)
         fall = 0.25 / WALL_MM / np.cosh((radius - 0.5 * size_mm) / WALL_MM) ** 2
         return np.asarray(-fall * away / radius)
@@ -45,9 +45,9 @@ class SceneCamera:
         self._number = 0
         self.shaking = self.cropped = False
 
-    def press(self, place_mm: tuple[float, float] | None) -> None:
+    def press(self, position_mm: tuple[float, float] | None) -> None:
         """Press at a point from the next frame on. None: lift."""
-        light = image(self._calibration, place_mm)
+        light = image(self._calibration, position_mm)
         with self._lock:
             self._light = light
 

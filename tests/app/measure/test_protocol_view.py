@@ -32,8 +32,8 @@ from gelpolight_core.records.entry import MeasurementRecord
 WAIT_MS = 60_000
 
 
-def frame(place_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
-    light = image(scene.calibration(), place_mm)
+def frame(position_mm: tuple[float, float] | None, seed: int) -> np.ndarray:
+    light = image(scene.calibration(), position_mm)
     noise = np.random.default_rng(seed).standard_normal(light.shape)
     return np.clip(np.rint(255.0 * light + noise), 0, 255).astype(np.uint8)
 
@@ -47,7 +47,7 @@ def test_the_mark_is_where_the_camera_will_see_the_object(shape: str) -> None:
     back, _ = camera_to_membrane(
         calibration.camera.directions(seen), calibration.plane, calibration.stack
     )
-    away = np.linalg.norm(back - np.array(press.place_mm), axis=1)
+    away = np.linalg.norm(back - np.array(press.position_mm), axis=1)
     assert away[-1] == pytest.approx(0.0, abs=1e-6)
     assert away[:-1].min() == pytest.approx(2.0, abs=1e-3)
     widest = 2.0 if shape == "cylinder" else 2.0 * np.sqrt(2.0)
@@ -59,13 +59,13 @@ def test_the_live_image_is_followed_from_lifting_to_holding() -> None:
     press = PressWanted(Truth("cylinder", 5.0, 0.5), (2.0, 1.0), 0.0, "r01", 1)
     target = make_target(press, ImageMap(scene.calibration()))
     check = PressCheck(target, frame(None, 0))
-    assert check(frame(press.place_mm, 1)).sentence == "Lift everything off the sensor."
+    assert check(frame(press.position_mm, 1)).sentence == "Lift everything off the sensor."
     assert check.phase == "lift"
     assert check(frame(None, 2)).sentence.startswith("Press the object in at the mark")
     beside = (2.0 + 2 * TOLERANCE_MM, 1.0)
     assert "mm from the mark" in check(frame(beside, 3)).sentence
     assert check.phase == "press"
-    held = check(frame(press.place_mm, 4))
+    held = check(frame(press.position_mm, 4))
     assert held.held and check.phase == "hold"
     assert not check(np.zeros((12, 16, 3), np.uint8)).held
 
@@ -79,7 +79,7 @@ def test_the_bench_presses_once_about_where_it_should() -> None:
     assert (scene_.item, scene_.size_mm) == ("cuboid", press.truth.size_mm)
     assert scene_.depth_mm == press.truth.height_mm
     # Four standard deviations of the hand in each direction.
-    assert np.hypot(*np.subtract((scene_.x_mm, scene_.y_mm), press.place_mm)) < 0.6
+    assert np.hypot(*np.subtract((scene_.x_mm, scene_.y_mm), press.position_mm)) < 0.6
     bench.arrange(x_mm=0.0)
     hand.press(press)
     assert bench.scene.x_mm == 0.0
@@ -147,7 +147,7 @@ def press_next(view: ProtocolView, camera: SceneCamera, qtbot: QtBot) -> None:
     wait_until_asked(view, qtbot)
     run = view.work.run
     before, wanted = run.progress.done, run.next()
-    camera.press(wanted.place_mm)
+    camera.press(wanted.position_mm)
     qtbot.waitUntil(lambda: run.progress.done == before + 1, timeout=WAIT_MS)
     camera.press(None)
 
@@ -237,7 +237,7 @@ def test_an_unsteady_press_is_refused_with_its_reason_and_requested_again(
     run, panel = view.work.run, view.pressing.panel
     wait_until_asked(view, qtbot)
     camera.shaking = True
-    camera.press(run.next().place_mm)
+    camera.press(run.next().position_mm)
     qtbot.waitUntil(lambda: panel.live.text() == "Hold it still.", timeout=WAIT_MS)
     panel.capture.click()
     qtbot.waitUntil(lambda: run.progress.refused == 1, timeout=WAIT_MS)

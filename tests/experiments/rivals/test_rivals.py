@@ -62,7 +62,7 @@ def errors() -> dict[tuple[str, str], float]:
         seen, others = (balls(n, n, near=light == "near") for n in (40, 5))
         size = np.median(np.hypot(*others.slopes.T))
         for name, fit in FITS.items():
-            away = np.hypot(*(fit(seen)(others.change, others.place_mm) - others.slopes).T)
+            away = np.hypot(*(fit(seen)(others.change, others.position_mm) - others.slopes).T)
             found[light, name] = float(np.median(away) / size)
     return found
 
@@ -96,18 +96,18 @@ def cubic(change: np.ndarray, place: np.ndarray) -> np.ndarray:
 def test_the_polynomial_finds_a_polynomial_and_does_not_run_away_outside() -> None:
     samples, others = exact(cubic), exact(cubic, seed=1)
     predict = fit_polynomial(samples)
-    assert np.abs(predict(others.change, others.place_mm) - others.slopes).max() < 1e-3
-    far = predict(100.0 * others.change, others.place_mm)
+    assert np.abs(predict(others.change, others.position_mm) - others.slopes).max() < 1e-3
+    far = predict(100.0 * others.change, others.position_mm)
     assert np.abs(far).max() < 10.0
 
 
 def test_the_network_learns_a_smooth_function_and_repeats_itself() -> None:
     samples, others = exact(cubic, count=12_000), exact(cubic, seed=1)
     predict = fit_network(samples, steps=1200)
-    found = predict(others.change, others.place_mm)
+    found = predict(others.change, others.position_mm)
     spread = others.slopes.std()
     assert np.sqrt(np.mean((found - others.slopes) ** 2)) < 0.12 * spread
-    one, two = (fit_network(samples, steps=20)(others.change, others.place_mm) for _ in (0, 1))
+    one, two = (fit_network(samples, steps=20)(others.change, others.position_mm) for _ in (0, 1))
     assert np.array_equal(one, two)
 
 

@@ -186,4 +186,4 @@ def test_cameras_are_identified_by_their_identity_not_their_number(
     assert device.name == "UVC Camera"
     monkeypatch.setattr(opencv, "LINUX", False)
     (device,) = OpenCvDriver(interface=cv2.CAP_DSHOW).devices()
-    assert device.place == "3"
+    assert device.address == "3"

@@ -26,7 +26,7 @@ SMALLEST_GROUND = 0.8
 """Share of the object's surroundings that must be usable for the drape to be seen."""
 
 
-def find_doubt(
+def describe_fit_problems(
     shape: str,
     fit: FitResult,
     window: WindowData,
