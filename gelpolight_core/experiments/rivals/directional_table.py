@@ -41,7 +41,7 @@ def fit_table(samples: BallSamples) -> Predict:
     nearest = distance_transform_edt(count == 0, return_distances=False, return_indices=True)
     table = mean[tuple(nearest)].astype(np.float32)
 
-    def predict(change: Map, _place_mm: Map) -> Map:
+    def predict(change: Map, _position_mm: Map) -> Map:
         found = _bins(change, low, step)
         return np.asarray(table[found[:, 0], found[:, 1], found[:, 2]], np.float32)
 
