@@ -41,7 +41,7 @@ class StabilityReport:
                 r.case.subject,
                 r.outcome.value,
                 "" if r.seen is None or r.seen.error_um is None else f"{r.seen.error_um:.3g}",
-                r.said,
+                r.summary,
             )
             for r in result
         ]

@@ -75,13 +75,13 @@ def ablation_markdown(ablations: Sequence[Ablation]) -> str:
     parts = []
     for ablation in ablations:
         first = ablation.results[0]
-        said = tr(
+        summary = tr(
             "{n} presses; with all terms on, a frame takes {ms:.0f} ms of the processor, "
             "the joint refinement {s:.1f} s."
         )
         parts += [
             f"### {ablation.sensor}",
-            said.format(n=first.score.count, ms=first.frame_ms, s=first.calibration_s),
+            summary.format(n=first.score.count, ms=first.frame_ms, s=first.calibration_s),
             "\n".join(
                 [
                     "| left out | what is done instead | height % | size % | RMS um | worst RMS um "

@@ -84,22 +84,23 @@ def _same(maps: list[HeightMap]) -> bool:
     )
 
 
-def _said(same: bool, maps: list[HeightMap]) -> Seen:
+def _compared(same: bool, maps: list[HeightMap]) -> Seen:
     away = max(float(np.abs(m.depth_mm - maps[0].depth_mm).max()) for m in maps)
-    said = tr("bit for bit the same") if same else tr("up to {d:.2g} um apart").format(d=1e3 * away)
-    return Seen(same, said)
+    if same:
+        return Seen(True, tr("bit for bit the same"))
+    return Seen(False, tr("up to {d:.2g} um apart").format(d=1e3 * away))
 
 
 def _runs(model: str) -> Seen:
     reconstruct = Reconstructor(standard_sensor().calibration, model=model)
     maps = [reconstruct.depth(standard_press().frame) for _ in range(RUNS)]
-    return _said(_same(maps), maps)
+    return _compared(_same(maps), maps)
 
 
 def _threads(model: str) -> Seen:
     calibration, frame = standard_sensor().calibration, standard_press().frame
     maps = [Reconstructor(calibration, model=model, workers=n).depth(frame) for n in THREADS]
-    return _said(_same(maps), maps)
+    return _compared(_same(maps), maps)
 
 
 def _precision(rows: int, columns: int) -> Seen:
@@ -113,8 +114,8 @@ def _precision(rows: int, columns: int) -> Seen:
         )
 
     away = 1e3 * float(np.abs(solved(np.float32) - solved(np.float64)).max())
-    said = tr("at most {d:.2g} um of 1 mm apart").format(d=away)
-    return Seen(away < SINGLE_UM, said, error_um=away, bound_um=SINGLE_UM)
+    summary = tr("at most {d:.2g} um of 1 mm apart").format(d=away)
+    return Seen(away < SINGLE_UM, summary, error_um=away, bound_um=SINGLE_UM)
 
 
 def _paper_precision() -> Seen:
@@ -125,5 +126,5 @@ def _paper_precision() -> Seen:
     slopes = plain_slopes(frame, calibration)
     plain = plain_depth(*slopes, table.grid.pitch_mm)
     apart = rms_um((fused - plain)[table.valid].astype(np.float64))
-    said = tr("{e:.2g} um RMS apart, stencils of order 4 and 2 included").format(e=apart)
-    return Seen(apart < 1.0, said, error_um=apart, bound_um=1.0)
+    summary = tr("{e:.2g} um RMS apart, stencils of order 4 and 2 included").format(e=apart)
+    return Seen(apart < 1.0, summary, error_um=apart, bound_um=1.0)

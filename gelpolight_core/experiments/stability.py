@@ -41,7 +41,7 @@ class ModeSeen:
         As in :class:`Seen`; None where nothing was measured.
     warning : str
         What the result says of itself where it is not to be trusted; empty where it trusts itself.
-    said : str
+    summary : str
         What happened, in a few words.
     """
 
@@ -49,7 +49,7 @@ class ModeSeen:
     error_um: float | None
     bound_um: float | None
     warning: str = ""
-    said: str = ""
+    summary: str = ""
 
     @property
     def outcome(self) -> Outcome:
@@ -69,7 +69,7 @@ class Seen:
     ----------
     right : bool
         Whether all that the case requires holds.
-    said : str
+    summary : str
         One sentence of what happened, without its full stop.
     finite : bool
         Whether every number of the result is finite.
@@ -89,7 +89,7 @@ class Seen:
     """
 
     right: bool
-    said: str
+    summary: str
     finite: bool = True
     error_um: float | None = None
     bound_um: float | None = None
@@ -139,7 +139,7 @@ class CaseResult:
         What was done.
     outcome : Outcome
         How it ended.
-    said : str
+    summary : str
         One sentence for a person, without its full stop.
     seen : Seen or None
         None where the case was refused or broke off.
@@ -151,7 +151,7 @@ class CaseResult:
 
     case: Case
     outcome: Outcome
-    said: str
+    summary: str
     seen: Seen | None
     seconds: float
     memory_mb: float | None = None
@@ -163,13 +163,13 @@ def run_case(case: Case) -> CaseResult:
     if case.memory:
         tracemalloc.start()
     try:
-        outcome, said, seen = _outcome(case)
+        outcome, summary, seen = _outcome(case)
         seconds = time.perf_counter() - begin
         memory = tracemalloc.get_traced_memory()[1] / 1e6 if case.memory else None
     finally:
         if case.memory:
             tracemalloc.stop()
-    return CaseResult(case, outcome, said, seen, seconds, memory)
+    return CaseResult(case, outcome, summary, seen, seconds, memory)
 
 
 def _outcome(case: Case) -> tuple[Outcome, str, Seen | None]:
@@ -180,20 +180,21 @@ def _outcome(case: Case) -> tuple[Outcome, str, Seen | None]:
     except Exception as error:  # a fault of the program is what the report is there to show
         return Outcome.FAILED, f"{type(error).__name__}: {error}", None
     if not seen.finite:
-        return Outcome.FAILED, tr("the result is not finite; {said}").format(said=seen.said), seen
+        text = tr("the result is not finite; {summary}")
+        return Outcome.FAILED, text.format(summary=seen.summary), seen
     wrong = [mode for mode in seen.modes if mode.outcome is not Outcome.PASSED]
     if seen.right and not wrong and (seen.modes or _within_bound(seen)):
-        return Outcome.PASSED, seen.said, seen
+        return Outcome.PASSED, seen.summary, seen
     if seen.warning:
-        return Outcome.REFUSED, f"{seen.said}; {seen.warning}", seen
+        return Outcome.REFUSED, f"{seen.summary}; {seen.warning}", seen
     failed = [mode.mode for mode in wrong if mode.outcome is Outcome.FAILED]
     if failed or not wrong or not seen.right:
-        said = seen.said
+        summary = seen.summary
         if failed:
-            said += "; " + tr("wrong without a note: {modes}").format(modes=", ".join(failed))
-        return Outcome.FAILED, said, seen
+            summary += "; " + tr("wrong without a note: {modes}").format(modes=", ".join(failed))
+        return Outcome.FAILED, summary, seen
     warnings = "; ".join(dict.fromkeys(m.warning for m in wrong))
-    return Outcome.REFUSED, f"{seen.said}; {warnings}", seen
+    return Outcome.REFUSED, f"{seen.summary}; {warnings}", seen
 
 
 def _within_bound(seen: Seen) -> bool:

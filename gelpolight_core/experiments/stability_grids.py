@@ -138,10 +138,10 @@ def _bump(rows: int, columns: int) -> Seen:
         return Seen(finite, tr("finite; too few nodes for a bump"), finite)
     error = rms_um(np.asarray(found - depth, np.float64).ravel())
     peak_um = 1e3 * float(depth.max())
-    said = tr("{e:.2g} um RMS on a bump of {h:.4g} um").format(e=error, h=peak_um)
+    summary = tr("{e:.2g} um RMS on a bump of {h:.4g} um").format(e=error, h=peak_um)
     # Across so few nodes a bump is no smooth one.
     share = RIGHT_SHARE if min(rows, columns) in range(2, LEAST_NODES) else FINE_SHARE
-    return Seen(True, said, finite, error, share * peak_um)
+    return Seen(True, summary, finite, error, share * peak_um)
 
 
 def _spoilt(value: float) -> Seen:
@@ -152,8 +152,8 @@ def _spoilt(value: float) -> Seen:
     result = integrate_slopes(slope_x, slope_y, pitch_mm=pitch)
     error = rms_um(np.asarray(result.depth_mm - depth, np.float64).ravel())
     counted = result.sanitised_count == np.count_nonzero(bad)
-    said = tr("{e:.2f} um RMS; {n} values counted").format(e=error, n=result.sanitised_count)
-    return Seen(bool(counted), said, bool(np.isfinite(result.depth_mm).all()), error, 3.0)
+    summary = tr("{e:.2f} um RMS; {n} values counted").format(e=error, n=result.sanitised_count)
+    return Seen(bool(counted), summary, bool(np.isfinite(result.depth_mm).all()), error, 3.0)
 
 
 def _one_steep() -> Seen:
@@ -162,18 +162,18 @@ def _one_steep() -> Seen:
     slope_x[120, 160] = 1e4
     result = integrate_slopes(slope_x, slope_y, pitch_mm=pitch)
     peak_px = float(np.abs(result.depth_mm).max()) / pitch
-    said = tr("a peak of {p:.1f} pixels; {n} value clipped").format(
+    summary = tr("a peak of {p:.1f} pixels; {n} value clipped").format(
         p=peak_px, n=result.clipped_count
     )
-    return Seen(peak_px < 5.0 and result.clipped_count == 1, said)
+    return Seen(peak_px < 5.0 and result.clipped_count == 1, summary)
 
 
 def _tiny(value: float) -> Seen:
     slope = np.full((64, 64), value, np.float32)
     depth = integrate_slopes(slope, slope, pitch_mm=0.1).depth_mm
     deepest = float(np.abs(depth).max())
-    said = tr("at most {d:.1g} mm").format(d=deepest)
-    return Seen(deepest < 1e-30, said, bool(np.isfinite(depth).all()))
+    summary = tr("at most {d:.1g} mm").format(d=deepest)
+    return Seen(deepest < 1e-30, summary, bool(np.isfinite(depth).all()))
 
 
 def _walled() -> tuple[Map, Map, Map, Map, float]:
@@ -195,14 +195,14 @@ def _tolerances() -> Seen:
     best = found[-1].depth_mm
     away = [1e3 * float(np.abs(f.depth_mm - best).max()) for f in found[:-1]]
     used = TOLERANCES.index(3e-4)
-    said = tr("at most {a} um from the strictest, {r} rounds").format(
+    summary = tr("at most {a} um from the strictest, {r} rounds").format(
         a=" / ".join(f"{x:.2f}" for x in away), r=" / ".join(str(f.rounds) for f in found)
     )
-    return Seen(away[used] < 2.0, said, rounds=found[used].rounds)
+    return Seen(away[used] < 2.0, summary, rounds=found[used].rounds)
 
 
 def _no_weights() -> Seen:
     _, slope_x, slope_y, weight, pitch = _walled()
     found = integrate_weighted(slope_x, slope_y, np.zeros_like(weight), pitch_mm=pitch)
-    said = tr("at most {d:.2g} mm").format(d=float(np.abs(found.depth_mm).max()))
-    return Seen(True, said, bool(np.isfinite(found.depth_mm).all()), rounds=found.rounds)
+    summary = tr("at most {d:.2g} mm").format(d=float(np.abs(found.depth_mm).max()))
+    return Seen(True, summary, bool(np.isfinite(found.depth_mm).all()), rounds=found.rounds)

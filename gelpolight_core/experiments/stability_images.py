@@ -178,12 +178,12 @@ def _not_of_this_sensor(frame: NDArray[Any]) -> Seen:
     best = found["full"]
     error = rms_um(depth_error(best, press.truth, radius_mm=12.0))
     silent = [model for model in MODELS if not warnings[model]]
-    said = tr("{e:.0f} um RMS").format(e=error)
+    summary = tr("{e:.0f} um RMS").format(e=error)
     if silent:
-        said += "; " + tr("no note by the model {names}").format(names=", ".join(silent))
+        summary += "; " + tr("no note by the model {names}").format(names=", ".join(silent))
     return Seen(
         right=False,
-        said=said,
+        summary=summary,
         finite=all(is_finite(h) for h in found.values()),
         error_um=error,
         flags=flag_shares(best),
@@ -237,8 +237,9 @@ def _as(make: Callable[[Map], NDArray[Any]]) -> Seen:
     seen = judged(known, press, BESIDE_UM, frame=frame)
     depths = [Reconstructor(known.calibration).depth(f).depth_mm for f in (frame, press.frame)]
     apart = rms_um((depths[0] - depths[1]).astype(np.float64))
-    said = tr("{said}; {d:.2f} um from the usual numbers").format(said=seen.said, d=apart)
-    return replace(seen, said=said, right=seen.right and apart < SAME_UM)
+    text = tr("{summary}; {d:.2f} um from the usual numbers")
+    summary = text.format(summary=seen.summary, d=apart)
+    return replace(seen, summary=summary, right=seen.right and apart < SAME_UM)
 
 
 def _contacts() -> list[Case]:
@@ -285,7 +286,7 @@ def _one_bright_pixel() -> Seen:
     pitch = found.pitch_mm
     return Seen(
         right=deepest < pitch,
-        said=tr("at most {d:.1f} um deep beside {p:.0f} um of a pixel").format(
+        summary=tr("at most {d:.1f} um deep beside {p:.0f} um of a pixel").format(
             d=1e3 * deepest, p=1e3 * pitch
         ),
         finite=is_finite(found),

@@ -77,7 +77,7 @@ def result_rows(results: Sequence[CaseResult]) -> list[dict[str, Any]]:
                 "rounds": None if seen is None else seen.rounds,
                 "seconds": round(result.seconds, 3),
                 "memory_mb": result.memory_mb,
-                "said": result.said,
+                "said": result.summary,
             }
         )
     return rows
@@ -138,7 +138,7 @@ def result_line(result: CaseResult) -> str:
     error = "" if seen is None or seen.error_um is None else f"{seen.error_um:.3g}"
     return (
         f"{result.outcome.value:<8} {result.case.name:<32}{error:>9} um{result.seconds:7.1f} s  "
-        f"{result.said}"
+        f"{result.summary}"
     )
 
 
@@ -224,17 +224,17 @@ def stability_page(
     sections = [_section(s, [r for r in results if r.case.subject == s]) for s in subjects]
     if found:
         drawing, listing = draw_tornado(found), _sensitivity_listing(found)
-        said = tr("What one standard uncertainty of each calibration parameter does to the depth")
+        text = tr("What one standard uncertainty of each calibration parameter does to the depth")
         sections.append(
             Section(
-                "sensitivity", tr("Sensitivity"), said, QualityTable(), (), (drawing,), (listing,)
+                "sensitivity", tr("Sensitivity"), text, QualityTable(), (), (drawing,), (listing,)
             )
         )
     if costs:
-        said = tr("What 1 % in each length of session.toml does to a measured cylinder")
+        text = tr("What 1 % in each length of session.toml does to a measured cylinder")
         listing = _length_listing(costs)
         sections.append(
-            Section("lengths", tr("Stated lengths"), said, QualityTable(), (), (), (listing,))
+            Section("lengths", tr("Stated lengths"), text, QualityTable(), (), (), (listing,))
         )
     return Page(tr("Stability"), summary_line(results), tuple(sections))
 
@@ -276,13 +276,13 @@ def _section(subject: str, results: Sequence[CaseResult]) -> Section:
 def _cells(result: CaseResult) -> tuple[str, ...]:
     seen = result.seen
     flags = "" if seen is None else _flag_text(dict(seen.flags))
-    said = (
-        result.said
+    summary = (
+        result.summary
         if not flags
-        else tr("{said}. Flagged: {flags}").format(said=result.said, flags=flags)
+        else tr("{summary}. Flagged: {flags}").format(summary=result.summary, flags=flags)
     )
     if result.memory_mb is not None:
-        said = tr("{said}; {m:.0f} MB").format(said=said, m=result.memory_mb)
+        summary = tr("{summary}; {m:.0f} MB").format(summary=summary, m=result.memory_mb)
     return (
         tr("{what} - required: {required}").format(
             what=result.case.label, required=result.case.required
@@ -292,7 +292,7 @@ def _cells(result: CaseResult) -> tuple[str, ...]:
         "" if seen is None else _number(seen.condition),
         "" if seen is None or seen.rounds is None else str(seen.rounds),
         f"{result.seconds:.1f}",
-        said,
+        summary,
     )
 
 

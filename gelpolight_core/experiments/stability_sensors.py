@@ -198,9 +198,10 @@ def _lens(design: SensorDesign) -> Seen:
     bound_um = max(RIGHT_UM, 30.0 * table.grid.pitch_mm)
     seen = judged(known, press, bound_um, radius_mm=7.0)
     worst = float(away_mm.max())
-    said = tr("{said}; there and back within {d:.2g} mm").format(said=seen.said, d=worst)
+    text = tr("{summary}; there and back within {d:.2g} mm")
+    summary = text.format(summary=seen.summary, d=worst)
     # Pixels are kept in single precision: some thousandths of a pixel.
-    return replace(seen, said=said, right=seen.right and worst < 0.02 * table.grid.pitch_mm)
+    return replace(seen, summary=summary, right=seen.right and worst < 0.02 * table.grid.pitch_mm)
 
 
 def _wall_cases() -> list[Case]:
@@ -249,7 +250,7 @@ def _cone(degrees: float) -> Seen:
 
 def _deep_cases() -> list[Case]:
     low = replace(matt_design(SCALE), leds=_ring(3.0, 3.0))
-    said = tr("right, or damped, stopped, and said so")
+    summary = tr("right, or damped, stopped, and said so")
     entries: list[tuple[str, str, Indenter, tuple[float, float], float]] = [
         ("depth_4_mm", tr("4 mm deep, LEDs at 13.7 mm"), Ball(6.0, 4.0), (1.2, -0.8), 40.0),
         ("depth_8_mm", tr("8 mm deep, LEDs at 13.7 mm"), Ball(8.0, 8.0), (1.2, -0.8), 80.0),
@@ -265,7 +266,7 @@ def _deep_cases() -> list[Case]:
         ("across_the_rim", tr("a ball across the rim"), BALL, (11.0, 0.0), RIGHT_UM),
     ]
     cases = [
-        Case(name, WALLS, label, said, partial(_in_standard, indenter, at_mm, bound))
+        Case(name, WALLS, label, summary, partial(_in_standard, indenter, at_mm, bound))
         for name, label, indenter, at_mm, bound in entries
     ]
     cases.append(
@@ -273,7 +274,7 @@ def _deep_cases() -> list[Case]:
             "among_the_leds",
             WALLS,
             tr("2 mm deep among LEDs at 3 mm"),
-            said,
+            summary,
             partial(_pressed, low, Ball(6.0, 2.0)),
         )
     )

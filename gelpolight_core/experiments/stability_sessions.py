@@ -252,11 +252,11 @@ def _measured(change: Change, scale: float = SCALE) -> Seen:
             ("paper", "best"),
         )
     )
-    said = "; ".join(f"{mode.mode}: {mode.said}" for mode in modes)
+    summary = "; ".join(f"{mode.mode}: {mode.summary}" for mode in modes)
     verdict = _verdict(run)
     return Seen(
         right=True,
-        said=said,
+        summary=summary,
         error_um=modes[0].error_um,
         bound_um=modes[0].bound_um,
         condition=_joint_condition(run),
@@ -280,12 +280,12 @@ def _mode_seen(
     height_sd, size_sd = size.sd["height_mm"], size.sd["diameter_mm"]
     height, width = size.height_mm - PRESS.depth_mm, size.size_mm - PRESS.size_mm
     worst = max(abs(height) / height_sd, abs(width) / size_sd)
-    said = tr("height {h:+.1f} ({hs:.1f}) um, size {w:+.0f} ({ws:.0f}) um").format(
+    summary = tr("height {h:+.1f} ({hs:.1f}) um, size {w:+.0f} ({ws:.0f}) um").format(
         h=1e3 * height, hs=1e3 * height_sd, w=1e3 * width, ws=1e3 * size_sd
     )
     # The worse of the two in units of its sd, as an error of the height.
     error_um = 1e3 * worst * height_sd
-    return ModeSeen(name, error_um, SIGMAS * 1e3 * height_sd, size.reason, said)
+    return ModeSeen(name, error_um, SIGMAS * 1e3 * height_sd, size.reason, summary)
 
 
 def _press_frame(run: CalibrationRun, folder: Path) -> NDArray[np.float32]:

@@ -178,14 +178,14 @@ def judged(
     )
     error = error_of(best)
     missing = [str(f.name) for f in needs for h in found.values() if not flagged(h, f).any()]
-    said = tr("{e:.1f} um RMS on a press of {h:.2f} mm").format(
+    summary = tr("{e:.1f} um RMS on a press of {h:.2f} mm").format(
         e=error, h=float(press.truth.depth_mm.max())
     )
     if missing:
-        said += "; " + tr("not flagged: {flags}").format(flags=", ".join(missing))
+        summary += "; " + tr("not flagged: {flags}").format(flags=", ".join(missing))
     return Seen(
         right=not missing,
-        said=said,
+        summary=summary,
         finite=all(is_finite(h) for h in maps.values()),
         error_um=error,
         bound_um=bound_um,

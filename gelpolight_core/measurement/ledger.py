@@ -85,8 +85,8 @@ class Ledger:
         self._known[key] = outcome
         if self._path is None:
             return
-        said = outcome if isinstance(outcome, str) else _as_json(outcome)
-        line = json.dumps({"key": key, "outcome": said}, separators=(",", ":")) + "\n"
+        plain = outcome if isinstance(outcome, str) else _as_json(outcome)
+        line = json.dumps({"key": key, "outcome": plain}, separators=(",", ":")) + "\n"
         append_durably(self._path, ("\n" + line if self._torn else line).encode())
         self._torn = False
 

@@ -437,14 +437,14 @@ def _refuse_other_model(calibration: AnyCalibration, model: str) -> None:
 def _notes(found: NearLightDepth) -> Notes:
     """Return what a person must know of a reconstruction, in sentences."""
     stopped = "" if found.rounds is None else found.rounds.stopped
-    said = {
+    note_of = {
         "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
         "unsettled": tr("the near-light rounds did not settle: damping did not help"),
         "grows": tr("the near-light rounds did not settle: the last was undone"),
     }
     notes = [] if found.boundary.free is None else [free_boundary_note()]
     notes += [unanchored_note()] if found.boundary.level_sd_mm > 0.0 else []
-    notes += [said[stopped]] if stopped in said else []
+    notes += [note_of[stopped]] if stopped in note_of else []
     sensor = visible_depth_note(found.visible_mm) if found.rounds is None else ""
     notes += [note for note in (unsolved_note(found.unsolved), sensor) if note]
     return tuple(notes)

@@ -254,7 +254,7 @@ def _sentence(evaluation: Evaluation) -> str:
     measured = count - len(evaluation.failed)
     if not measured:
         return tr("None of {n} presses could be measured").format(n=count)
-    said = [tr("{measured} of {n} presses were measured").format(measured=measured, n=count)]
+    summary = [tr("{measured} of {n} presses were measured").format(measured=measured, n=count)]
     texts = {
         "planar": tr(
             "mean absolute error in the planar direction {e:.2f} % (paper: about {p:.0f} %)"
@@ -266,8 +266,8 @@ def _sentence(evaluation: Evaluation) -> str:
     for direction, text in texts.items():
         error = evaluation.overall(direction).mean_absolute_percent
         if math.isfinite(error):
-            said.append(text.format(e=error, p=PAPER_PERCENT[direction]))
-    return "; ".join(said)
+            summary.append(text.format(e=error, p=PAPER_PERCENT[direction]))
+    return "; ".join(summary)
 
 
 def _percent(value: float, *, sign: bool = False) -> str:

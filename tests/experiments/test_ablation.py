@@ -95,17 +95,17 @@ def test_every_variant_leaves_out_one_thing_and_has_a_name_of_its_own() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "summary"),
     [
         (["--terms", "near_light_0,colour"], "colour"),
         (["nowhere"], "session.toml"),
     ],
 )
 def test_what_cannot_be_done_is_refused_before_the_work(
-    tmp_path: Path, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, arguments: list[str], summary: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["ablation", *arguments, "-o", str(tmp_path / "out")]) == MENDABLE
-    assert said in capsys.readouterr().err
+    assert summary in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

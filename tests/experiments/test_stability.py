@@ -56,8 +56,8 @@ QUICK = (
 )
 def test_an_extreme_case_is_right_or_refused(case: Case) -> None:
     result = run_case(case)
-    assert result.outcome is not Outcome.FAILED, result.said
-    assert result.said
+    assert result.outcome is not Outcome.FAILED, result.summary
+    assert result.summary
 
 
 def test_pixels_that_are_no_number_leave_the_rest_of_the_map_alone() -> None:
@@ -71,8 +71,8 @@ def test_pixels_that_are_no_number_leave_the_rest_of_the_map_alone() -> None:
 def test_the_papers_model_says_where_shadows_leave_its_assumptions() -> None:
     for name, says in (("wall_57_deg", False), ("cone_89_deg", True)):
         result = run_case(next(case for case in CASES if case.name == name))
-        assert result.outcome is not Outcome.FAILED, result.said
-        assert ("shadow of an LED" in result.said) is says
+        assert result.outcome is not Outcome.FAILED, result.summary
+        assert ("shadow of an LED" in result.summary) is says
 
 
 def test_names_are_one_each() -> None:
@@ -93,7 +93,7 @@ def test_a_crash_is_a_row_that_failed_and_the_next_case_runs() -> None:
 
     results = run_cases([_case(crash), _case(refuse)])
     assert [r.outcome for r in results] == [Outcome.FAILED, Outcome.REFUSED]
-    assert "by nothing" in results[0].said and "Straighten it" in results[1].said
+    assert "by nothing" in results[0].summary and "Straighten it" in results[1].summary
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_each_stated_length_is_stated_wrongly_alone(length, tmp_path: Path) -> N
 def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode() -> None:
     case = next(c for c in CASES if c.name == "session_scale_0.25")
     result = run_case(case)
-    assert result.outcome is not Outcome.FAILED, result.said
+    assert result.outcome is not Outcome.FAILED, result.summary
     assert result.seen is not None and len(result.seen.modes) == 4
     assert result.seen.condition is not None and result.seen.condition > 1.0
 

@@ -147,7 +147,7 @@ def test_the_command_goes_on_with_a_run_and_reports(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "summary"),
     [
         (["--sizes", "-1"], "sizes_mm holds -1"),
         (["--repeats", "0", "--regions", "0"], "nothing is to be pressed"),
@@ -155,10 +155,10 @@ def test_the_command_goes_on_with_a_run_and_reports(
     ],
 )
 def test_a_protocol_that_cannot_be_pressed_is_refused_before_anything_is_made(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], summary: str
 ) -> None:
     assert main(["protocol", str(tmp_path / "run"), *arguments]) == MENDABLE
-    assert said in capsys.readouterr().err
+    assert summary in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 
