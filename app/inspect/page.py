@@ -17,6 +17,7 @@ from app.inspect.actions import FileActions
 from app.inspect.modes import ModeChoice
 from app.inspect.processing_panel import ProcessedLine
 from app.inspect.record_control import RecordControl
+from app.inspect.stream import DepthStream
 from app.inspect.views import Views
 from app.live.advice import advise
 from app.live.banner import Banner
@@ -94,6 +95,7 @@ class InspectPage(QWidget):
             icon_name="zero", tip=tr("Use the current image as the zero reference (Ctrl+0)"),
         )  # fmt: skip
         self.recorder = RecordControl(self.depth, self, context=self.context)
+        self.stream = DepthStream(self.depth, self, context=self.context)
         self.file_actions = FileActions(
             self.depth, self.views, self.jobs, self, context=self.context
         )
@@ -135,6 +137,7 @@ class InspectPage(QWidget):
         self.depth.changed.connect(self._advise)
         self.modes.chosen.connect(self.depth.choose)
         self.context.requests.preferences_changed.connect(self._show_again)
+        self.stream.changed.connect(self._on_stream)
         self.recorder.reported.connect(self._on_recorded)
         self.jobs.refused.connect(lambda text: self.context.toasts.show(text, "warn"))
         self.banner.act_wanted.connect(self._on_act)
@@ -161,6 +164,7 @@ class InspectPage(QWidget):
     def may_close(self) -> bool:
         """Return True: closing loses nothing."""
         self.recorder.close()
+        self.stream.close()
         self.views.keep()
         self.jobs.close()
         self.modes.close()
@@ -175,6 +179,10 @@ class InspectPage(QWidget):
             return
         for info in image_folders([path])():
             self.context.source.choose(info)
+
+    def show_stream(self) -> None:
+        """Show what is sent to other programs."""
+        self.stream.show_dialog()
 
     def begin_demo(self) -> None:
         """Use the virtual sensor."""
@@ -194,7 +202,7 @@ class InspectPage(QWidget):
         self._want()
 
     def _want(self) -> None:
-        self.depth.want(replace(self.views.wanted(), still=self.live.paused))
+        self.depth.want(replace(self.views.wanted(), stream=self.stream.on, still=self.live.paused))
 
     def _show(self, shown: Shown) -> None:
         self._shown = shown
@@ -239,7 +247,8 @@ class InspectPage(QWidget):
     def _show_texts(self) -> None:
         self.modes.follow(self.depth.last)
         self.views.surface.refresh_pins()
-        self._rate.setText("    ".join(filter(None, (self._recorded, self.depth.rate_text()))))
+        texts = self._recorded, self.stream.text, self.depth.rate_text()
+        self._rate.setText("    ".join(filter(None, texts)))
         self._rate.setToolTip(plain_tip(self.depth.trace_text()))
         heightmap = None if self._shown is None else self._shown.heightmap
         text = tr("Point at a view to read the depth there.")
@@ -266,6 +275,10 @@ class InspectPage(QWidget):
 
     def _on_recorded(self, text: str) -> None:
         self._recorded = text
+        self._show_texts()
+
+    def _on_stream(self) -> None:
+        self._want()
         self._show_texts()
 
     def _advise(self) -> None:

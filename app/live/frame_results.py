@@ -66,6 +66,8 @@ class Wanted:
         The reference of the difference.
     processing : Processing
         What is done to the height map of a frozen image.
+    stream : bool
+        Whether depth and normals are sent to other programs.
     still : bool
         Whether the image is frozen. It is then processed at full detail, with the uncertainty if
         needed.
@@ -81,6 +83,7 @@ class Wanted:
     display: Display = field(default_factory=Display)
     reference: Reference | None = None
     processing: Processing = field(default_factory=Processing)
+    stream: bool = False
     still: bool = False
 
     @property
@@ -93,12 +96,12 @@ class Wanted:
     def needs_depth(self) -> bool:
         """Whether the frame must be reconstructed."""
         views = self.surface or self.height or bool(self.normals) or bool(self.quality)
-        return views or self.section is not None or self.region is not None
+        return views or self.stream or self.section is not None or self.region is not None
 
     @property
     def needs_normals(self) -> bool:
         """Whether the reconstruction must include the normals."""
-        return bool(self.normals) or self.quality == "misfit"
+        return bool(self.normals) or self.quality == "misfit" or self.stream
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -392,6 +392,10 @@ class MainWindow(QMainWindow):
         report = DesignReport(SensorDesign() if bench is None else bench.design)
         self._show_tool("design", lambda: ReportDialog(report, context=self.context, parent=self))
 
+    def show_stream(self) -> None:
+        """Show what is sent to other programs, on the Inspect page."""
+        self._with_page("inspect", lambda page: _call(page, "show_stream"))
+
     def _show_tool(self, name: str, make: Callable[[], QDialog]) -> None:
         """Show a dialog that keeps its results while the program runs."""
         if name not in self._tools:

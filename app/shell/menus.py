@@ -68,6 +68,12 @@ class Menus:
                 window, "tools.stability", tr("Numerical &stability…"), window.show_stability
             )
         )
+        if "inspect" in window.entries:
+            menu.addAction(
+                make_action(
+                    window, "tools.stream", tr("&Stream the live depth…"), window.show_stream
+                )
+            )
         menu.addAction(
             make_action(window, "tools.design", tr("&Design check…"), window.show_design)
         )

@@ -1,0 +1,202 @@
+"""Streams the live depth to other programs, and the dialog that starts and stops it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QPushButton,
+    QWidget,
+)
+
+from app.context.context import AppContext
+from app.live.depth import LiveDepth
+from app.live.frame_results import Shown
+from app.live.publisher import ANY_HOST, HOST, PORT, Publisher
+from app.widgets.inputs import ComboBox, SpinBox
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import show_meaning
+from app.widgets.naming import named
+from app.widgets.question import ask
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.live_message import pack
+from gelpolight_core.translation import tr
+
+WIDTH = 440
+
+
+class DepthStream(QObject):
+    """Sends depth, normals, flags and health of every new frame. Off at the start of the program.
+
+    Parameters
+    ----------
+    depth : LiveDepth
+        Computes the frames.
+    owner : QWidget
+        The page.
+    context : AppContext
+        Shared by all pages.
+
+    Signals
+    -------
+    changed()
+        It was started or stopped.
+    """
+
+    changed = Signal()
+
+    def __init__(self, depth: LiveDepth, owner: QWidget, *, context: AppContext) -> None:
+        super().__init__(owner)
+        self._depth, self._owner, self._context = depth, owner, context
+        self._publisher: Publisher | None = None
+        self._dialog: StreamDialog | None = None
+        self._network = False
+        self._sent = -1
+        self.count = 0
+        depth.shown.connect(self._send)
+        depth.live.switched.connect(self._on_switched)
+
+    @property
+    def on(self) -> bool:
+        """Whether frames are sent."""
+        return self._publisher is not None
+
+    @property
+    def address(self) -> str:
+        """Where other programs subscribe. Empty while nothing is sent."""
+        return "" if self._publisher is None else self._publisher.address
+
+    @property
+    def text(self) -> str:
+        """What is sent where, in a few words. Empty while nothing is sent."""
+        if not self.on:
+            return ""
+        if self._network:
+            return tr("streaming to the NETWORK: {address}").format(address=self.address)
+        return tr("streaming: {address}").format(address=self.address)
+
+    def show_dialog(self) -> None:
+        """Show the dialog."""
+        if self._dialog is None:
+            self._dialog = StreamDialog(self, self._owner)
+        self._dialog.refresh()
+        self._dialog.show()
+        self._dialog.raise_()
+
+    def start(self, port: int = PORT, *, network: bool = False) -> None:
+        """Send from now on: to this computer only, or with `network` to all that can reach it.
+
+        Raises
+        ------
+        InputError
+            If the address cannot be used, or pyzmq is not installed.
+        """
+        self.stop()
+        self._publisher = Publisher(ANY_HOST if network else HOST, port, network=network)
+        self._network, self._sent, self.count = network, -1, 0
+        self.changed.emit()
+
+    def stop(self) -> None:
+        """Send nothing more."""
+        publisher, self._publisher = self._publisher, None
+        if publisher is not None:
+            publisher.close()
+            self.changed.emit()
+
+    def close(self) -> None:
+        """Stop at the end of the program."""
+        self.stop()
+        if self._dialog is not None:
+            self._dialog.close()
+
+    def _on_switched(self) -> None:
+        self._sent = -1  # numbers of another stream start again
+
+    def _send(self, shown: Shown) -> None:
+        """Send a frame once, as reconstructed. A frozen image is computed many times."""
+        heightmap, frame = shown.raw, shown.frame
+        if self._publisher is None or heightmap is None or frame.number == self._sent:
+            return
+        if heightmap.normals is None:
+            return  # it was computed before the stream was started
+        used = self._depth.live_reconstructor
+        serial = "" if used is None else used.calibration.sensor.serial
+        parts = pack(heightmap, frame=frame.number, time_s=frame.time_s, serial=serial)
+        self._publisher.send(parts)
+        self._sent = frame.number
+        self.count += 1
+
+
+class StreamDialog(QDialog):
+    """Lets the user start and stop the stream. The network needs an explicit consent."""
+
+    def __init__(self, stream: DepthStream, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._stream = stream
+        named(self, "stream", tr("Stream the live depth"))
+        self.setWindowTitle(tr("Stream the live depth"))
+        self.setMinimumWidth(WIDTH)
+        about = PlainLabel(
+            tr(
+                "Depth, normals, flags and health of the live frames are sent over ZeroMQ while "
+                "the Inspect page is visible. The guide has a client of ten lines."
+            )
+        )
+        about.setWordWrap(True)
+        self.reach = named(ComboBox(), "stream.reach", tr("Receivers"))
+        self.reach.addItem(tr("Programs on this computer"), False)
+        self.reach.addItem(tr("Other computers of the network, too"), True)
+        self.port = named(SpinBox(), "stream.port", tr("Port"))
+        self.port.setRange(1024, 65535)
+        self.port.setValue(PORT)
+        self.state = named(PlainLabel(), "stream.state", tr("State of the stream"))
+        self.state.setWordWrap(True)
+        self.button = named(QPushButton(), "stream.start", tr("Start or stop the stream"))
+        self.button.clicked.connect(self._toggle)
+        close = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        close.addButton(self.button, QDialogButtonBox.ButtonRole.ActionRole)
+        close.rejected.connect(self.reject)
+        form = QFormLayout(self)
+        form.addRow(about)
+        form.addRow(tr("&Receivers"), self.reach)
+        form.addRow(tr("&Port"), self.port)
+        form.addRow(self.state)
+        form.addRow(close)
+        stream.changed.connect(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show whether it sends."""
+        on = self._stream.on
+        self.button.setText(tr("Stop") if on else tr("Start"))
+        for box in (self.reach, self.port):
+            box.setEnabled(not on)
+        self._say(self._stream.text or tr("Nothing is sent."), "pass" if on else "muted")
+
+    def _say(self, text: str, meaning: str) -> None:
+        self.state.setText(text)
+        show_meaning(self.state, meaning)
+
+    def _toggle(self) -> None:
+        if self._stream.on:
+            self._stream.stop()
+        elif self.reach.currentData():
+            ask(
+                self,
+                tr("Open to the network"),
+                tr(
+                    "Everybody on a network of this computer can then receive the depth, without a "
+                    "password and not encrypted. Nobody can change anything in this program."
+                ),
+                (tr("Stream to the network"), lambda: self._start(network=True)),
+            )
+        else:
+            self._start(network=False)
+
+    def _start(self, *, network: bool) -> None:
+        try:
+            self._stream.start(self.port.value(), network=network)
+        except InputError as error:
+            self._say(str(error), "fail")

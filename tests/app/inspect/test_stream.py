@@ -1,0 +1,148 @@
+"""The live depth as another program receives it."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QLabel, QPushButton
+from pytestqt.qtbot import QtBot
+
+from app.context.context import AppContext
+from app.inspect.page import InspectPage
+from app.widgets.question import Question
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.sensor_calibration import Calibration
+
+zmq = pytest.importorskip("zmq")
+GUIDE = Path(__file__).resolve().parents[3] / "docs" / "streaming.md"
+WAIT_MS = 60_000
+
+
+@pytest.fixture
+def page(context: AppContext, qtbot: QtBot) -> Iterator[InspectPage]:
+    made = InspectPage(context=context)
+    for dock in made.views.docks.values():
+        dock.hide()  # the stream alone makes depth and normals necessary
+    yield made
+    made.leave()
+    made.may_close()
+    made.close()
+    made.deleteLater()
+
+
+@pytest.fixture
+def live(
+    page: InspectPage, small_session: Path, small_calibration: Calibration, context: AppContext
+) -> InspectPage:
+    """Return the page with a folder of images as the camera."""
+    from app.sources.listing import image_folders
+
+    (info,) = image_folders([small_session / "balls"])()
+    context.source.choose(info)
+    page.enter()
+    reconstructor = Reconstructor(small_calibration, model="paper")
+    page.depth.calibrations.loaded.emit(reconstructor, reconstructor)
+    return page
+
+
+def _free_port() -> int:
+    with zmq.Context() as context, context.socket(zmq.PUB) as socket:
+        return int(socket.bind_to_random_port("tcp://127.0.0.1"))
+
+
+class Client(threading.Thread):
+    """Runs the client of the guide until it has printed twice."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(daemon=True)
+        text = GUIDE.read_text("utf-8").partition("```python\n")[2].partition("```")[0]
+        assert "5557" in text
+        self._text = text.replace("5557", str(port))
+        self.printed: list[tuple[object, ...]] = []
+        self.names: dict[str, object] = {"print": self._print}
+
+    def _print(self, *values: object) -> None:
+        self.printed.append(values)
+        if len(self.printed) == 2:
+            raise EOFError
+
+    def run(self) -> None:
+        context = zmq.Context.instance()
+        context.rcvtimeo = WAIT_MS
+        try:
+            exec(self._text, self.names)
+        except EOFError:
+            self.names["socket"].close(linger=0)  # type: ignore[attr-defined]
+            context.term()
+
+
+def test_the_client_of_the_guide_receives_depth_normals_and_health(
+    live: InspectPage, qtbot: QtBot
+) -> None:
+    port = _free_port()
+    live.stream.start(port)
+    client = Client(port)
+    client.start()
+    qtbot.waitUntil(lambda: not client.is_alive(), timeout=WAIT_MS)
+    (first, _, _, _), (second, deepest, normals, faults) = client.printed
+    assert second > first  # type: ignore[operator]
+    assert 0.1 < float(deepest) < 5.0  # type: ignore[arg-type]
+    arrays = client.names["arrays"]
+    assert normals == (*arrays["depth_mm"].shape, 3)  # type: ignore[index]
+    length = np.linalg.norm(arrays["normals"], axis=2)  # type: ignore[index]
+    assert np.median(length) == pytest.approx(1.0, abs=1e-3)
+    assert isinstance(faults, list)
+    assert str(port) in live.findChild(QLabel, "inspect.rate").text()
+    live.stream.stop()
+    assert str(port) not in live.findChild(QLabel, "inspect.rate").text()
+
+
+def test_a_frozen_image_is_sent_once(live: InspectPage, qtbot: QtBot) -> None:
+    live.stream.start(_free_port())
+    qtbot.waitUntil(lambda: live.stream.count > 0, timeout=WAIT_MS)
+    live.pause(True)
+    qtbot.waitUntil(lambda: live.depth.last is not None, timeout=WAIT_MS)
+    last = live.depth.last
+    assert last is not None
+    before = live.stream.count
+    for _ in range(3):
+        live.depth.shown.emit(live.depth.last)
+    assert live.stream.count <= before + 1
+
+
+def test_the_network_is_opened_only_after_a_confirmation(page: InspectPage, qtbot: QtBot) -> None:
+    page.show_stream()
+    dialog = page.stream._dialog
+    assert dialog is not None and dialog.reach.currentData() is False
+    dialog.reach.setCurrentIndex(dialog.reach.findData(True))
+    dialog.port.setValue(_free_port())
+    dialog.button.click()
+    assert not page.stream.on
+    (question,) = dialog.findChildren(Question)
+    agree = question.findChild(QPushButton, "question.answer0")
+    assert agree is not None
+    agree.click()
+    assert page.stream.on and page.stream.address.startswith("tcp://0.0.0.0:")
+    assert "NETWORK" in dialog.state.text()
+    dialog.button.click()
+    assert not page.stream.on
+
+
+def test_a_port_in_use_or_a_missing_package_is_reported_in_the_dialog(
+    page: InspectPage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page.show_stream()
+    dialog = page.stream._dialog
+    assert dialog is not None
+    with zmq.Context() as context, context.socket(zmq.PUB) as socket:
+        dialog.port.setValue(socket.bind_to_random_port("tcp://127.0.0.1"))
+        dialog.button.click()
+        assert "cannot be used" in dialog.state.text()
+    monkeypatch.setitem(sys.modules, "zmq", None)
+    dialog.button.click()
+    assert "pip install" in dialog.state.text() and not page.stream.on

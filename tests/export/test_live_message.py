@@ -1,0 +1,55 @@
+"""Height maps as messages for other programs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.export.live_message import TOPIC, pack, unpack
+from gelpolight_core.health.finding import Finding, health_of
+from gelpolight_core.quality import Verdict
+from gelpolight_core.reconstruction.height_map import HeightMap
+
+
+@pytest.fixture
+def heightmap() -> HeightMap:
+    depth = np.linspace(0.0, 0.5, 12, dtype=np.float32).reshape(3, 4)
+    normals = np.dstack([0.0 * depth, 0.0 * depth, 0.0 * depth - 1.0]).astype(np.float32)
+    flags = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    x, y = np.arange(4) * 0.1 - 2.0, np.arange(3) * 0.1 - 1.0
+    return HeightMap(depth, x, y, 0.1, normals, flags, "c-1", "full", "f", notes=("a note",))
+
+
+def test_a_message_brings_back_the_arrays_and_where_they_lie(heightmap: HeightMap) -> None:
+    parts = pack(heightmap, frame=7, time_s=12.5, serial="A-001")
+    assert parts[0] == TOPIC
+    header, arrays = unpack(parts)
+    for name in ("depth_mm", "normals", "flags"):
+        np.testing.assert_array_equal(arrays[name], getattr(heightmap, name))
+        assert arrays[name].dtype == getattr(heightmap, name).dtype
+    assert (header["frame"], header["time_s"], header["serial"]) == (7, 12.5, "A-001")
+    assert (header["x0_mm"], header["y0_mm"], header["pitch_mm"]) == (-2.0, -1.0, 0.1)
+    assert header["notes"] == ["a note"] and header["health"]["checked"] is False
+
+
+def test_normals_are_left_out_if_there_are_none_and_faults_are_named(heightmap: HeightMap) -> None:
+    fault = Finding("dirt", "dust", "Clean it", Verdict.WARN, value=3.0, unit="%")
+    health = health_of([fault], unknown=("blurred",), untouched=0.8)
+    header, arrays = unpack(
+        pack(replace(heightmap, normals=None, health=health), frame=0, time_s=0.0, serial="")
+    )
+    assert set(arrays) == {"depth_mm", "flags"}
+    assert header["health"]["findings"][0]["key"] == "dirt"
+    assert header["health"]["unknown"] == ["blurred"] and header["health"]["untouched"] == 0.8
+
+
+def test_other_messages_are_refused(heightmap: HeightMap) -> None:
+    parts = pack(heightmap, frame=0, time_s=0.0, serial="")
+    newer = json.dumps(json.loads(parts[1]) | {"version": 2}).encode()
+    for bad in ([], [b"depth"], [b"depth", b"no json"], parts[:-1], [parts[0], newer, *parts[2:]]):
+        with pytest.raises(InputError):
+            unpack(bad)
