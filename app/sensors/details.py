@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QProgressBar,
     QScrollArea,
-    QToolButton,
+    QToolBar,
     QVBoxLayout,
     QWidget,
 )
@@ -46,16 +46,17 @@ class Details(QWidget):
         # Space for the longest text, that of a validated calibration, so that the buttons do not
         # move.
         self._facts.setMinimumHeight(FACT_LINES * self._facts.fontMetrics().lineSpacing())
-        buttons = QHBoxLayout()
+        # A toolbar, because it has an arrow where it is too narrow for all buttons.
+        buttons = named(QToolBar(self), "sensors.details.bar", tr("Actions of the calibration"))
+        buttons.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
         for action in actions:
+            buttons.addAction(action)
             button = named(
-                QToolButton(self), f"{action.objectName()}.button", action.text().replace("&", "")
+                buttons.widgetForAction(action),
+                f"{action.objectName()}.button",
+                action.text().replace("&", ""),
             )
-            button.setDefaultAction(action)
-            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
             button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-            buttons.addWidget(button)
-        buttons.addStretch(1)
         self._area = named(QScrollArea(self), "sensors.details.stages", tr("Quality of the stages"))
         self._area.setWidgetResizable(True)
         self._area.setFrameShape(QFrame.Shape.NoFrame)
@@ -67,7 +68,7 @@ class Details(QWidget):
         self.busy.hide()
         layout.addWidget(self._title)
         layout.addWidget(self._facts)
-        layout.addLayout(buttons)
+        layout.addWidget(buttons)
         layout.addWidget(self.busy)
         layout.addWidget(self._area, 1)
 
@@ -85,7 +86,11 @@ class Details(QWidget):
             )
         else:
             self._facts.setText(facts(entry, entry.summary, uses))
-        self._area.setWidget(_stages(entry))
+        stages = _stages(entry)
+        self._area.setWidget(stages)
+        # It scrolls only up and down: no limit is cut at the right.
+        bar = self._area.verticalScrollBar().sizeHint().width()
+        self._area.setMinimumWidth(stages.minimumSizeHint().width() + bar)
 
 
 def _stages(entry: Entry) -> QWidget:

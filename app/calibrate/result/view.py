@@ -49,6 +49,7 @@ class ResultView(QWidget):
         super().__init__(parent)
         named(self, "result", tr("Calibration"))
         self._rows: dict[Stage, _StageRow] = {}
+        self._name = ""
         column = QVBoxLayout(self)
         self.headline = named(PlainLabel(), "result.headline", tr("Verdict"))
         self.headline.setWordWrap(True)
@@ -110,6 +111,9 @@ class ResultView(QWidget):
         saved : str, optional
             Name of the saved calibration that belongs to the present captures.
         """
+        if self._name and not saved:
+            self.show_saved("")  # what was saved is no longer what the captures give
+        self._name = saved
         for stage, row in self._rows.items():
             row.show_state(*states[row.step.key], statuses[stage].quality)
         done = all(is_done(statuses[stage].state.value) for stage in self._rows)
