@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from gelpolight_core.measurement.measured import Measured
 from gelpolight_core.translation import tr
+
+if TYPE_CHECKING:
+    # The window opens before the numerical libraries are loaded.
+    from gelpolight_core.measurement.measured import Measured
 
 LENGTH_UNITS = ("mm", "um")
 _PER_MM = {"mm": 1.0, "um": 1e3}
