@@ -35,7 +35,7 @@ def test_what_is_left_behind_is_named(
 ) -> None:
     above, inside, said = LEAKS[kind]
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    pytester.makeconftest(CONFTEST.read_text("utf-8"))
+    pytester.makeconftest(CONFTEST.read_text("utf-8") + "\nGRACE_S = 0.2\n")
     pytester.makepyfile(f"{above}\ndef test_leaks():\n{inside}\ndef test_next():\n    pass\n")
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-p", "no:xvfb")
     result.assert_outcomes(passed=2, errors=1)
