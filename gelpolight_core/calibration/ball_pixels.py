@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
-from gelpolight_core.reflectance.surroundings import neighbourhood, view_directions
+from gelpolight_core.reflectance.surroundings import view_directions
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-BOUNCE_REACH_MM = 1.0
+FIELD_PITCH_MM = 0.1
+"""Facets of the membrane that throw light are about as wide."""
 DRAPE_WIDTH_MM = 1.6
 EDGE_GAP_MM = 0.12
 PIXELS_PER_PART = 800
@@ -22,6 +25,61 @@ PIXELS_PER_PART = 800
 # less well.
 CAP_TRUST = 0.3
 MODEL_ERROR = 0.01
+MOST_RATIO = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class CoarseView:
+    """The camera's rays over the whole field, on coarse nodes.
+
+    Attributes
+    ----------
+    points_mm, ray_slope : (rows * columns, 2)
+        Where the rays meet the flat membrane, and their slope.
+    view : (rows, columns, 3)
+        Unit directions back to the camera.
+    usable : (rows, columns) bool
+        Nodes with light and membrane.
+    pitch_mm : float
+        Distance between nodes.
+    factor : int
+        Nodes of the calibration's grid to one of these, along an axis.
+    """
+
+    points_mm: Array
+    ray_slope: Array
+    view: Array
+    usable: NDArray[np.bool_]
+    pitch_mm: float
+    factor: int
+
+    @classmethod
+    def of(cls, table: ResamplingTable, usable: NDArray[np.bool_]) -> CoarseView:
+        """Return the coarse view of a table's grid."""
+        grid = table.grid
+        factor = max(round(FIELD_PITCH_MM / grid.pitch_mm), 1)
+        all_usable = block_means(usable.astype(np.float32), factor) > 0.99
+        ray_slope = np.nan_to_num(block_means(table.ray_slope, factor)).astype(np.float64)
+        x, y = (
+            axis[: axis.size // factor * factor].reshape(-1, factor).mean(axis=1)
+            for axis in (grid.x_mm, grid.y_mm)
+        )
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        pitch = factor * grid.pitch_mm
+        return cls(
+            points, ray_slope.reshape(-1, 2), view_directions(ray_slope), all_usable, pitch, factor
+        )
+
+    def index(self, points_mm: Array) -> Array:
+        """Return row and column (N, 2) of points (N, 2)."""
+        return np.asarray((points_mm - self.points_mm[0])[:, ::-1] / self.pitch_mm)
+
+
+def block_means(values: NDArray[Any], factor: int) -> Map:
+    """Return means over blocks of nodes."""
+    rows, columns = (n // factor for n in values.shape[:2])
+    whole = np.ascontiguousarray(values[: rows * factor, : columns * factor], np.float32)
+    return np.asarray(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA))
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +90,17 @@ class BallPixels:
     ----------
     points_mm, ray_slope, view : (N, 2), (N, 2), (N, 3)
         Camera rays (point and ray slope), and unit directions back to the camera.
-    ratio, weight, around : (N, 3)
-        Press over background, 1 / its standard deviation, and its average in the neighbourhood.
+    ratio, weight : (N, 3)
+        Press over background, and 1 / its standard deviation.
     radius_mm : float
         Radius of the ball.
+    view_of_field : CoarseView
+        The whole membrane that may throw light on them.
+    field : (rows, columns, 3) float32
+        Press over background there; 0 where it is not usable.
+    around, around_flat : (N, 3)
+        Light that they receive from the rest of a membrane that absorbs nothing, in the press and
+        while the membrane is flat, in units of the flat membrane's direct light.
     """
 
     points_mm: Array
@@ -43,8 +108,11 @@ class BallPixels:
     view: Array
     ratio: Array
     weight: Array
-    around: Array
     radius_mm: float
+    view_of_field: CoarseView
+    field: Map
+    around: Array
+    around_flat: Array
 
 
 def gather_ball_pixels(
@@ -52,6 +120,7 @@ def gather_ball_pixels(
     image: Map,
     background: Map,
     table: ResamplingTable,
+    view: CoarseView,
     usable: NDArray[np.bool_],
     noise: Array,
 ) -> BallPixels:
@@ -65,6 +134,8 @@ def gather_ball_pixels(
         Resampled, crosstalk removed.
     table : ResamplingTable
         The grid and its rays.
+    view : CoarseView
+        Of that grid.
     usable : (rows, columns) bool
         Nodes with light and membrane.
     noise : (3,)
@@ -73,7 +144,7 @@ def gather_ball_pixels(
     grid = table.grid
     base = np.maximum(background, LEAST_VALUE)
     ratio = np.asarray(image / base, np.float32)
-    around = neighbourhood(ratio, usable, grid.pitch_mm, BOUNCE_REACH_MM)
+    field = np.clip(block_means(ratio, view.factor), 0.0, MOST_RATIO) * view.usable[..., None]
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])
@@ -100,8 +171,11 @@ def gather_ball_pixels(
         view_directions(ray_slope),
         value / below,
         np.where(known, np.concatenate(trust) / sd, 0.0),
-        around[rows, columns].astype(np.float64),
         press.pose.radius_mm,
+        view,
+        field.astype(np.float32),
+        np.zeros_like(value),
+        np.zeros_like(value),
     )
 
 
@@ -117,6 +191,9 @@ def thinned(pixels: BallPixels) -> BallPixels:
         half(pixels.view),
         half(pixels.ratio),
         half(pixels.weight),
-        half(pixels.around),
         pixels.radius_mm,
+        pixels.view_of_field,
+        pixels.field,
+        half(pixels.around),
+        half(pixels.around_flat),
     )

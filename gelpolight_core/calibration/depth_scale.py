@@ -21,9 +21,11 @@ from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
+from gelpolight_core.reconstruction.near_light.from_around import LEVEL_NZ, surface_normals
 from gelpolight_core.reconstruction.near_light.kernel import solve_rows
 from gelpolight_core.reconstruction.near_light.maps import (
     COARSE,
+    LEAST_SHARE,
     kinds,
     membrane_numbers,
     middles,
@@ -37,8 +39,8 @@ from gelpolight_core.reconstruction.near_light.structures import (
     slopes_like,
 )
 from gelpolight_core.reflectance.ball import BallPose
-from gelpolight_core.reflectance.membrane import bounce_weight
-from gelpolight_core.reflectance.surroundings import neighbourhood, view_directions
+from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
+from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 Array = NDArray[np.float64]
@@ -49,10 +51,12 @@ PLATEAU_SHARE, HEIGHT_SHARE = 0.1, 0.04
 NODES = 160
 NOISE = 0.003
 ROUNDS = 2
+# Walls and the light that they throw change each other.
+ROUNDS_WITH_AROUND, THROWN = 5, 3
 # Small differences of depths are compared.
 STEPS, SETTLED, TOLERANCE = 10, 1e-4, 1e-4
 # Below this, half the difference of two depths is rounding error.
-LEAST_SHARE = 1e-6
+LEAST_STEP = 1e-6
 # Ball tops within this radius (mm) are compared; further out the slope of the cap has too much
 # weight.
 TOP_MM = 0.3
@@ -119,9 +123,9 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
         The calibrated LEDs and membrane.
     table : ResamplingTable
         Grid and rays.
-    covariance : (15, 15) or (27, 27)
+    covariance : (14, 14) or (26, 26)
         Covariance of the shared parameters of the joint refinement, in their order: LEDs (9),
-        exponent, gloss, roughness, interreflection on the ball caps, interreflection, decay length,
+        exponent, gloss, roughness, reflectance for light from around, decay length,
         heights of the curves.
     """
     field, depth, plateau = synthetic_press(full, table)
@@ -130,7 +134,7 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
     share = 0.0
     for size, direction in zip(sizes, directions.T, strict=True):
         step = np.sqrt(max(float(size), 0.0)) * direction
-        if np.abs(step).max() < LEAST_SHARE:
+        if np.abs(step).max() < LEAST_STEP:
             continue
         ends = [
             found_depth(_moved(full, sign * step), field, depth)[plateau] for sign in (1.0, -1.0)
@@ -212,7 +216,7 @@ def _shaded(
     stride: int,
     pitch_mm: float,
 ) -> tuple[Map, Map]:
-    """Return press over background and its average in the neighbourhood."""
+    """Return press over background, and the light from around in it."""
     points, rays, position, depth, normals = seen
     view = view_directions(rays)
     flat = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
@@ -224,13 +228,38 @@ def _shaded(
     direct = light[..., 2] / flat_light[..., 2] * (flat_distance / distance) ** 2
     direct *= full.membrane.response(light, normals, view)
     direct /= full.membrane.response(flat_light, up, view)
-    share = full.membrane.bounce * bounce_weight(normals)
-    around = np.ones((*usable.shape, 3), np.float32)
-    for _ in range(3):  # the neighbourhood receives light from its own neighbourhood
-        ratio = direct + share[:, None] * around.reshape(-1, 3)
-        whole = ratio.reshape(around.shape).astype(np.float32)
-        around = neighbourhood(whole, usable, stride * pitch_mm, full.membrane.bounce_reach_mm)
-    return np.where(usable[..., None], whole, np.float32(1.0)), around
+    shape = usable.shape
+    around, seen_as = np.zeros((*shape, 3)), np.zeros((*shape, 3))
+    flat = direct_flat(full, flat_light, flat_distance, view).reshape(*shape, 3)
+    for _ in range(THROWN if full.membrane.bounce > LEAST_SHARE else 1):
+        # Light that is thrown on is thrown on again.
+        seen_as = direct.reshape(*shape, 3) + around
+        surface = Surface(
+            np.concatenate([position, -depth[:, None]], axis=1).reshape(*shape, 3),
+            normals.reshape(*shape, 3),
+            view.reshape(*shape, 3),
+            seen_as * flat * usable[..., None],
+        )
+        around = _around(full, surface, flat, stride * pitch_mm)
+    return np.where(usable[..., None], seen_as, 1.0).astype(np.float32), around.astype(np.float32)
+
+
+def direct_flat(full: FullModel, light: Array, distance: Array, view: Array) -> Array:
+    """Return the flat membrane's brightness (N, 3) in units of `Surface.seen`."""
+    up = np.broadcast_to([0.0, 0.0, -1.0], view.shape)
+    return np.asarray(-full.membrane.response(light, up, view) * light[..., 2] / distance**2)
+
+
+def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> Array:
+    """Return light from around (rows, columns, 3), in units of the flat membrane's."""
+    around = np.zeros_like(flat)
+    if full.membrane.bounce <= LEAST_SHARE:
+        return around
+    tilted = surface.normals[..., 2] > LEVEL_NZ
+    leds, receivers = full.led_positions_mm, Receivers.on(surface, tilted)
+    found = gathered(surface, receivers, leds, full.membrane, pitch_mm)
+    around[tilted] = full.membrane.bounce * found / flat[tilted]
+    return around
 
 
 def _moved(full: FullModel, step: Array) -> FullModel:
@@ -240,7 +269,7 @@ def _moved(full: FullModel, step: Array) -> FullModel:
         exponent=max(old.exponent + float(step[9]), 0.1),
         gloss=float(np.clip(old.gloss + step[10], 0.0, 0.95)),
         roughness=float(np.clip(old.roughness + step[11], 0.05, 1.0)),
-        bounce=max(old.bounce + float(step[13]), 0.0),
+        bounce=max(old.bounce + float(step[12]), 0.0),
         diffuse=bent_curves(old.diffuse, step[COMMON:]) if old.diffuse else (),
     )
     leds = full.led_positions_mm + step[:9].reshape(3, 3)
@@ -261,10 +290,27 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     """
     scale = _scale(full, field)
     membrane, steps = membrane_numbers(full), Steps(STEPS, SETTLED**2, True, False)
-    for _ in range(ROUNDS):
+    rows, columns = depth_mm.shape
+    thrown = membrane.bounce is not None
+    view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
+    flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
+    x, y = np.meshgrid(field.x_mm, field.y_mm)
+    normals = surface_normals(depth_mm, np.s_[:rows, :columns], field.ray_slope, scale.pitch_mm)
+    for _ in range(ROUNDS_WITH_AROUND if thrown else ROUNDS):
+        image = field.image
+        if thrown:
+            ray_slope, (nx, ny) = field.ray_slope, normals
+            points = np.stack(
+                [x + depth_mm * ray_slope[0], y + depth_mm * ray_slope[1], -depth_mm], -1
+            )
+            down = -np.sqrt(np.maximum(1.0 - nx**2 - ny**2, 0.0))
+            seen = np.moveaxis(image.ratio, 0, -1) * flat * field.usable[..., None]
+            surface = Surface(points, np.stack([nx, ny, down], axis=-1), view, seen)
+            light = np.moveaxis(_around(full, surface, flat, scale.pitch_mm), -1, 0)
+            image = image._replace(around=np.ascontiguousarray(light, np.float32))
         slopes = slopes_like(depth_mm)
-        rows = len(depth_mm)
-        solve_rows(0, rows, field.image, depth_mm, scale, (0, 0), membrane, steps, slopes)
+        solve_rows(0, rows, image, depth_mm, scale, (0, 0), membrane, steps, slopes)
+        normals = slopes.normal_x, slopes.normal_y
         depth_mm = integrate_weighted(
             slopes.slope_x,
             slopes.slope_y,

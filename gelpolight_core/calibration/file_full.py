@@ -93,6 +93,9 @@ def _read_scale(entry: dict[str, Any]) -> ScaleSd:
 
 def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membrane:
     values = {name: float(value) for name, value in entry.items()}
+    if values.pop("bounce_reach_mm", None) is not None and values["bounce"] > 0.0:
+        # Until version 3 it was a share of a neighbourhood's average, which cannot be converted.
+        raise ValueError("its interreflection is of a form that is no longer used")
     diffuse: tuple[tuple[float, ...], ...] = ()
     if curves is not None:
         if curves.shape != (3, CURVE_NODES) or not np.isfinite(curves).all():
@@ -107,6 +110,6 @@ def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membra
         raise ValueError("the membrane has impossible values")
     if membrane.exponent <= 0.0 or not 0.0 < membrane.roughness <= 1.0:
         raise ValueError("the membrane has impossible values")
-    if membrane.bounce < 0.0 or membrane.bounce_reach_mm <= 0.0:
+    if membrane.bounce < 0.0:
         raise ValueError("the membrane has impossible values")
     return membrane

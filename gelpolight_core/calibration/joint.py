@@ -14,12 +14,13 @@ presses decide.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.ball_pixels import BOUNCE_REACH_MM, BallPixels, thinned
+from gelpolight_core.calibration.ball_light import with_light_from_around
+from gelpolight_core.calibration.ball_pixels import BallPixels, thinned
 from gelpolight_core.calibration.jackknife import jackknife_covariance
 from gelpolight_core.calibration.joint_kernel import CORRELATION
 from gelpolight_core.calibration.joint_problem import (
@@ -33,11 +34,15 @@ from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, Calibration
 from gelpolight_core.least_squares import fit_least_squares
 from gelpolight_core.parallel import in_parallel
 from gelpolight_core.reflectance.ball import BallPose
+from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.press import BallPress
 
 Array = NDArray[np.float64]
-_NAMES = ("exponent", "gloss", "roughness", "cap_bounce", "bounce", "decay_mm")
+BOUNCE = 12
+SIGNIFICANT = 3.0
+"""Standard deviations from which on light from around counts as seen."""
+_NAMES = ("exponent", "gloss", "roughness", "bounce", "decay_mm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +54,9 @@ class JointResult:
     led_positions_mm, led_sd_mm : (3, 3)
         Sensor frame.
     membrane : Membrane
-        With the share of light that the drape receives from its neighbourhood.
+        With its reflectance for light from other parts of it.
     membrane_sd : dict
         Standard deviations of its parameters.
-    cap_bounce : float
-        Interreflection on the convex caps of the balls.
     decay_mm : float
         Decay length of the drape.
     balls : tuple of BallPose
@@ -70,9 +73,9 @@ class JointResult:
         The same loss with the two-lobe membrane, and with the one-dimensional one.
     membrane_kept : str
         ``two-lobe`` or ``one-dimensional``: the form of `membrane`.
-    covariance : (15, 15) or (27, 27)
-        Of LEDs (9), exponent, gloss, roughness, interreflection on the cap, interreflection and
-        decay length and, if the membrane is one-dimensional, of the heights of its curves; from
+    covariance : (14, 14) or (26, 26)
+        Of LEDs (9), exponent, gloss, roughness, reflectance for light from around and decay
+        length and, if the membrane is one-dimensional, of the heights of its curves; from
         leaving out one press at a time. 0 for fixed parameters.
     """
 
@@ -80,7 +83,6 @@ class JointResult:
     led_sd_mm: Array
     membrane: Membrane
     membrane_sd: dict[str, float]
-    cap_bounce: float
     decay_mm: float
     balls: tuple[BallPose, ...]
     misfit: float
@@ -96,6 +98,7 @@ def refine_jointly(
     presses: Sequence[BallPress],
     pixels: Sequence[BallPixels],
     led_positions_mm: Array,
+    slab: Slab,
     *,
     terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
 ) -> JointResult:
@@ -110,13 +113,25 @@ def refine_jointly(
         The detected balls, and their pixels.
     led_positions_mm : (3, 3)
         From the mirror spots.
+    slab : Slab
+        What is below the membrane.
     terms : CalibrationTerms, optional
         The effects to model; by default all.
     """
+    if terms.bounce:
+        seen = _first_light(presses, pixels, led_positions_mm, slab, terms)
+        # A membrane that shows no light from around needs none to be gathered in any frame.
+        pixels, terms = (pixels, replace(terms, bounce=False)) if seen is None else (seen, terms)
     held_out, membranes = _held_out(presses, pixels, led_positions_mm, terms)
     refine = held_out[1] <= held_out[0]
     curves = membranes[1] <= membranes[0]
     solved = _solve(presses, pixels, led_positions_mm, terms, refine=refine, curves=curves)
+    if terms.bounce:
+        pixels = _lit(pixels, solved.x, slab)
+        start = solved.x
+        solved = _solve(
+            presses, pixels, led_positions_mm, terms, refine=refine, curves=curves, near=start
+        )
     x, sd = solved.x, solved.sd
     end = COMMON + 3 * len(pixels)
     return JointResult(
@@ -124,12 +139,8 @@ def refine_jointly(
         sd[:9].reshape(3, 3),
         _membrane_of(x, end),
         dict(zip(_NAMES, sd[9:COMMON].tolist(), strict=True)),
-        float(x[12]),
-        float(x[14]),
-        tuple(
-            BallPose((float(cx), float(cy)), p.radius_mm, float(depth))
-            for (cx, cy, depth), p in zip(x[COMMON:end].reshape(-1, 3), pixels, strict=True)
-        ),
+        float(x[DECAY]),
+        _balls_of(x, pixels),
         solved.misfit,
         solved.ball_misfits,
         held_out,
@@ -141,11 +152,45 @@ def refine_jointly(
 
 
 def _membrane_of(x: Array, balls_end: int) -> Membrane:
-    bounce = float(x[13])
+    bounce = float(x[12])
     if x.size == balls_end:
-        return Membrane(float(x[9]), float(x[10]), float(x[11]), bounce, BOUNCE_REACH_MM)
-    return Membrane(
-        bounce=bounce, bounce_reach_mm=BOUNCE_REACH_MM, diffuse=diffuse_curves(x[balls_end:])
+        return Membrane(float(x[9]), float(x[10]), float(x[11]), bounce)
+    return Membrane(bounce=bounce, diffuse=diffuse_curves(x[balls_end:]))
+
+
+def _lit(pixels: Sequence[BallPixels], x: Array, slab: Slab) -> list[BallPixels]:
+    """Return the pixels with light from around, by a solution."""
+    end = COMMON + 3 * len(pixels)
+    balls = _balls_of(x, pixels)
+    return with_light_from_around(
+        pixels, balls, float(x[DECAY]), x[:9].reshape(3, 3), _membrane_of(x, end), slab
+    )
+
+
+def _first_light(
+    presses: Sequence[BallPress],
+    pixels: Sequence[BallPixels],
+    leds: Array,
+    slab: Slab,
+    terms: CalibrationTerms,
+) -> list[BallPixels] | None:
+    """Return the pixels with light from around, by a fit to some of them; None if they show none.
+
+    The fit starts from the light that a matt membrane would throw.
+    """
+    x, _ = _start(presses, leds, terms, curves=False)
+    some = _lit([thinned(p) for p in pixels], x, slab)
+    fitted = _solve(presses, some, leds, terms, refine=terms.led_refinement)
+    if fitted.x[BOUNCE] <= SIGNIFICANT * fitted.sd[BOUNCE]:
+        return None
+    return _lit(pixels, fitted.x, slab)
+
+
+def _balls_of(x: Array, pixels: Sequence[BallPixels]) -> tuple[BallPose, ...]:
+    balls = x[COMMON : COMMON + 3 * len(pixels)].reshape(-1, 3)
+    return tuple(
+        BallPose((float(cx), float(cy)), p.radius_mm, float(depth))
+        for (cx, cy, depth), p in zip(balls, pixels, strict=True)
     )
 
 
@@ -167,14 +212,13 @@ def _start(
     """Return the start values of the fit, and which parameters are free."""
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
     glossy = terms.gloss and not curves
-    bounce = 0.1 * terms.bounce
-    common = [1.0, 0.05 * glossy, 0.5, bounce, bounce, 0.7]
+    common = [1.0, 0.05 * glossy, 0.5, 0.1 * terms.bounce, 0.7]
     heights = np.zeros(CURVE_SIZE if curves else 0)
     start = np.concatenate([leds.ravel(), common, np.ravel(balls), heights])
     free = np.ones(start.size, dtype=bool)
     free[:9] = terms.led_refinement
     # Deviations from Lambert's cosine law are covered by the one-dimensional curves.
-    free[9:14] = [False, glossy, glossy, terms.bounce, terms.bounce]
+    free[9:DECAY] = [False, glossy, glossy, terms.bounce]
     return start, free
 
 
@@ -187,18 +231,23 @@ def _solve(
     refine: bool,
     curves: bool = False,
     judging: Array | None = None,
+    near: Array | None = None,
 ) -> _Solution:
-    """Solve for all parameters or, when judging a fit to other presses, for the balls alone."""
+    """Solve for all parameters or, when judging a fit to other presses, for the balls alone.
+
+    Starts from a solution that is `near`, if there is one.
+    """
     start, free = _start(presses, leds, terms, curves=curves)
     balls = slice(COMMON, COMMON + 3 * len(pixels))
     free[:9] &= refine
     low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
-    low[9:COMMON] = [0.5, 0.0, 0.15, 0.0, 0.0, 0.15]
-    high[9:COMMON] = [1.8, 0.9, 1.0, 1.5, 1.5, 3.0]
+    low[9:COMMON] = [0.5, 0.0, 0.15, 0.0, 0.15]
+    high[9:COMMON] = [1.8, 0.9, 1.0, 1.5, 3.0]
     depth_at = slice(COMMON + 2, balls.stop, 3)
     low[depth_at] = 0.02
     high[depth_at] = [0.95 * p.radius_mm for p in pixels]
     start[depth_at] = np.clip(start[depth_at], 0.03, 0.9 * high[depth_at])
+    begin = start if near is None else near
     if judging is not None:
         start[:COMMON] = judging[:COMMON]
         start[balls.stop :] = judging[judging.size - (start.size - balls.stop) :]
@@ -217,7 +266,7 @@ def _solve(
     found = fit_least_squares(
         lambda part: problem.all(whole(part)),
         lambda part: problem.jacobian(whole(part))[:, free],
-        start[free],
+        begin[free],
         (low[free], high[free]),
         scale=scale[free],
         robust=True,

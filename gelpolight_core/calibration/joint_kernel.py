@@ -40,14 +40,15 @@ def _rise(bumps, heights, k, cosine, flat_cosine):  # type: ignore[no-untyped-de
 
 @_compiled
 def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    pixels, seen, leds, lobes, heights, bumps, no_curves, interreflection, result
+    pixels, seen, leds, lobes, heights, bumps, no_curves, reflectance, result
 ):
     """Write residuals, those of direct light alone, cosines and flat cosines (4, N, 3).
 
     Parameters
     ----------
     pixels : tuple
-        Points (N, 2), directions to the camera (N, 3), ratio, weight and surroundings (N, 3).
+        Points (N, 2), directions to the camera (N, 3), ratio, weight, and light from around in the
+        press and on the flat membrane (N, 3).
     seen : tuple
         Points (N, 3), normals (N, 3) and whether they are on the ball (N,).
     leds : (3, 3)
@@ -58,18 +59,16 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
         Of the curves and their terms; heights of size 0 for a membrane with two lobes.
     no_curves : (3, 0)
         Diffuse curves of the two-lobe membrane, which has none.
-    interreflection : tuple
-        On the ball, and on the drape.
+    reflectance : float
+        For light from around.
     result : (4, N, 3)
         Written.
     """
-    points, view, ratio, weight, around = pixels
-    surface, normals, on_ball = seen
+    points, view, ratio, weight, around, around_flat = pixels
+    surface, normals, _ = seen
     for i in range(points.shape[0]):
         normal = (normals[i, 0], normals[i, 1], normals[i, 2])
         towards = (view[i, 0], view[i, 1], view[i, 2])
-        share = interreflection[0] if on_ball[i] else interreflection[1]
-        share *= (1.0 + normal[2]) / 2.0
         for k in range(3):
             light, far = _towards(leds, k, surface[i, 0], surface[i, 1], surface[i, 2])
             flat, flat_far = _towards(leds, k, points[i, 0], points[i, 1], 0.0)
@@ -87,7 +86,10 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             direct *= light[2] / flat[2] * (flat_far / far) ** 2
             lit = min(max((facing - SHADOW_COSINE) / SHADOW_COSINE, 0.0), 1.0)
             scale = weight[i, k] * lit / CORRELATION
-            result[0, i, k] = (direct + share * around[i, k] - ratio[i, k]) * scale
+            # The background holds light from around, too.
+            direct /= 1.0 + reflectance * around_flat[i, k]
+            more = reflectance * around[i, k] / (1.0 + reflectance * around_flat[i, k])
+            result[0, i, k] = (direct + more - ratio[i, k]) * scale
             result[1, i, k] = direct * scale
             result[2, i, k] = cosine
             result[3, i, k] = flat_cosine

@@ -20,8 +20,8 @@ Surface = tuple[Array, Array, NDArray[np.bool_]]
 LED_LATERAL_SD_MM = 0.05
 LED_HEIGHT_SD_MM = 0.2
 PRIOR_STRENGTH = 3.0
-# LEDs (9), exponent, gloss, roughness, interreflection on the cap and the drape, decay length.
-COMMON, DECAY = 15, 14
+# LEDs (9), exponent, gloss, roughness, reflectance for light from around, decay length.
+COMMON, DECAY = 14, 13
 # The one-dimensional membrane: cos times the exponential of a spline through these cosines; it is 0
 # at the last. Below the first, which balls hardly reach, it continues with Lambert's law.
 CURVE_COSINES = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
@@ -103,14 +103,21 @@ class Problem:
         pixels = self.presses[index]
         result = np.empty((4, *pixels.ratio.shape))
         model_press(
-            (pixels.points_mm, pixels.view, pixels.ratio, pixels.weight, pixels.around),
+            (
+                pixels.points_mm,
+                pixels.view,
+                pixels.ratio,
+                pixels.weight,
+                pixels.around,
+                pixels.around_flat,
+            ),
             seen,
             x[:9].reshape(3, 3),
             (float(x[9]), float(x[10]), float(x[11])),
             x[self.balls_end :].reshape(3, -1),
             _BUMPS,
             _NO_CURVES,
-            (float(x[12]), float(x[13])),
+            float(x[12]),
             result,
         )
         return result[0], result[1], result[2], result[3]
@@ -124,7 +131,7 @@ class Problem:
                 PRIOR_STRENGTH * moved[:, 2] / LED_HEIGHT_SD_MM,
                 # Exponent and gloss trade off; the data must clearly show a diffuse share that
                 # deviates from Lambert's law (the loss allows large deviations), or an unseen lobe.
-                [PRIOR_STRENGTH * (x[9] - 1.0) / 0.01, (x[12] - x[13]) / 0.2, (x[11] - 0.5) / 0.3],
+                [PRIOR_STRENGTH * (x[9] - 1.0) / 0.01, (x[11] - 0.5) / 0.3],
                 x[self.balls_end :] / CURVE_SD,
             ]
         )

@@ -48,6 +48,9 @@ _BEGINS = {
 }
 """Share of the total work done when a stage begins."""
 
+MOST_HEIGHT_ERROR = 3.0
+"""Percent of height from which on a calibration fails: its presses are off by as much."""
+
 
 @dataclass(frozen=True, slots=True)
 class CalibrationRun:
@@ -245,7 +248,7 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
             100.0 * scale.balls,
             "%",
             warn=2.0,
-            fail=10.0,
+            fail=MOST_HEIGHT_ERROR,
             advice=lengths,
         ),
         judge(
@@ -254,7 +257,7 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
             100.0 * scale.depth,
             "%",
             warn=2.0,
-            fail=10.0,
+            fail=MOST_HEIGHT_ERROR,
             # More balls reduce scatter, but not an error common to all heights.
             advice=lengths if stated_wrong else tr("Press more balls at more positions"),
         ),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.ball_pixels import gather_ball_pixels
+from gelpolight_core.calibration.ball_pixels import CoarseView, gather_ball_pixels
 from gelpolight_core.calibration.depth_scale import (
     ball_height_error,
     depth_scale_sd,
@@ -18,9 +18,16 @@ from gelpolight_core.calibration.results import StageResults, need
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import LightResult
+from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.press import BallPress
-from gelpolight_core.sensor_calibration import Calibration, FullModel, Provenance, ScaleSd
-from gelpolight_core.session.session import Session
+from gelpolight_core.sensor_calibration import (
+    Calibration,
+    FullModel,
+    Provenance,
+    ScaleSd,
+    sensor_stack,
+)
+from gelpolight_core.session.session import SensorData, Session
 
 CHECKED_BALLS = 4
 
@@ -40,19 +47,21 @@ def refine(session: Session, results: StageResults) -> StageResults:
     InputError
         If an earlier stage was not run.
     """
-    refined = refine_with(results)
+    refined = refine_with(session.sensor, results)
     assert refined.joint is not None and refined.full is not None
     scale = _scale_sd(session, refined, refined.joint, refined.full)
     return replace(refined, full=replace(refined.full, scale_sd=scale))
 
 
 def refine_with(
-    results: StageResults, *, terms: CalibrationTerms = ALL_CALIBRATION_TERMS
+    sensor: SensorData, results: StageResults, *, terms: CalibrationTerms = ALL_CALIBRATION_TERMS
 ) -> StageResults:
     """Refine LEDs and membrane on the presses, and keep the background for comparison.
 
     Parameters
     ----------
+    sensor : SensorData
+        With its layers.
     results : StageResults
         Results of all earlier stages.
     terms : CalibrationTerms, optional
@@ -66,11 +75,15 @@ def refine_with(
     crosstalk = found.matrix
     background = unmix(bare, crosstalk)
     noise = press_noise(results.presses)
+    view = CoarseView.of(table, factors.usable)
     pixels = [
-        gather_ball_pixels(press, unmix(image, crosstalk), background, table, factors.usable, noise)
+        gather_ball_pixels(
+            press, unmix(image, crosstalk), background, table, view, factors.usable, noise
+        )
         for press, image in zip(results.presses, results.images, strict=True)
     ]
-    joint = refine_jointly(results.presses, pixels, lights.led_positions_mm, terms=terms)
+    slab = Slab.of(sensor_stack(sensor, need(results.top_pose, "balls").plane))
+    joint = refine_jointly(results.presses, pixels, lights.led_positions_mm, slab, terms=terms)
     full = FullModel(
         joint.led_positions_mm,
         joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),

@@ -319,7 +319,7 @@ def _calibrated(
         if terms not in made:
             tell(variant.label, CALIBRATING * (1 + len(made)) / whole)
             begin = time.process_time()
-            refined = bare_calibration(session, refine_with(results, terms=terms))
+            refined = bare_calibration(session, refine_with(session.sensor, results, terms=terms))
             made[terms] = refined, time.process_time() - begin
         calibration, seconds = made[terms]
         if variant.model == "paper":

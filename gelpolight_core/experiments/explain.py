@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.experiments.ablation import RIM_MM, TruePress, read_presses
-from gelpolight_core.experiments.gathered_light import Surface, gathered
 from gelpolight_core.experiments.true_view import TrueView, lit_by, true_view
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import light_directions
@@ -27,7 +26,7 @@ from gelpolight_core.reconstruction.integration.weighted import integrate_weight
 from gelpolight_core.reconstruction.misfit import direct_light
 from gelpolight_core.reconstruction.near_light.region_solver import Solved
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
-from gelpolight_core.reflectance.membrane import bounce_weight
+from gelpolight_core.reflectance.gathered_light import Receivers, Slab, Surface, gathered
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 from gelpolight_core.session.session import Session
@@ -168,7 +167,7 @@ def explain(
         # Walls mirror even distant membrane: light is gathered from the whole field.
         whole = solver.solved(press.rgb, effort="fast", everywhere=True)
         assert whole is not None
-        parts.append(_light_at(full, press.truth, whole))
+        parts.append(_light_at(full, Slab.of(calibration.stack), press.truth, whole))
     tell("", 1.0)
     values = np.concatenate(parts) if parts else np.empty((0, 6))
     return Explanation(
@@ -248,7 +247,7 @@ def _loss(press: TruePress, solved: Solved, view: TrueView, radius_mm: float) ->
     return Loss(press.row.file, error(own), error(true), error(mixed(dark)), error(mixed(~dark)))
 
 
-def _light_at(full: FullModel, truth: TrueDepth, solved: Solved) -> Array:
+def _light_at(full: FullModel, slab: Slab, truth: TrueDepth, solved: Solved) -> Array:
     """Return side, slope, image, direct light, the model's addition and the gathered one (N, 6).
 
     Every second node along both axes, where it is tilted.
@@ -258,23 +257,23 @@ def _light_at(full: FullModel, truth: TrueDepth, solved: Solved) -> Array:
     slope = np.degrees(np.arccos(np.clip(-view.normals[..., 2], 0.0, 1.0)))
     usable = scale.kind == 2
     seen = np.moveaxis(image.ratio, 0, -1).astype(np.float64)
-    around = np.moveaxis(np.broadcast_to(image.around, image.ratio.shape), 0, -1)
+    around = np.moveaxis(np.broadcast_to(solved.compared.fine.around, image.ratio.shape), 0, -1)
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     towards_camera = view_directions(ray_slope)
     facets = Surface(view.points_mm, view.normals, towards_camera, seen * flat * usable[..., None])
     where = usable & view.known & (slope >= BANDS[0])
     thinned = np.zeros_like(where)
     thinned[::2, ::2] = where[::2, ::2]
-    thrown = gathered(facets, thinned, leds, full.membrane, scale.pitch_mm) / flat[thinned]
+    at = Receivers.on(facets, thinned)
+    thrown = gathered(facets, at, leds, full.membrane, scale.pitch_mm, slab=slab) / flat[thinned]
     points, normals = view.points_mm[thinned], view.normals[thinned]
     lit = lit_by(truth, view, leds)[thinned]
     direct = direct_light(full, points[:, :2], -points[:, 2], normals, ray_slope[thinned])
-    model = full.membrane.bounce * around[thinned] * bounce_weight(normals)[:, None]
     light, _ = light_directions(leds, points)
     tilted = np.einsum("nkc,nc->nk", light, normals) > -light[..., 2]
     side = np.where(lit, np.where(tilted, 0, 1), 2)
     steep = np.broadcast_to(slope[thinned][:, None], lit.shape)
-    parts = (side, steep, seen[thinned], np.where(lit, direct, 0.0), model, thrown)
+    parts = (side, steep, seen[thinned], np.where(lit, direct, 0.0), around[thinned], thrown)
     return np.stack([part.ravel() for part in parts], axis=1)
 
 

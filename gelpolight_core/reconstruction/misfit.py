@@ -20,9 +20,10 @@ from gelpolight_core.masks import LEAST_LIGHT, SATURATED
 from gelpolight_core.reconstruction.height_map import Flag, HeightMap
 from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibration
 from gelpolight_core.reconstruction.linear import as_linear
+from gelpolight_core.reconstruction.near_light.maps import COARSE, LEAST_SHARE, SensorMaps
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reflectance.membrane import bounce_weight
-from gelpolight_core.reflectance.surroundings import neighbourhood, view_directions
+from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
+from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 Map = NDArray[np.float32]
@@ -130,13 +131,32 @@ def _image_misfit(
     ratio = np.asarray(light / np.maximum(base, LEAST_LIGHT), np.float32)
     of_use = (raw < SATURATED) & (base > LEAST_LIGHT) & inside[..., None]
     pitch = heightmap.pitch_mm * (thin[0].step or 1)
-    around = neighbourhood(ratio, inside, pitch, full.membrane.bounce_reach_mm)
     normals = heightmap.normals[thin].astype(np.float64)
     explained = direct_light(full, np.stack([x, y], axis=-1), depth, normals, ray_slope)
-    bounced = full.membrane.bounce * around * bounce_weight(normals)[..., None]
-    left = np.where(of_use, ratio - explained - bounced, 0.0)
+    if full.membrane.bounce > LEAST_SHARE:
+        maps = SensorMaps(calibration, full)
+        scale = maps.scale(COARSE)
+        at = (np.asarray((m + 0.5) / COARSE - 0.5, np.float32) for m in (column, row))
+        flat, returned = _between((-scale.flat, maps.returned), *at)
+        points = np.stack([x, y, -depth], axis=-1)
+        seen = np.where(of_use, ratio * flat, 0.0)
+        surface = Surface(points, normals, view_directions(ray_slope), seen)
+        receivers = Receivers.on(surface, inside)
+        leds, membrane, slab = full.led_positions_mm, full.membrane, maps.slab
+        found = gathered(surface, receivers, leds, membrane, pitch, slab=slab)
+        explained *= 1.0 - returned
+        explained[inside] += membrane.bounce * found / flat[inside]
+    left = np.where(of_use, ratio - explained, 0.0)
     count = np.maximum(of_use.sum(axis=-1), 1)
     return np.asarray(np.sqrt((left**2).sum(axis=-1) / count), np.float32)
+
+
+def _between(maps: tuple[Map, ...], column: Map, row: Map) -> list[Map]:
+    """Return maps (3, rows, columns) between their nodes, (..., 3) each."""
+    return [
+        np.stack([cv2.remap(plane, column, row, cv2.INTER_LINEAR) for plane in planes], axis=-1)
+        for planes in maps
+    ]
 
 
 def direct_light(

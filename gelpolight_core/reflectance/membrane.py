@@ -1,4 +1,4 @@
-"""The membrane of the full model: a diffuse and a glossy share, and light from its neighbourhood.
+"""The membrane of the full model: a diffuse and a glossy share, and light from other parts of it.
 
 The glossy share is a microfacet lobe (GGX distribution, Smith's masking) about the half vector
 between light and view; the diffuse share is a power of the cosine, or a curve for each channel.
@@ -34,10 +34,8 @@ class Membrane:
     roughness : float
         GGX alpha of the glossy lobe.
     bounce : float
-        Light from the membrane around: share of the neighbourhood's brightness that a wall turned
-        fully towards it receives.
-    bounce_reach_mm : float
-        Standard deviation of the Gaussian over which the neighbourhood is averaged.
+        Reflectance for light from other parts of the membrane, in units of the reflectance that
+        :meth:`response` describes; 0: it gives none to itself.
     diffuse : tuple of 3 tuples of `CURVE_NODES` floats
         The diffuse share of each channel at even cosines from 0 to 1, in place of
         ``cosine**exponent``; empty where the power stands.
@@ -47,7 +45,6 @@ class Membrane:
     gloss: float = 0.0
     roughness: float = 0.5
     bounce: float = 0.0
-    bounce_reach_mm: float = 0.8
     diffuse: tuple[tuple[float, ...], ...] = ()
 
     @property
@@ -85,11 +82,3 @@ class Membrane:
         )
         brightness_of_points(light, normals, view, lobes, self.curves, result)
         return result
-
-
-def bounce_weight(normals: Array) -> Array:
-    """Return how much of its view a tilted point has of the membrane around, (...).
-
-    A plane element tilted by tau against an even ground sees (1 - cos tau) / 2 of it.
-    """
-    return np.asarray((1.0 + normals[..., 2]) / 2.0)

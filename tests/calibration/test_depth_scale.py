@@ -22,7 +22,7 @@ def full_model(calibration: Calibration) -> FullModel:
     return FullModel(
         calibration.led_positions_mm,
         np.full((3, 3), 0.02),
-        Membrane(1.0, 0.2, 0.5, 0.3, 1.0),
+        Membrane(1.0, 0.2, 0.5, 0.3),
         calibration.radiance,
         0.7,
         0.01,
@@ -43,15 +43,15 @@ def test_the_synthetic_press_is_what_the_sensor_would_find() -> None:
 def test_wider_parameters_leave_depths_as_much_less_sure() -> None:
     calibration = scene.calibration()
     full = full_model(calibration)
-    covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 1.0, 0.02**2, 1.0])
+    covariance = np.diag([0.02**2] * 9 + [0.003**2, 0.01**2, 0.01**2, 0.02**2, 1.0])
     once = depth_scale_sd(full, calibration.table, covariance)
     twice = depth_scale_sd(full, calibration.table, 4.0 * covariance)
     assert twice == pytest.approx(2.0 * once, rel=0.05)
     assert depth_scale_sd(full, calibration.table, 0.0 * covariance) == 0.0
     # LED errors of 0.1 mm cost 0.4 % of depth, so 0.02 mm cost about 0.1 %; gloss of 0.01 costs up
-    # to 1 %. Parameters that a depth does not use (cap interreflection, decay) cost nothing.
+    # to 1 %. A parameter that a depth does not use (decay) costs nothing.
     assert 5e-4 < once < 2e-2
-    unused = np.diag([0.0] * 12 + [1.0, 0.0, 1.0])
+    unused = np.diag([0.0] * 13 + [1.0])
     assert depth_scale_sd(full, calibration.table, unused) < 1e-6
 
 

@@ -29,7 +29,7 @@ def full_calibration() -> Calibration:
     full = FullModel(
         led_positions_mm=plain.led_positions_mm + np.array([0.1, -0.03, -0.2]),
         led_sd_mm=np.array([[0.01, 0.02, 0.05], [0.015, 0.01, 0.04], [0.01, 0.01, 0.06]]),
-        membrane=Membrane(1.03, 0.21, 0.47, 0.31, 0.9, CURVES),
+        membrane=Membrane(1.03, 0.21, 0.47, 0.31, CURVES),
         background=(0.9 * plain.radiance).astype(np.float32),
         decay_mm=0.68,
         misfit=0.0123,
@@ -118,7 +118,7 @@ def test_a_full_model_of_version_1_is_read(whole: Path, tmp_path: Path) -> None:
 
     read = read_calibration(forged(whole, tmp_path / "old.gplcal", older))
     assert read.full is not None
-    assert read.full.membrane == Membrane(1.03, 0.21, 0.47, 0.31, 0.9)
+    assert read.full.membrane == Membrane(1.03, 0.21, 0.47, 0.31)
     assert read.full.membrane_kept == "two-lobe"
     assert read.provenance.edits == ()
 
@@ -191,7 +191,7 @@ def test_an_unchanged_forgery_is_accepted(whole: Path, tmp_path: Path) -> None:
         {"roughness": 0.0},
         {"roughness": 1.5},
         {"bounce": float("inf")},
-        {"bounce_reach_mm": float("nan")},
+        {"bounce": 0.5, "bounce_reach_mm": 1.0},
         {"colour": 1.0},
         {"exponent": "steep"},
         {"exponent": None},
@@ -273,7 +273,7 @@ def test_arrays_that_are_not_finite_are_refused(
         {"misfit": -0.1},
         {"held_out": [float("nan"), 1.0]},
         {"membrane": {"bounce": -1.0}},
-        {"membrane": {"bounce_reach_mm": 0.0}},
+        {"membrane": {"bounce": 0.5, "bounce_reach_mm": 1.0}},
         {"membrane_kept": "velvet"},
         {"membrane_sd": {"gloss": -0.1}},
         {"membrane_held_out": [0.1]},

@@ -78,9 +78,11 @@ def test_a_calibration_with_all_terms_is_the_sessions_own(
 ) -> None:
     session, results = read_session(virtual_session), virtual_results
     whole = virtual_run.calibration
-    again = bare_calibration(session, refine_with(results))
+    again = bare_calibration(session, refine_with(session.sensor, results))
     assert again.identity == whole.identity
-    mixed = bare_calibration(session, refine_with(results, terms=CalibrationTerms(crosstalk=False)))
+    mixed = bare_calibration(
+        session, refine_with(session.sensor, results, terms=CalibrationTerms(crosstalk=False))
+    )
     np.testing.assert_array_equal(mixed.crosstalk, np.eye(3))
     assert mixed.full is not None and whole.full is not None
     # 5 % of the neighbours' light is left in.

@@ -12,9 +12,9 @@ import pytest
 from app.command_line.main import MENDABLE, main
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.experiments.explain import explain
-from gelpolight_core.experiments.gathered_light import Surface, gathered
 from gelpolight_core.experiments.true_view import lit_by, true_view
 from gelpolight_core.measurement.score import TrueDepth
+from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.sensor_calibration import Calibration
 from gelpolight_core.session.session import read_session
@@ -81,7 +81,7 @@ def test_a_tilted_facet_sees_its_share_of_an_even_ground() -> None:
     where = np.zeros((nodes, nodes), bool)
     where[middle] = True
     surface = Surface(points, normals, view, np.full_like(points, 0.2))
-    found = gathered(surface, where, LEDS, Membrane(), side)
+    found = gathered(surface, Receivers.on(surface, where), LEDS, Membrane(), side)
     share = 0.5 - 0.5 * np.cos(tilt) - 2.0 / np.pi * np.sin(tilt) * above / 14.0
     assert found[0] / 0.2 == pytest.approx(np.full(3, share), rel=0.02)
 

@@ -69,7 +69,8 @@ def dented(membrane: Membrane, seed: int) -> tuple[ShadedField, Map]:
     ratio = membrane.response(light, normals, view) / membrane.response(light, flat, view)
     ratio = ratio.reshape(ROWS, COLUMNS, 3) * random.normal(1.0, 0.004, (ROWS, COLUMNS, 3))
     around = random.uniform(0.7, 1.2, 3) * np.ones_like(ratio)
-    ratio += membrane.bounce * around * 0.5 * (1.0 + normals[:, 2].reshape(ROWS, COLUMNS, 1))
+    around *= membrane.bounce * 0.5 * (1.0 + normals[:, 2].reshape(ROWS, COLUMNS, 1))
+    ratio += around
     usable = random.random((ROWS, COLUMNS)) > 0.01
     field = ShadedField(
         ratio.astype(np.float32),

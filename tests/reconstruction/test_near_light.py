@@ -84,7 +84,8 @@ def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
     ratio = brightness(place, normals, view, membrane) / brightness(flat, up, view, membrane)
     around = np.full_like(ratio, 1.1)
     around[..., 0] = 0.8
-    ratio = ratio + membrane.bounce * around * (0.5 * (1.0 + normals[..., 2:]))
+    around *= membrane.bounce * 0.5 * (1.0 + normals[..., 2:])
+    ratio = ratio + around
     single = [np.asarray(a, np.float32) for a in (ratio, np.full_like(ratio, SIGMA), around)]
     field = ShadedField(
         single[0],

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.reflectance.membrane import Membrane, bounce_weight
+from gelpolight_core.reflectance.membrane import Membrane
 
 Array = NDArray[np.float64]
 UP = (0.0, 0.0, -1.0)
@@ -166,13 +166,3 @@ def test_each_light_and_point_is_answered_by_itself() -> None:
     for i in (0, 7, 19):
         for k in range(3):
             assert together[i, k] == shown(membrane, light[i, k], normals[i], view[i])
-
-
-@given(tilts)
-def test_light_from_around_grows_from_nothing_on_the_flat_to_half_on_an_upright_wall(
-    tilt: float,
-) -> None:
-    """A plane element tilted by tau sees (1 - cos tau) / 2 of an even ground."""
-    weight = bounce_weight(direction(tilt, 0.7)[None, None])
-    assert weight.shape == (1, 1)
-    assert weight[0, 0] == pytest.approx((1.0 - math.cos(tilt)) / 2.0, abs=1e-12)

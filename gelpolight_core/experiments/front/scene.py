@@ -133,7 +133,7 @@ def calibrated_scene(session: Session, kept: Path, tell: Progress) -> Scene:
         tell(Stage.JOINT.value, len(stages) / (len(stages) + 2))
         # What is written last says that all is there.
         write_calibration(assemble(session, results, model="paper").calibration, files[0])
-        write_calibration(bare_calibration(session, refine_with(results)), files[1])
+        write_calibration(bare_calibration(session, refine_with(session.sensor, results)), files[1])
         write_samples(ball_samples(results), files[2])
     tell("", 1.0)
     paper, full = (read_open_calibration(file) for file in files[:2])

@@ -33,9 +33,9 @@ MODEL_ERROR = 0.03
 
 _B = 64
 # Planes of a block's array: what is read, what is worked with, and what is written.
-_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _KIND = 0, 3, 6, 9, 12, 13, 17
-_SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE = 18, 21, 24, 33, 36
-_TRUST, _FLAG, _MOVED, _PLANES = 38, 39, 40, 41
+_RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND = 0, 3, 6, 9, 12, 13, 17, 21
+_SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE = 22, 25, 28, 37, 40
+_TRUST, _FLAG, _MOVED, _PLANES = 42, 43, 44, 45
 _single = np.float32
 _0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
 _PI = _single(pi)
@@ -161,12 +161,17 @@ def _light(led, x, y, d):  # type: ignore[no-untyped-def]  # pragma: no cover - 
 
 
 @_part
-def _direct_light(ratio, around, sigma, sat, scale, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0)."""
-    direct = ratio if bounce is None else ratio - bounce * around * _HALF * (_1 + nz)
+def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0).
+
+    Where shadows are `judged` by the present surface, a channel is dark where its light is hidden;
+    else where it shows next to no direct light.
+    """
+    direct = ratio if bounce is None else ratio - around
     direct = direct * scale
     low = _most(dark, _least(_SIGMAS * sigma, _SHARE) * scale)
     lit = _1 if direct >= low else _0
+    lit = _1 - hidden if judged > _0 else lit
     if not shadows:
         lit = _1
     return direct, lit, _0 if sat > _0 else lit
@@ -228,13 +233,13 @@ def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignor
 
 
 @_part
-def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight, bend):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return a channel's part of the Gauss-Newton equations along two tangents of n.
 
     The tangents are (-nz, 0, nx) and (0, -nz, ny).
     """
-    d1 = n[0] * (gz + bend) - n[2] * gx
-    d2 = n[1] * (gz + bend) - n[2] * gy
+    d1 = n[0] * gz - n[2] * gx
+    d2 = n[1] * gz - n[2] * gy
     w = weight / ((sigma * sigma + _MODEL2) * scale * scale)
     e = w * (direct - f)
     return w * d1 * d1, w * d1 * d2, w * d2 * d2, d1 * e, d2 * e
@@ -253,17 +258,19 @@ def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cov
 
 
 @_part
-def _channels(w, j, dark, bounce, nz, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _channels(w, j, dark, bounce, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Return what `_direct_light` says of a node's three channels."""
     r0, r1, r2 = _triple(w, _RATIO, j)
     a0, a1, a2 = _triple(w, _AROUND, j)
     g0, g1, g2 = _triple(w, _NOISE, j)
     b0, b1, b2 = _triple(w, _MARKS, j)
+    h0, h1, h2 = _triple(w, _HIDDEN, j)
     s0, s1, s2 = _triple(w, _SCALED, j)
+    judged = w[(_HIDDEN + 3) * _B + j]
     return (
-        _direct_light(r0, a0, g0, b0, s0, dark[0], bounce, nz, shadows),
-        _direct_light(r1, a1, g1, b1, s1, dark[1], bounce, nz, shadows),
-        _direct_light(r2, a2, g2, b2, s2, dark[2], bounce, nz, shadows),
+        _direct_light(r0, a0, g0, b0, h0, judged, s0, dark[0], bounce, shadows),
+        _direct_light(r1, a1, g1, b1, h1, judged, s1, dark[1], bounce, shadows),
+        _direct_light(r2, a2, g2, b2, h2, judged, s2, dark[2], bounce, shadows),
     )
 
 
@@ -286,7 +293,7 @@ def _begin_block(w, rays, position, leds, dark, curves, table, gloss, bounce, sh
         l2, near2 = _light(leds[2], x, y + d * wy, d)
         s0, s1, s2 = _triple(w, _SCALE, j)
         _put(w, _SCALED, j, (s0 * near0, s1 * near1, s2 * near2))
-        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, bounce, -_1, shadows)
+        (d0, _, k0), (d1, _, k1), (d2, _, k2) = _channels(w, j, dark, bounce, shadows)
         f0 = _response(l0, flat, v, curves[0], table, gloss, 0)[0]
         f1 = _response(l1, flat, v, curves[1], table, gloss, 1)[0]
         f2 = _response(l2, flat, v, curves[2], table, gloss, 2)[0]
@@ -296,7 +303,7 @@ def _begin_block(w, rays, position, leds, dark, curves, table, gloss, bounce, sh
         b0, b1, b2 = _triple(w, _MARKS, j)
         nx, ny, nz = _start(l0, l1, l2, e0, e1, e2, k0, k1, k2, b0, b1, b2)
         px, py = w[_NORMAL * _B + j], w[(_NORMAL + 1) * _B + j]
-        on = warm * (k0 + k1 + k2) > _single(2.5)
+        on = warm * (k0 + k1 + k2 + w[(_HIDDEN + 3) * _B + j]) > _single(2.5)
         pz = -sqrt(_most(_1 - px * px - py * py, _TINY))
         _put(w, _NORMAL, j, (px if on else nx, py if on else ny, pz if on else nz))
         _put(w, _LIGHT, j, l0)
@@ -310,20 +317,15 @@ def _step_block(w, dark, curves, table, gloss, bounce, shadows):  # type: ignore
     """Do one Gauss-Newton step at a block's nodes; return the square of the longest."""
     for j in range(_B):
         n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
-        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, bounce, n[2], shadows)
+        (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, bounce, shadows)
         s0, s1, s2 = _triple(w, _SCALED, j)
         g0, g1, g2 = _triple(w, _NOISE, j)
-        b0, b1, b2 = _0, _0, _0
-        if bounce is not None:
-            half = bounce * _HALF
-            a0, a1, a2 = _triple(w, _AROUND, j)
-            b0, b1, b2 = half * a0 * s0, half * a1 * s1, half * a2 * s2
         f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)
-        a11, a12, a22, ag1, ag2 = _pull(f, gx, gy, gz, n, t0, s0, g0, k0, b0)
+        a11, a12, a22, ag1, ag2 = _pull(f, gx, gy, gz, n, t0, s0, g0, k0)
         f, gx, gy, gz = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)
-        b11, b12, b22, bg1, bg2 = _pull(f, gx, gy, gz, n, t1, s1, g1, k1, b1)
+        b11, b12, b22, bg1, bg2 = _pull(f, gx, gy, gz, n, t1, s1, g1, k1)
         f, gx, gy, gz = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)
-        c11, c12, c22, cg1, cg2 = _pull(f, gx, gy, gz, n, t2, s2, g2, k2, b2)
+        c11, c12, c22, cg1, cg2 = _pull(f, gx, gy, gz, n, t2, s2, g2, k2)
         m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
         h1, h2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
         damp = _DAMP * (m11 + m22) + _TINY
@@ -359,8 +361,7 @@ def _end_block(w, rays, dark, bounce, coverage, shadows):  # type: ignore[no-unt
         d, at = w[_DEPTH * _B + j], _single(j)
         wx, wy = rays[0] + at * rays[1], rays[2] + at * rays[3]
         n = _triple(w, _NORMAL, j)
-        # What is dark is judged with the light from around that the normal found receives.
-        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, bounce, n[2], shadows)
+        (_, lit0, k0), (_, lit1, k1), (_, lit2, k2) = _channels(w, j, dark, bounce, shadows)
         known = k0 + k1 + k2
         solved = known > _single(1.5)
         nx, ny, nz = n[0] if solved else _0, n[1] if solved else _0, n[2] if solved else -_1
@@ -465,6 +466,10 @@ def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # typ
         w[(_MARKS + 1) * _B + j] = _single((bits >> 1) & 1)
         w[(_MARKS + 2) * _B + j] = _single((bits >> 2) & 1)
         w[(_MARKS + 3) * _B + j] = _single((bits >> 3) & 1)
+        w[_HIDDEN * _B + j] = _single((bits >> 4) & 1)
+        w[(_HIDDEN + 1) * _B + j] = _single((bits >> 5) & 1)
+        w[(_HIDDEN + 2) * _B + j] = _single((bits >> 6) & 1)
+        w[(_HIDDEN + 3) * _B + j] = _single((bits >> 7) & 1)
         w[_KIND * _B + j] = _single(kind[row, position + j])
     if warm:
         for j in range(count):

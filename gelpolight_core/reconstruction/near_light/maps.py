@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 
 from gelpolight_core.image.response import CameraResponse
+from gelpolight_core.lights.positions import light_directions
 from gelpolight_core.masks import DARK_COSINE, usable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
 from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers, Scale
+from gelpolight_core.reflectance.gathered_light import Slab, returned_to_flat
 from gelpolight_core.reflectance.membrane import CURVE_NODES, Membrane
+from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 
 Array = NDArray[np.float64]
@@ -73,6 +76,11 @@ class SensorMaps:
         """Membrane and lights."""
         return membrane_numbers(self.full, self.calibration.reflectance.coverage)
 
+    @property
+    def slab(self) -> Slab:
+        """What is below the membrane."""
+        return Slab.of(self.calibration.stack)
+
     @cached_property
     def _scales(self) -> dict[int, Scale]:
         return {}
@@ -86,6 +94,17 @@ class SensorMaps:
         if factor not in self._scales:
             self._scales[factor] = self._made(factor)
         return self._scales[factor]
+
+    @cached_property
+    def returned(self) -> Map:
+        """Share of the background that the lower face returns, (3, rows, columns), coarsest."""
+        scale = self.scale(COARSE)
+        y, x = (
+            first + scale.pitch_mm * np.arange(n)
+            for first, n in zip((scale.y_mm, scale.x_mm), scale.kind.shape, strict=True)
+        )
+        direct = _flat_brightness(self.full, x, y, scale.rays[:2].astype(np.float64))
+        return np.asarray(1.0 - direct / scale.flat, np.float32)
 
     @cached_property
     def rim_distance_mm(self) -> Map:
@@ -113,7 +132,7 @@ class SensorMaps:
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
             return Scale(*position, flat, kind, coarse.rays, factor / COARSE)
         ray_slope = np.moveaxis(block_average(self.calibration.table.ray_slope, factor), -1, 0)
-        return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor)
+        return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor, slab=self.slab)
 
 
 def sensor_scale(
@@ -123,6 +142,7 @@ def sensor_scale(
     kind: Any,
     *,
     factor: int,
+    slab: Slab | None = None,
 ) -> Scale:
     """Return a scale with ray maps of its own.
 
@@ -138,6 +158,8 @@ def sensor_scale(
         As in :class:`Scale`.
     factor : int
         As in :class:`Scale`.
+    slab : Slab, optional
+        What is below the membrane and returns light.
     """
     x, y = axes_mm
     pitch = float(x[1] - x[0])
@@ -147,7 +169,7 @@ def sensor_scale(
     for position, axis in ((2, 1), (4, 0)):
         for k in range(2):
             rays[position + k] = np.gradient(whole[k], pitch, axis=axis)
-    flat = _flat_brightness(full, x, y, whole)
+    flat = _flat_brightness(full, x, y, whole, slab, kind == 2)
     return Scale(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0)
 
 
@@ -244,18 +266,37 @@ def _whole(ray_slope: Array, x_mm: Array, y_mm: Array) -> Array:
     return np.asarray(np.where(known, ray_slope, np.moveaxis(terms @ plane, -1, 0)))
 
 
-def _flat_brightness(full: FullModel, x: Array, y: Array, ray_slope: Array) -> Map:
-    """Return `Scale.flat`."""
-    rows, columns = y.size, x.size
-    view = np.stack([*ray_slope, np.full((rows, columns), -1.0)], axis=-1).reshape(-1, 3)
-    view /= np.linalg.norm(view, axis=-1, keepdims=True)
-    up = np.tile([0.0, 0.0, -1.0], (rows * columns, 1))
-    points = np.stack([*np.meshgrid(x, y), np.zeros((rows, columns))], axis=-1).reshape(-1, 3)
-    to_led = full.led_positions_mm[None] - points[:, None]
-    distance = np.linalg.norm(to_led, axis=-1)
-    response = full.membrane.response(to_led / distance[..., None], up, view)
-    strength = response * to_led[..., 2] / distance**3
-    return np.ascontiguousarray(strength.T.reshape(3, rows, columns), np.float32)
+def _flat_brightness(
+    full: FullModel,
+    x: Array,
+    y: Array,
+    ray_slope: Array,
+    slab: Slab | None = None,
+    usable: Mask | None = None,
+) -> Map:
+    """Return `Scale.flat`; only a slab, and the membrane where it is usable, return light."""
+    shape, membrane = (y.size, x.size), full.membrane
+    view = view_directions(np.moveaxis(ray_slope, 0, -1))
+    up = np.tile([0.0, 0.0, -1.0], (y.size * x.size, 1))
+    points = np.stack([*np.meshgrid(x, y), np.zeros(shape)], axis=-1)
+    light, distance = light_directions(full.led_positions_mm, points.reshape(-1, 3))
+    response = membrane.response(light, up, view.reshape(-1, 3))
+    direct = (response * light[..., 2] / distance**2).reshape(*shape, 3)
+    flat = direct
+    if slab is not None and usable is not None and membrane.bounce > LEAST_SHARE:
+        pitch = float(x[1] - x[0])
+        for _ in range(2):
+            more = returned_to_flat(
+                -flat * usable[..., None],
+                points,
+                view,
+                full.led_positions_mm,
+                membrane,
+                pitch,
+                slab,
+            )
+            flat = direct - membrane.bounce * more
+    return np.ascontiguousarray(np.moveaxis(flat, -1, 0), np.float32)
 
 
 def block_average(values: NDArray[Any], factor: int) -> Map:

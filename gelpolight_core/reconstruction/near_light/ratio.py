@@ -99,11 +99,10 @@ class PressSampler:
         while at < COARSE:
             at *= 2
             coarse = self._halved(coarse, f"at {at}")
+        fine = coarse if factor == COARSE else sampled
         if self.maps.membrane.bounce is not None:
-            coarse = coarse._replace(around=self._around(coarse.ratio))
-        if factor == COARSE:
-            return Compared(coarse, coarse, None)
-        fine = sampled._replace(around=self._enlarged_around(coarse.around, sampled.marks.shape))
+            coarse = self._as_if_flat(coarse, region, "coarse")
+            fine = self._as_if_flat(fine, region, "fine")
         return Compared(fine, coarse, edge)
 
     def _noise(self, factor: int) -> tuple[np.float32, ...]:
@@ -148,27 +147,14 @@ class PressSampler:
         self._workers.run(rows // 2, halve, fine, coarse)
         return coarse
 
-    def _around(self, ratio: Map) -> Map:
-        """Return press over background, averaged over the neighbourhood; as `neighbourhood`."""
-        reach = self.maps.full.membrane.bounce_reach_mm / self.maps.scale(COARSE).pitch_mm
-        factor = max(int(reach / 4.0), 1)
-        rows, columns = ratio.shape[1:]
-        size = (max(columns // factor, 1), max(rows // factor, 1))
-        result = self._take("coarse around", ratio.shape)
+    def _as_if_flat(self, image: RatioImage, region: Region, name: str) -> RatioImage:
+        """Return an image with the light that a flat membrane receives from around."""
+        (top, left), (rows, columns) = region.at(1)
+        around = self._take(f"around {name}", image.ratio.shape)
         for k in range(3):
-            known = np.clip(ratio[k], 0.0, 4.0)
-            small = cv2.resize(known, size, interpolation=cv2.INTER_AREA)
-            small = cv2.GaussianBlur(small, (0, 0), reach / factor)
-            cv2.resize(small, (columns, rows), result[k])
-        return result
-
-    def _enlarged_around(self, around: Map, shape: tuple[int, int]) -> Map:
-        if around.shape[2] == 1:
-            return around
-        result = self._take("around", (3, *shape))
-        for k in range(3):
-            cv2.resize(around[k], shape[::-1], result[k])
-        return result
+            share = self.maps.returned[k, top : top + rows, left : left + columns]
+            cv2.resize(share, image.marks.shape[::-1], around[k])
+        return image._replace(around=around)
 
     def levels(self, dtype: np.dtype[Any], linear: bool) -> Map:
         """Return the linear light (3, levels) of every number of an image."""

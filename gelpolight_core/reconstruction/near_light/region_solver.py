@@ -19,6 +19,11 @@ from gelpolight_core.reconstruction.near_light.boundary import (
     find_boundary,
     region_strips,
 )
+from gelpolight_core.reconstruction.near_light.from_around import (
+    FromAround,
+    surface_normals,
+    with_surroundings,
+)
 from gelpolight_core.reconstruction.near_light.kernel import UNSOLVED_WEIGHT, solve_rows
 from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps
 from gelpolight_core.reconstruction.near_light.ratio import Compared
@@ -44,6 +49,8 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 FREE = 1e-4
 """How firmly the border is held where a contact crosses it."""
+STEEP_ROUNDS = 2
+"""Rounds with a membrane that absorbs nothing."""
 THIN = 2
 """Along both axes, of the nodes whose unsolved ones are counted."""
 
@@ -99,11 +106,15 @@ class Start(NamedTuple):
         x and y of the last normals; None where no round was done.
     boundary : Boundary
         Where depth 0 is held.
+    around : 2 of (3, rows, columns) float32, or None
+        Light from around and clearance of the lights; None where the membrane gives no light to
+        itself.
     """
 
     depth_mm: Map
     normals: tuple[Map, Map] | None
     boundary: Boundary
+    around: tuple[Map, Map] | None = None
 
 
 class Weighted(NamedTuple):
@@ -132,33 +143,31 @@ class RegionSolver:
         self._workers = workers
         self._take = buffers.take
         self._longest_mm = longest_step_mm(maps.full)
+        self._from_around = FromAround(maps, workers)
 
     def rounds(
         self, region: Region, compared: Compared, settings: Settings, terms: Terms
     ) -> tuple[Rounds, Start]:
-        """Return the rounds at the coarsest scale, and from where the last round starts."""
-        scale, corner = self.maps.scale(COARSE), region.corner
+        """Return the rounds at the coarsest scale, and from where the last round starts.
+
+        On a membrane that throws light onto itself, rounds follow that reckon with it.
+        """
+        at = (self.maps.scale(COARSE), region.corner)
+        thrown = self.maps.membrane.bounce is not None
         normals: tuple[Map, Map] | None = None
         boundary = None if terms.free_rim and terms.weights else Boundary()
         tolerances = list(settings.round_tolerances)
 
         def solve(depth: Map) -> Map:
             nonlocal normals, boundary
-            slopes = self.slopes((scale, corner), compared.coarse, depth, settings, terms, normals)
+            slopes = self.slopes(at, compared.coarse, depth, settings, terms, normals)
             normals = slopes.normal_x, slopes.normal_y
             tolerance = tolerances.pop(0) if len(tolerances) > 1 else tolerances[0]
-
-            def integrated(free: Mask | None, tolerance: float = tolerance) -> Map:
-                weighted = _weighted(scale, corner, slopes, free)
-                return self._integrated(scale, weighted, depth, tolerance, terms).depth_mm
-
-            if boundary is not None:
-                return boundary.levelled(integrated(boundary.free))
-            held = integrated(None)
-            strips = region_strips(self.maps.rim_distance_mm, region, scale.pitch_mm)
-            fine = partial(integrated, tolerance=settings.round_tolerances[-1])
-            boundary = find_boundary(held, strips, fine, scale.pitch_mm)
-            return held if boundary.free is None else boundary.levelled(integrated(boundary.free))
+            # Walls that light from around makes too flat say nothing of the boundary.
+            known = Boundary() if thrown else boundary
+            found, known = self._bounded(region, slopes, depth, known, (tolerance, settings, terms))
+            boundary = boundary if thrown else known
+            return found
 
         rounds = near_light_rounds(
             solve,
@@ -167,7 +176,70 @@ class RegionSolver:
             wanted=terms.near_light_rounds,
             shallow_mm=settings.shallow_mm,
         )
+        if thrown and normals is not None:
+            surface = (rounds.depth_mm, *normals)
+            return rounds, self._with_around(region, compared, surface, boundary, settings, terms)
         return rounds, Start(rounds.depth_mm, normals, boundary or Boundary())
+
+    def _bounded(
+        self,
+        region: Region,
+        slopes: Slopes,
+        depth: Map,
+        boundary: Boundary | None,
+        how: tuple[float, Settings, Terms],
+    ) -> tuple[Map, Boundary]:
+        """Integrate a coarse round; find out where depth 0 is held, unless that is known."""
+        scale, (tolerance, settings, terms) = self.maps.scale(COARSE), how
+
+        def integrated(free: Mask | None, tolerance: float = tolerance) -> Map:
+            weighted = _weighted(scale, region.corner, slopes, free)
+            return self._integrated(scale, weighted, depth, tolerance, terms).depth_mm
+
+        if boundary is not None:
+            return boundary.levelled(integrated(boundary.free)), boundary
+        held = integrated(None)
+        strips = region_strips(self.maps.rim_distance_mm, region, scale.pitch_mm)
+        fine = partial(integrated, tolerance=settings.round_tolerances[-1])
+        boundary = find_boundary(held, strips, fine, scale.pitch_mm)
+        found = held if boundary.free is None else boundary.levelled(integrated(boundary.free))
+        return found, boundary
+
+    def _with_around(
+        self,
+        region: Region,
+        compared: Compared,
+        surface: tuple[Map, Map, Map],
+        boundary: Boundary | None,
+        settings: Settings,
+        terms: Terms,
+    ) -> Start:
+        """Return a start whose light from around and whose shadows are those of its surface.
+
+        What the surface throws onto itself makes walls look flatter, and flatter walls throw less.
+        The first rounds therefore reckon with a membrane that absorbs nothing, and the others come
+        from walls that are too steep.
+        """
+        scale, (top, left), (rows, columns) = self.maps.scale(COARSE), *region.at(1)
+        at = np.s_[top : top + rows, left : left + columns]
+        depth, own = surface[0], self.maps.full.membrane.bounce
+        how = (settings.round_tolerances[-1], settings, terms)
+        for number in range(settings.around_rounds):
+            steep = number < STEEP_ROUNDS
+            around = self._from_around.on(
+                region, compared.coarse, surface, max(own, 1.0) if steep else own
+            )
+            begin = surface_normals(depth, at, scale.rays[:2], scale.pitch_mm)
+            image = with_surroundings(compared.coarse, *around)
+            slopes = self.slopes((scale, (top, left)), image, depth, settings, terms, begin)
+            known = Boundary() if steep else boundary
+            found, known = self._bounded(region, slopes, depth, known, how)
+            boundary = boundary if steep else known
+            depth = held_back(depth, found, self._longest_mm).copy()
+            surface = (depth, slopes.normal_x.copy(), slopes.normal_y.copy())
+        around = self._from_around.on(region, compared.coarse, surface, own)
+        begin = surface_normals(depth, at, scale.rays[:2], scale.pitch_mm)
+        return Start(depth, begin, boundary or Boundary(), around)
 
     def last_slopes(
         self,
@@ -176,29 +248,31 @@ class RegionSolver:
         start: Start,
         settings: Settings,
         terms: Terms,
-    ) -> tuple[Map, Slopes]:
+    ) -> tuple[Compared, Map, Slopes]:
         """Solve at the scale of the settings, from depth and normals of the coarsest one.
 
-        Returns the depth at which the slopes were solved, and the slopes.
+        Returns what was solved, with light from around; the depth at which, and the slopes.
         """
         corner, shape = region.at(COARSE // settings.factor)
         depth = _enlarged(start.depth_mm, shape)
         known = start.normals
         normals = None if known is None else tuple(_enlarged(n, shape) for n in known)
         at = (self.maps.scale(settings.factor), corner)
-        return depth, self.slopes(at, compared.fine, depth, settings, terms, normals)
+        if start.around is not None:
+            compared = compared._replace(fine=with_surroundings(compared.fine, *start.around))
+        slopes = self.slopes(at, compared.fine, depth, settings, terms, normals)
+        return compared, depth, slopes
 
     def last_depth(
         self,
         region: Region,
-        compared: Compared,
-        solved: tuple[Map, Slopes],
+        solved: tuple[Compared, Map, Slopes],
         boundary: Boundary,
         settings: Settings,
         terms: Terms,
     ) -> Solved:
         """Integrate what :meth:`last_slopes` has returned."""
-        (depth, slopes), scale = solved, self.maps.scale(settings.factor)
+        (compared, depth, slopes), scale = solved, self.maps.scale(settings.factor)
         corner, shape = region.at(COARSE // settings.factor)
         weighted = _weighted(scale, corner, slopes, boundary.free)
         found = self._integrated(scale, weighted, depth, settings.tolerance, terms)

@@ -24,6 +24,8 @@ class Settings:
         Gauss-Newton steps of a block of nodes, at most.
     settled : float
         Length of the step below which a block of nodes is done.
+    around_rounds : int
+        Rounds at the coarsest scale with the light that the membrane throws onto itself.
     shallow_mm : float
         Depth up to which one near-light round is enough: a second one moves the surface by about
         twice its depth squared over the lights' height, here by less than half a micrometre.
@@ -34,6 +36,7 @@ class Settings:
     tolerance: float = 1e-3
     steps: int = 4
     settled: float = 3e-3
+    around_rounds: int = 6
     shallow_mm: float = 0.05
 
 

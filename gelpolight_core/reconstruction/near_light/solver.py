@@ -292,7 +292,7 @@ class NearLightSolver:
             found = self._sampler.compare(
                 raw, region, factor=COARSE, linear=linear, terms=ALL_TERMS
             )
-            return self._solver.rounds(region, found, self._settings["best"], ALL_TERMS)[0].depth_mm
+            return self._solver.rounds(region, found, self._settings["best"], ALL_TERMS)[1].depth_mm
 
     def _depth(
         self, image: Image, region: Region | None, wanted: Wanted, record: TraceRecorder
@@ -389,9 +389,7 @@ class NearLightSolver:
             weighted = self._solver.last_slopes(region, found, start, settings, terms)
             reason.append(tr("from the depth at quarter scale"))
         with record.done(INTEGRATION, 5 * nodes * 4) as reason:
-            solved = self._solver.last_depth(
-                region, found, weighted, start.boundary, settings, terms
-            )
+            solved = self._solver.last_depth(region, weighted, start.boundary, settings, terms)
             reason.append(
                 tr("conjugate gradients, rounds: {n}").format(n=solved.integration_rounds)
             )
@@ -424,6 +422,10 @@ class NearLightSolver:
             rounds, start = self._solver.rounds(region, found, settings, terms)
             count, deepest = len(rounds.changes_mm), float(rounds.depth_mm.max())
             reason.append(tr("rounds: {n}; {d:.2f} mm deep").format(n=count, d=deepest))
+            if start.around is not None:
+                reason.append(
+                    tr("{n} more with light from around").format(n=settings.around_rounds)
+                )
             if start.boundary.free is not None:
                 reason.append(tr("a contact crosses the boundary, which is free there"))
         return found, rounds, start

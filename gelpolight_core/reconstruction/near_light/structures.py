@@ -11,6 +11,9 @@ Map = NDArray[np.float32]
 Triple = tuple[float, float, float]
 NOT_FINITE = 8
 """Bit of `RatioImage.marks`: a pixel was not a finite number."""
+HIDDEN, JUDGED = 16, 128
+"""Bits of `RatioImage.marks`: first of three that say that a light is hidden by the present
+surface, and the one that says that this is known; else a light is dark that shows no light."""
 
 
 class RatioImage(NamedTuple):
@@ -19,10 +22,10 @@ class RatioImage(NamedTuple):
     Attributes
     ----------
     ratio, noise, around : (3, rows, columns) float32
-        Press over background, its standard deviation, and its average over the neighbourhood
-        (``around`` is (3, 1, 1) where the membrane gives no light to itself).
+        Press over background, its standard deviation, and the part of it that comes from other
+        parts of the membrane (``around`` is (3, 1, 1) where it gives no light to itself).
     marks : (rows, columns) uint8
-        Bits 0 to 2: the channel is saturated; `NOT_FINITE`.
+        Bits 0 to 2: the channel is saturated; `NOT_FINITE`; `HIDDEN` and `JUDGED`.
     """
 
     ratio: Map
@@ -78,7 +81,7 @@ class MembraneNumbers(NamedTuple):
     gloss : 2, or None
         Share and squared roughness of the glossy lobe.
     bounce : float or None
-        Share of the light from the surroundings (interreflection).
+        Reflectance for light from other parts of the membrane; None: it gives none.
     coverage : 3 x 2
         Cosines of each light that the ball presses have shown.
     """

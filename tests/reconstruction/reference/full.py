@@ -13,7 +13,6 @@ from reference.placement import place_on_grid, resample
 from reference.weighted import integrate_weighted
 from scipy.ndimage import binary_fill_holes
 
-from gelpolight_core.calibration.ball_pixels import neighbourhood
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 
@@ -94,7 +93,7 @@ def shaded_field(
     return ShadedField(
         ratio,
         sigma,
-        neighbourhood(ratio, usable, grid.pitch_mm, full.membrane.bounce_reach_mm),
+        np.zeros_like(ratio),  # the oracle is for membranes that give no light to themselves
         missing,
         usable,
         np.asarray(binary_fill_holes(usable)),

@@ -31,7 +31,7 @@ class ShadedField:
     Attributes
     ----------
     ratio, sigma, around : (rows, columns, 3) float32
-        Press over background, its standard deviation, and its average in the neighbourhood.
+        Press over background, its standard deviation, and the light from around in it.
     saturated : (rows, columns, 3) bool
         Channels that are saturated.
     usable : (rows, columns) bool
@@ -109,9 +109,7 @@ def solve_near_light(
     slope_x, slope_y, weight = (np.zeros(shape, np.float32) for _ in range(3))
     normals = np.zeros((*shape, 3), np.float32)
     flags = np.zeros(shape, np.uint8)
-    shape_of = np.array(
-        [membrane.exponent, membrane.gloss, membrane.roughness, membrane.bounce], np.float64
-    )
+    shape_of = np.array([membrane.exponent, membrane.gloss, membrane.roughness], np.float64)
     curves = membrane.curves if membrane.diffuse else None
     dark = np.ascontiguousarray(dark_brightness(membrane))
     depth = np.ascontiguousarray(depth_mm, np.float32)

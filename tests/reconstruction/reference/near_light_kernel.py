@@ -206,8 +206,7 @@ def solve_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             for step in range(8):
                 missing_count, missing, side = 0, -1, 0
                 for k in range(3):
-                    bounce = shape[3] * around[i, j, k] * 0.5 * (1.0 + nz)
-                    direct[k] = (ratio[i, j, k] - bounce) * scale[k]
+                    direct[k] = (ratio[i, j, k] - around[i, j, k]) * scale[k]
                     spread[k] = sqrt(sigma[i, j, k] ** 2 + MODEL_ERROR**2) * scale[k]
                     low = max(dark[k], min(DARK_SIGMAS * sigma[i, j, k], DARK_SHARE) * scale[k])
                     out[k] = 0

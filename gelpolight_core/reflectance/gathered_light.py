@@ -1,21 +1,25 @@
-"""Light from one part of the membrane to another, gathered over a known surface.
+"""Light from one part of the membrane to another, gathered over a given surface.
 
 Each facet of the surface sends out what the camera sees of it, turned into the other direction by
 the glossy lobe. A point receives all facets through its own response, so that light that one wall
 throws onto another is counted with its direction. What the camera sees holds all earlier
 reflections and all shadows, so that one gathering is enough. The diffuse share is Lambertian.
+What the elastomer's lower face returns (Fresnel, and totally beyond the critical angle) comes from
+the facets' mirror images in it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.optics.refraction import LayerStack
 from gelpolight_core.reflectance.membrane import Membrane
 from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
 
@@ -33,9 +37,33 @@ _LEAST_VIEW = _single(LEAST_VIEW)
 _TINY = _single(1e-6)
 _POINT, _NORMAL, _AREA, _LIGHT = 0, 3, 6, 7
 _PLANES = 25
+_DOWN = (_POINT + 2, _NORMAL + 2, _LIGHT + 2, _LIGHT + 8, _LIGHT + 14)
+"""Planes of z components, which a mirror image has reversed."""
 
 _part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
 _whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+
+
+class Slab(NamedTuple):
+    """What is between the membrane and the air below it.
+
+    Attributes
+    ----------
+    thickness_mm : float
+        As if it were all elastomer.
+    refractive_index : float
+        Refractive index of the elastomer.
+    """
+
+    thickness_mm: float
+    refractive_index: float
+
+    @classmethod
+    def of(cls, stack: LayerStack) -> Slab:
+        """Return the slab of a sensor's layers, of which the first is air."""
+        layers = list(zip(stack.thicknesses_mm, stack.indices, strict=True))[1:]
+        index = stack.indices[-1]
+        return cls(sum(t * index / n for t, n in layers), index)
 
 
 class Surface(NamedTuple):
@@ -54,6 +82,29 @@ class Surface(NamedTuple):
     normals: NDArray[np.floating]
     view: NDArray[np.floating]
     seen: NDArray[np.floating]
+
+
+class Receivers(NamedTuple):
+    """Points that receive light.
+
+    Attributes
+    ----------
+    points_mm, normals, view : (N, 3)
+        Sensor frame; unit normals, and unit directions to the camera.
+    place : (N, 2)
+        Row and column of the facet that is next.
+    """
+
+    points_mm: NDArray[np.floating]
+    normals: NDArray[np.floating]
+    view: NDArray[np.floating]
+    place: NDArray[Any]
+
+    @classmethod
+    def on(cls, surface: Surface, where: NDArray[np.bool_]) -> Receivers:
+        """Return some (rows, columns) of a surface's own facets."""
+        place = np.stack(np.nonzero(where), axis=-1)
+        return cls(surface.points_mm[where], surface.normals[where], surface.view[where], place)
 
 
 def facets(
@@ -105,12 +156,15 @@ def facets(
 
 def gathered(
     surface: Surface,
-    where: NDArray[np.bool_],
+    at: Receivers,
     leds_mm: NDArray[np.float64],
     membrane: Membrane,
     side_mm: float,
+    *,
+    slab: Slab | None = None,
+    run: Callable[..., None] | None = None,
 ) -> Map:
-    """Return what some facets receive of all others, to the camera, (N, 3) as `Surface.seen`.
+    """Return what points receive of a surface, to the camera, (N, 3) as `Surface.seen`.
 
     The membrane absorbs nothing; multiply by its reflectance.
 
@@ -118,25 +172,79 @@ def gathered(
     ----------
     surface : Surface
         Facets of the whole field; what is beyond whole multiples of `WIDE` squared is left out.
-    where : (rows, columns) bool
-        The facets for which it is wanted.
+    at : Receivers
+        The points.
     leds_mm : (3, 3)
         Sensor frame.
     membrane : Membrane
         Its glossy lobe.
     side_mm : float
         Distance between facets.
+    slab : Slab, optional
+        Its lower face returns light; by default none does.
+    run : callable, optional
+        Calls a compiled function over parts of the points, as `RowWorkers.run` does; by default
+        one thread does all.
     """
     near = facets(surface, leds_mm, membrane, side_mm)
     wide = widened(surface)
     middle = facets(wide, leds_mm, membrane, WIDE * side_mm)
     far = facets(widened(wide), leds_mm, membrane, WIDE**2 * side_mm)
-    position = np.stack(np.nonzero(where), axis=-1)
-    at = np.concatenate([*(part[where] for part in surface[:3]), position], -1).astype(np.float32)
-    result = np.empty((len(at), 3), np.float32)
+    points = np.concatenate(at, axis=-1).astype(np.float32)
+    result = np.empty((len(points), 3), np.float32)
     gloss = (_single(membrane.gloss), _single(membrane.roughness**2)) if membrane.gloss else None
-    gather_rows(0, len(at), at, near, middle, far, gloss, result)
+    mirrored, index2 = far, _0
+    if slab is not None:
+        mirrored, index2 = _mirrored(far, slab.thickness_mm), _single(slab.refractive_index**2)
+    fields = (near, middle, far, mirrored)
+    if run is None:
+        gather_rows(0, len(points), points, fields, gloss, index2, result)
+    else:
+        run(len(points), gather_rows, points, fields, gloss, index2, result)
     return result
+
+
+def _mirrored(sent: Map, depth_mm: float) -> Map:
+    """Return the mirror images of facets in a face so far below the membrane."""
+    image = sent.copy()
+    image[list(_DOWN)] *= -1.0
+    image[_POINT + 2] -= _single(2.0 * depth_mm)
+    return image
+
+
+def returned_to_flat(
+    flat: NDArray[np.floating],
+    points_mm: NDArray[np.floating],
+    view: NDArray[np.floating],
+    leds_mm: NDArray[np.float64],
+    membrane: Membrane,
+    side_mm: float,
+    slab: Slab,
+) -> Map:
+    """Return what the flat membrane receives by the lower face, (rows, columns, 3) as `flat`.
+
+    The membrane absorbs nothing. It changes slowly, and is computed on some of the facets.
+
+    Parameters
+    ----------
+    flat : (rows, columns, 3)
+        Light of the flat membrane to the camera, as `Surface.seen`.
+    points_mm, view, leds_mm, membrane, side_mm, slab
+        As in :func:`gathered`.
+    """
+    rows, columns = flat.shape[:2]
+    up = np.zeros_like(view)
+    up[..., 2] = -1.0
+    surface = Surface(points_mm, up, view, flat)
+    step = 2 * WIDE
+    where = np.zeros((rows, columns), bool)
+    where[::step, ::step] = True
+    some = gathered(surface, Receivers.on(surface, where), leds_mm, membrane, side_mm, slab=slab)
+    some = some.reshape(-(-rows // step), -(-columns // step), 3)
+    at = np.meshgrid(*(np.arange(n, dtype=np.float32) / step for n in (columns, rows)))
+    return np.asarray(
+        cv2.remap(some, at[0], at[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    )
 
 
 def widened(surface: Surface) -> Surface:
@@ -221,21 +329,49 @@ def _window(row, column):  # type: ignore[no-untyped-def]  # pragma: no cover - 
     return row - NEAR, row + NEAR + 1, column - NEAR, column + NEAR + 1
 
 
+@_part
+def _returned_share(up, index2):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return what the lower face returns of light at an angle of cosine `up` to its normal."""
+    out2 = _1 - index2 * (_1 - up * up)
+    out = sqrt(out2 if out2 > _0 else _0)
+    index = sqrt(index2)
+    across = (index * up - out) / (index * up + out)
+    along = (index * out - up) / (index * out + up)
+    return _HALF * (across * across + along * along)
+
+
+@_part
+def _returned(sent, index2, p, n, v, s, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return what a point receives of the facets' mirror images."""
+    r_sum, g_sum, b_sum = _0, _0, _0
+    for i in range(sent.shape[1]):
+        for j in range(sent.shape[2]):
+            dx, dy, dz = sent[0, i, j] - p[0], sent[1, i, j] - p[1], sent[2, i, j] - p[2]
+            share = _returned_share(-dz / sqrt(dx * dx + dy * dy + dz * dz), index2)
+            r, g, b = _gather(sent, i, j, j + 1, p, n, v, s, gloss)
+            r_sum, g_sum, b_sum = r_sum + share * r, g_sum + share * g, b_sum + share * b
+    return r_sum, g_sum, b_sum
+
+
 @_whole
-def gather_rows(first, last, at, near, middle, far, gloss, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def gather_rows(first, last, at, fields, gloss, index2, result):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Gather what points receive, points `first` to `last`.
 
     Parameters
     ----------
     at : (points, 11) float32
         Point, normal, view, and its row and column among the facets of the field.
-    near, middle, far : (planes, rows, columns) float32
-        Facets, wide and widest facets of the whole field, from :func:`facets`.
+    fields : 4 of (planes, rows, columns) float32
+        Facets, wide and widest facets of the whole field, from :func:`facets`, and the widest
+        ones' mirror images in the lower face.
     gloss : (float, float) or None
         Share and squared roughness of the lobe.
+    index2 : float
+        Square of the elastomer's refractive index; 0 where no face returns light.
     result : (points, 3) float32
         Written: light to the camera, in the facets' unit.
     """
+    near, middle, far, mirrored = fields
     everywhere = (0, far.shape[1], 0, far.shape[2])
     for m in range(first, last):
         p, n = (at[m, 0], at[m, 1], at[m, 2]), (at[m, 3], at[m, 4], at[m, 5])
@@ -250,4 +386,8 @@ def gather_rows(first, last, at, near, middle, far, gloss, result):  # type: ign
         r0, g0, b0 = _around(near, own, (0, 0, 0, 0), p, n, v, s, gloss)
         r1, g1, b1 = _around(middle, mid, a, p, n, v, s, gloss)
         r2, g2, b2 = _around(far, everywhere, b, p, n, v, s, gloss)
-        result[m, 0], result[m, 1], result[m, 2] = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
+        r0, g0, b0 = r0 + r1 + r2, g0 + g1 + g2, b0 + b1 + b2
+        if index2 > _0:
+            r1, g1, b1 = _returned(mirrored, index2, p, n, v, s, gloss)
+            r0, g0, b0 = r0 + r1, g0 + g1, b0 + b1
+        result[m, 0], result[m, 1], result[m, 2] = r0, g0, b0

@@ -1,0 +1,248 @@
+"""Light that a pressed membrane throws onto itself, and shadows that it casts onto itself.
+
+Both follow from the surface that the rounds have found so far. Outside the region that is solved
+the membrane is flat, and looks as in the background.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps
+from gelpolight_core.reconstruction.near_light.region import Region
+from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
+from gelpolight_core.reconstruction.threads import RowWorkers
+from gelpolight_core.reflectance.gathered_light import WIDE, Receivers, Surface, gathered
+from gelpolight_core.reflectance.surroundings import view_directions
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+LEVEL_NZ = -0.9986
+"""Below 3 degrees light from around changes little from node to node, and some nodes are enough."""
+CLEAR = 0.015
+"""A light is hidden where its ray clears the surface by less than this slope: LEDs of 0.2 mm, 10 to
+14 mm away, are half hidden within about that."""
+PLACING = 6
+FIRST_STEP, STEP = 1.5, 0.75
+"""Nodes along a ray to a light, between those at which the surface is compared with it."""
+
+_single = np.float32
+_HALF = _single(0.5)
+_whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
+
+
+class FromAround:
+    """Light and shadows of one sensor's membrane on itself, at the coarsest scale.
+
+    Parameters
+    ----------
+    maps : SensorMaps
+        The sensor's.
+    workers : RowWorkers
+        Threads.
+    """
+
+    def __init__(self, maps: SensorMaps, workers: RowWorkers) -> None:
+        self.maps, self._workers = maps, workers
+        self._flat: Surface | None = None
+        self._ray_slope = np.zeros((0, 0, 2), np.float32)
+
+    def on(
+        self,
+        region: Region,
+        image: RatioImage,
+        surface: tuple[Map, Map, Map],
+        reflectance: float,
+    ) -> tuple[Map, Map]:
+        """Return light from around, and how far each light's ray clears the surface.
+
+        Parameters
+        ----------
+        region : Region
+            That is solved.
+        image : RatioImage
+            Of it, at the coarsest scale.
+        surface : 3 of (rows, columns)
+            Depth along the rays, and x and y of the normals.
+        reflectance : float
+            The membrane's.
+
+        Returns
+        -------
+        around : (3, rows, columns) float32
+            In units of the background.
+        clear : (3, rows, columns) float32
+            The least slope between the surface and the ray to each light.
+        """
+        scale = self.maps.scale(COARSE)
+        (top, left), (rows, columns) = region.at(1)
+        at = np.s_[top : top + rows, left : left + columns]
+        whole = self._pressed(at, image, surface)
+        membrane, leds = self.maps.full.membrane, self.maps.full.led_positions_mm
+        tilted = whole.normals[at][..., 2] > LEVEL_NZ
+        some = np.zeros_like(tilted)
+        some[WIDE // 2 :: WIDE, WIDE // 2 :: WIDE] = True
+        receivers = [
+            Receivers.on(whole, _within(at, part, scale.kind.shape)) for part in (some, tilted)
+        ]
+        both = Receivers(*(np.concatenate(parts) for parts in zip(*receivers, strict=True)))
+        found = gathered(
+            whole, both, leds, membrane, scale.pitch_mm, slab=self.maps.slab, run=self._workers.run
+        )
+        split = int(some.sum())
+        place = some.nonzero()
+        coarse = found[:split].reshape(len(np.unique(place[0])), -1, 3)
+        thrown = np.asarray(cv2.resize(coarse, (columns, rows), interpolation=cv2.INTER_LINEAR))
+        thrown[tilted] = found[split:]
+        around = np.moveaxis(thrown, -1, 0) / -scale.flat[(slice(None), *at)] * reflectance
+        around *= scale.kind[at] == 2
+        return np.ascontiguousarray(around, np.float32), self._clearance(whole, at)
+
+    def _pressed(
+        self, at: tuple[slice, slice], image: RatioImage, surface: tuple[Map, Map, Map]
+    ) -> Surface:
+        """Return the whole membrane with a region of it pressed."""
+        scale = self.maps.scale(COARSE)
+        if self._flat is None:
+            self._ray_slope = np.moveaxis(scale.rays[:2], 0, -1)
+            y, x = (
+                first + scale.pitch_mm * np.arange(n, dtype=np.float32)
+                for first, n in zip((scale.y_mm, scale.x_mm), scale.kind.shape, strict=True)
+            )
+            flat = np.stack([*np.meshgrid(x, y), np.zeros(scale.kind.shape)], -1)
+            up = np.zeros_like(flat)
+            up[..., 2] = -1.0
+            light = -np.moveaxis(scale.flat, 0, -1) * (scale.kind == 2)[..., None]
+            parts = (flat, up, view_directions(self._ray_slope.astype(np.float64)), light)
+            self._flat = Surface(*(part.astype(np.float32) for part in parts))
+        depth, nx, ny = surface
+        points, normals, view, seen = (part.copy() for part in self._flat)
+        points[at][..., :2] += depth[..., None] * self._ray_slope[at]
+        points[at][..., 2] = -depth
+        down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
+        normals[at] = np.stack([nx, ny, down], axis=-1)
+        seen[at] *= np.clip(np.moveaxis(image.ratio, 0, -1), 0.0, None)
+        return Surface(points, normals, view, seen)
+
+    def _clearance(self, whole: Surface, at: tuple[slice, slice]) -> Map:
+        """Return the least slope between the surface and the rays to the lights."""
+        scale = self.maps.scale(COARSE)
+        depth = np.ascontiguousarray(-whole.points_mm[..., 2], np.float32)
+        rows, columns = np.indices(depth.shape, dtype=np.float32)
+        per_pitch = _single(1.0 / scale.pitch_mm)
+        # At true positions: half steps of the fixed point, as surfaces may fold.
+        place, home = np.stack([columns, rows]), np.stack([columns, rows])
+        slope, seen = np.moveaxis(self._ray_slope, -1, 0) * per_pitch, depth
+        for _ in range(PLACING):
+            place = _HALF * (place + home - seen * slope)
+            seen = np.asarray(cv2.remap(depth, place[0], place[1], cv2.INTER_LINEAR))
+        points = np.ascontiguousarray(whole.points_mm[at], np.float32)
+        clear = np.empty((3, *points.shape[:2]), np.float32)
+        leds = self.maps.full.led_positions_mm.astype(np.float32)
+        origin = (_single(scale.x_mm), _single(scale.y_mm), _single(scale.pitch_mm))
+        deepest = _single(seen.max())
+        self._workers.run(len(points), clear_rows, points, seen, origin, leds, deepest, clear)
+        return clear
+
+
+def _within(
+    at: tuple[slice, slice], part: NDArray[np.bool_], shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    whole = np.zeros(shape, bool)
+    whole[at] = part
+    return whole
+
+
+def with_surroundings(image: RatioImage, around: Map, clear: Map) -> RatioImage:
+    """Return an image with light from around and shadows, brought to its scale.
+
+    Parameters
+    ----------
+    image : RatioImage
+        Of the same region.
+    around, clear : (3, rows, columns) float32
+        From :meth:`FromAround.on`.
+    """
+    rows, columns = image.marks.shape
+    marks = image.marks | np.uint8(JUDGED)
+    enlarged = np.empty_like(image.ratio)
+    for k in range(3):
+        cv2.resize(around[k], (columns, rows), enlarged[k])
+        hidden = cv2.resize(clear[k], (columns, rows)) < CLEAR
+        marks |= np.where(hidden, np.uint8(HIDDEN << k), np.uint8(0))
+    return image._replace(around=enlarged, marks=marks)
+
+
+def surface_normals(
+    depth_mm: Map, at: tuple[slice, slice], ray_slope: Map, pitch_mm: float
+) -> tuple[Map, Map]:
+    """Return x and y of the normals of a depth along the rays (rows, columns).
+
+    Parameters
+    ----------
+    depth_mm : (rows, columns) float32
+        Of a region.
+    at : 2 slices
+        Its nodes.
+    ray_slope : (2, rows, columns) float32
+        Of the whole field.
+    pitch_mm : float
+        Distance between nodes.
+    """
+    wx, wy = ray_slope[(slice(None), *at)]
+    x, y = depth_mm * wx, depth_mm * wy
+    (x_v, x_u), (y_v, y_u), (d_v, d_u) = (np.gradient(m, pitch_mm) for m in (x, y, depth_mm))
+    x_u += 1.0
+    y_v += 1.0
+    n = (-d_u * y_v + d_v * y_u, -x_u * d_v + x_v * d_u, -(x_u * y_v - x_v * y_u))
+    size = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
+    return (n[0] / size).astype(np.float32), (n[1] / size).astype(np.float32)
+
+
+@_whole
+def clear_rows(first, last, points, depth, place, leds, deepest, clear):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Find how far the rays from points to the lights clear the surface, rows `first` to `last`.
+
+    Parameters
+    ----------
+    points : (rows, columns, 3) float32
+        Of the surface.
+    depth : (whole rows, whole columns) float32
+        At true positions.
+    place : tuple
+        First node of `depth` (x, y), and the distance between its nodes.
+    leds : (3, 3) float32
+        Sensor frame.
+    deepest : float
+        Largest depth: rays below it are clear.
+    clear : (3, rows, columns) float32
+        Written.
+    """
+    x0, y0, pitch = place
+    none, one, most = _single(0.0), _single(1.0), _single(2.0 * CLEAR)
+    rows, columns = depth.shape
+    for i in range(first, last):
+        for k in range(3):
+            for j in range(points.shape[1]):
+                px, py, d = points[i, j, 0], points[i, j, 1], -points[i, j, 2]
+                dx, dy = leds[k, 0] - px, leds[k, 1] - py
+                far = np.sqrt(dx * dx + dy * dy) + _single(1e-6)
+                # The ray goes down towards the light: its depth grows.
+                fall = (-leds[k, 2] - d) / far
+                ux, uy = dx / far, dy / far
+                least, t = most, _single(FIRST_STEP) * pitch
+                while t < far and d + fall * t < deepest:
+                    x, y = (px + ux * t - x0) / pitch, (py + uy * t - y0) / pitch
+                    if x < none or y < none or x > columns - one or y > rows - one:
+                        break
+                    m, n = min(int(y), rows - 2), min(int(x), columns - 2)
+                    fx, fy = x - _single(n), y - _single(m)
+                    up = depth[m, n] + fx * (depth[m, n + 1] - depth[m, n])
+                    low = depth[m + 1, n] + fx * (depth[m + 1, n + 1] - depth[m + 1, n])
+                    slope = fall - (up + fy * (low - up) - d) / t
+                    least = slope if slope < least else least
+                    t += _single(STEP) * pitch
+                clear[k, i, j] = least

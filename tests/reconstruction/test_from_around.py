@@ -1,0 +1,61 @@
+"""Shadows and normals of a surface that the rounds have found, against geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelpolight_core.reconstruction.near_light.from_around import (
+    CLEAR,
+    clear_rows,
+    surface_normals,
+    with_surroundings,
+)
+from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
+
+NODES, PITCH = 120, 0.1
+AXIS = (PITCH * (np.arange(NODES) - NODES / 2)).astype(np.float32)
+LEDS = np.array([[0.0, 10.0, -10.0], [-9.0, -5.0, -10.0], [9.0, -5.0, -10.0]], np.float32)
+
+
+def test_normals_of_a_slanted_plane_do_not_depend_on_the_rays() -> None:
+    x, _ = np.meshgrid(AXIS, AXIS)
+    rays = np.empty((2, NODES, NODES), np.float32)
+    rays[0], rays[1] = 0.2, -0.1
+    # d = 0.5 + 0.3 (x + 0.2 d), seen along rays of one direction.
+    depth = ((0.5 + 0.3 * x) / (1.0 - 0.3 * 0.2)).astype(np.float32)
+    found = surface_normals(depth, np.s_[:NODES, :NODES], rays, PITCH)
+    assert found[0] == pytest.approx(np.full_like(depth, -0.3 / np.hypot(0.3, 1.0)), abs=1e-4)
+    assert found[1] == pytest.approx(np.zeros_like(depth), abs=1e-4)
+
+
+def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches() -> None:
+    height = 0.8
+    ridge = np.where(np.abs(AXIS) < 1.0, height, 0.0).astype(np.float32)
+    depth = np.ascontiguousarray(np.repeat(ridge[:, None], NODES, axis=1))
+    x, y = np.meshgrid(AXIS, AXIS)
+    points = np.stack([x, y, -depth], axis=-1).astype(np.float32)
+    clear = np.empty((3, NODES, NODES), np.float32)
+    place = (AXIS[0], AXIS[0], np.float32(PITCH))
+    clear_rows(0, NODES, points, depth, place, LEDS, np.float32(height), clear)
+    # The first LED is at y = 10 and 10 deep: at the ridge's edge, y = -1, its rays rise by
+    # (10 - 0.8) / 11 of their way, so that the shadow ends 0.8 * 11 / 9.2 mm behind it.
+    ends = -1.0 - height * 11.0 / (10.0 - height)
+    hidden = clear[0, :, NODES // 2] < CLEAR
+    behind = (AXIS < -1.0 - PITCH) & (AXIS > ends + PITCH)
+    assert hidden[behind].all()
+    assert not hidden[(AXIS < ends - PITCH) | (AXIS > 1.0 + PITCH)].any()
+    assert not hidden[np.abs(AXIS) < 1.0 - PITCH].any()
+
+
+def test_a_picture_is_told_what_is_hidden_and_what_comes_from_around() -> None:
+    ratio = np.ones((3, 8, 8), np.float32)
+    marks = np.full((8, 8), 1, np.uint8)
+    around, clear = np.full((3, 4, 4), 0.2, np.float32), np.ones((3, 4, 4), np.float32)
+    clear[1, :2] = -1.0
+    found = with_surroundings(RatioImage(ratio, ratio, ratio, marks), around, clear)
+    assert found.around == pytest.approx(np.full_like(ratio, 0.2))
+    assert (found.marks & 1).all() and (found.marks & JUDGED).all()
+    assert ((found.marks[:3] & (HIDDEN << 1)) > 0).all()
+    assert not (found.marks[5:] & (HIDDEN << 1)).any()
+    assert not (found.marks & (HIDDEN | HIDDEN << 2)).any()

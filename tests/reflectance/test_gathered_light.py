@@ -1,0 +1,54 @@
+"""What the lower face returns to a flat membrane, against an integral over angles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gelpolight_core.optics.refraction import LayerStack
+from gelpolight_core.reflectance.gathered_light import Slab, returned_to_flat
+from gelpolight_core.reflectance.membrane import Membrane
+
+LEDS = np.array([[0.0, 10.0, -8.0], [-9.0, -5.0, -8.0], [9.0, -5.0, -8.0]])
+SIDE, NODES = 0.2, 160
+
+
+def fresnel(angle: np.ndarray, index: float) -> np.ndarray:
+    """Return the reflectance of a face to air for unpolarised light from inside, by angles."""
+    outside = np.arcsin(np.clip(index * np.sin(angle), 0.0, 1.0 - 1e-12))
+    across = np.sin(angle - outside) / np.sin(angle + outside)
+    along = np.tan(angle - outside) / np.tan(angle + outside)
+    return np.where(index * np.sin(angle) >= 1.0, 1.0, 0.5 * (across**2 + along**2))
+
+
+@pytest.mark.parametrize("thickness_mm", [4.0, 12.0])
+def test_an_even_matt_membrane_receives_what_its_mirror_image_shows(thickness_mm: float) -> None:
+    axis = SIDE * (np.arange(NODES) - 0.5 * (NODES - 1))
+    x, y = np.meshgrid(axis, axis)
+    points = np.stack([x, y, np.zeros_like(x)], axis=-1)
+    view = np.zeros_like(points)
+    view[..., 2] = -1.0
+    # A disc, so that the integral is over rings.
+    radius = 14.0
+    seen = np.where((np.hypot(x, y) < radius)[..., None], 0.3, 0.0) * np.ones(3)
+    slab = Slab(thickness_mm, 1.41)
+    found = returned_to_flat(seen, points, view, LEDS, Membrane(), SIDE, slab)
+    angle = np.linspace(1e-4, np.arctan(radius / (2.0 * thickness_mm)), 20001)
+    rings = fresnel(angle, 1.41) * 2.0 * np.sin(angle) * np.cos(angle)
+    share = float(np.trapezoid(rings, angle))
+    middle = found[NODES // 2 - 4 : NODES // 2 + 5, NODES // 2 - 4 : NODES // 2 + 5]
+    assert middle.mean() / 0.3 == pytest.approx(share, rel=0.05)
+
+
+def test_a_face_to_the_same_medium_returns_nothing() -> None:
+    seen = np.full((64, 64, 3), 0.2)
+    x, y = np.meshgrid(SIDE * np.arange(64.0), SIDE * np.arange(64.0))
+    points = np.stack([x, y, np.zeros_like(x)], axis=-1)
+    view = np.broadcast_to([0.0, 0.0, -1.0], points.shape)
+    found = returned_to_flat(seen, points, view, LEDS, Membrane(), SIDE, Slab(6.0, 1.0))
+    assert found == pytest.approx(np.zeros_like(found), abs=1e-6)
+
+
+def test_a_window_counts_by_its_optical_thickness() -> None:
+    slab = Slab.of(LayerStack((20.0, 2.0, 14.0), (1.0, 1.49, 1.41)))
+    assert slab == pytest.approx((14.0 + 2.0 * 1.41 / 1.49, 1.41))
