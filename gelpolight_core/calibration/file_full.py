@@ -93,9 +93,10 @@ def _read_scale(entry: dict[str, Any]) -> ScaleSd:
 
 def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membrane:
     values = {name: float(value) for name, value in entry.items()}
-    if values.pop("bounce_reach_mm", None) is not None and values["bounce"] > 0.0:
-        # Until version 3 it was a share of a neighbourhood's average, which cannot be converted.
-        raise ValueError("its interreflection is of a form that is no longer used")
+    # Older files hold the width of the neighbourhood that gave light. Its share is the reflectance.
+    reach_mm = values.pop("bounce_reach_mm", 1.0)
+    if not (np.isfinite(reach_mm) and reach_mm > 0.0):
+        raise ValueError("the membrane has impossible values")
     diffuse: tuple[tuple[float, ...], ...] = ()
     if curves is not None:
         if curves.shape != (3, CURVE_NODES) or not np.isfinite(curves).all():

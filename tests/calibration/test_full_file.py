@@ -115,6 +115,8 @@ def test_a_full_model_of_version_1_is_read(whole: Path, tmp_path: Path) -> None:
         for key in ("membrane_sd", "membrane_held_out", "membrane_kept"):
             del manifest["full"][key]
         del manifest["arrays"]["full_membrane_diffuse"]
+        # The share of a neighbourhood's light was the membrane's reflectance, too.
+        manifest["full"]["membrane"]["bounce_reach_mm"] = 1.0
 
     read = read_calibration(forged(whole, tmp_path / "old.gplcal", older))
     assert read.full is not None
@@ -191,7 +193,7 @@ def test_an_unchanged_forgery_is_accepted(whole: Path, tmp_path: Path) -> None:
         {"roughness": 0.0},
         {"roughness": 1.5},
         {"bounce": float("inf")},
-        {"bounce": 0.5, "bounce_reach_mm": 1.0},
+        {"bounce_reach_mm": float("nan")},
         {"colour": 1.0},
         {"exponent": "steep"},
         {"exponent": None},
@@ -273,7 +275,7 @@ def test_arrays_that_are_not_finite_are_refused(
         {"misfit": -0.1},
         {"held_out": [float("nan"), 1.0]},
         {"membrane": {"bounce": -1.0}},
-        {"membrane": {"bounce": 0.5, "bounce_reach_mm": 1.0}},
+        {"membrane": {"bounce_reach_mm": 0.0}},
         {"membrane_kept": "velvet"},
         {"membrane_sd": {"gloss": -0.1}},
         {"membrane_held_out": [0.1]},
