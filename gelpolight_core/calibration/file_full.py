@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,9 @@ from gelpolight_core.reflectance.membrane import CURVE_NODES, MEMBRANES, Membran
 from gelpolight_core.sensor_calibration import FullModel, ScaleSd
 
 CURVES = "full_membrane_diffuse"
+OLDER_BOUNCE_SD = 0.03
+"""Of the height, share. Older files hold the share of the neighbourhood's light that came back: it
+is near the membrane's reflectance, but not equal to it."""
 
 
 def full_entry(full: FullModel) -> dict[str, Any]:
@@ -67,10 +70,17 @@ def read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMod
     figures = np.array([two_lobe, one_dimensional, *sd.values()], float)
     if not np.isfinite(figures).all() or figures.min() < 0.0:
         raise ValueError("the figures of the membrane are impossible")
+    membrane = dict(entry["membrane"])
+    reach_mm = float(membrane.pop("bounce_reach_mm", np.inf))
+    if not reach_mm > 0.0:
+        raise ValueError("the membrane has impossible values")
+    scale_sd = _read_scale(entry["scale_sd"]) if "scale_sd" in entry else None
+    if reach_mm < np.inf and scale_sd is not None and float(membrane["bounce"]) > 0.0:
+        scale_sd = replace(scale_sd, depth=float(np.hypot(scale_sd.depth, OLDER_BOUNCE_SD)))
     return FullModel(
         led_positions_mm=arrays["full_led_positions_mm"],
         led_sd_mm=arrays["full_led_sd_mm"],
-        membrane=_read_membrane(entry["membrane"], arrays.get(CURVES)),
+        membrane=_read_membrane(membrane, arrays.get(CURVES)),
         background=arrays["full_background"],
         decay_mm=float(entry["decay_mm"]),
         misfit=float(entry["misfit"]),
@@ -79,7 +89,7 @@ def read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMod
         membrane_sd=sd,
         membrane_held_out=(two_lobe, one_dimensional),
         membrane_kept=str(kept),
-        scale_sd=_read_scale(entry["scale_sd"]) if "scale_sd" in entry else None,
+        scale_sd=scale_sd,
     )
 
 
@@ -93,10 +103,6 @@ def _read_scale(entry: dict[str, Any]) -> ScaleSd:
 
 def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membrane:
     values = {name: float(value) for name, value in entry.items()}
-    # Older files hold the width of the neighbourhood that gave light. Its share is the reflectance.
-    reach_mm = values.pop("bounce_reach_mm", 1.0)
-    if not (np.isfinite(reach_mm) and reach_mm > 0.0):
-        raise ValueError("the membrane has impossible values")
     diffuse: tuple[tuple[float, ...], ...] = ()
     if curves is not None:
         if curves.shape != (3, CURVE_NODES) or not np.isfinite(curves).all():

@@ -176,6 +176,21 @@ def test_a_file_without_full_model_reads_as_the_papers(tmp_path: Path) -> None:
     assert read_calibration(tmp_path / "paper.gplcal").full is None
 
 
+def test_interreflection_of_an_older_file_makes_heights_less_certain(
+    whole: Path, tmp_path: Path
+) -> None:
+    def older(manifest: dict[str, Any]) -> None:
+        manifest["full"]["membrane"]["bounce_reach_mm"] = 1.0
+
+    now, read = (
+        read_calibration(path).full for path in (whole, forged(whole, tmp_path / "o.gplcal", older))
+    )
+    assert now is not None and now.scale_sd is not None
+    assert read is not None and read.scale_sd is not None
+    assert read.membrane == now.membrane
+    assert read.scale_sd.depth == pytest.approx(np.hypot(now.scale_sd.depth, 0.03))
+
+
 def test_an_unchanged_forgery_is_accepted(whole: Path, tmp_path: Path) -> None:
     """The refusals below are caused by the values, not by the checksums."""
     read = read_calibration(forged(whole, tmp_path / "same.gplcal"))
