@@ -48,8 +48,8 @@ _BEGINS = {
 }
 """Share of the total work done when a stage begins."""
 
-MOST_HEIGHT_ERROR = 3.0
-"""Percent of height from which on a calibration fails: its presses are off by as much."""
+MOST_HEIGHT_ERROR = 4.0
+"""Percent of height from which on a calibration fails: half of the error of the paper's method."""
 
 
 @dataclass(frozen=True, slots=True)

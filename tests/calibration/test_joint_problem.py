@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gelpolight_core.calibration.ball_pixels import BallPixels
+from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView
 from gelpolight_core.calibration.joint_problem import COMMON, CURVE_SIZE, Problem
 
 STEP = 1e-4
+# Light from around is given: none is gathered.
+NO_VIEW = CoarseView(
+    np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 0, 3)), np.zeros((0, 0), bool), 1.0, 1
+)
 
 
 def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
@@ -25,12 +29,15 @@ def problem(*, curves: bool) -> tuple[Problem, np.ndarray]:
                 view / np.linalg.norm(view, axis=1, keepdims=True),
                 random.uniform(0.5, 1.5, (40, 3)),
                 random.uniform(0.9, 1.1, (40, 3)),
-                random.uniform(20.0, 60.0, (40, 3)),
                 4.0,
+                NO_VIEW,
+                np.zeros((0, 0, 3), np.float32),
+                random.uniform(0.2, 1.0, (40, 3)),
+                random.uniform(0.0, 0.1, (40, 3)),
             )
         )
     lights = [[0.5, 11.8, -13.7], [-10.4, -5.6, -13.7], [10.1, -6.3, -13.7]]
-    membrane = [1.05, 0.2, 0.4, 0.1, 0.2, 0.7]
+    membrane = [1.05, 0.2, 0.4, 0.15, 0.7]
     balls = [-2.05, 1.1, 0.9, 3.1, -1.45, 1.2]
     x = np.concatenate([np.ravel(lights), membrane, balls, np.full(CURVE_SIZE * curves, 0.03)])
     return Problem(presses, x + 0.01, np.ones(x.size, bool)), x
