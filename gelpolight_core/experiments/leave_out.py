@@ -29,7 +29,7 @@ EMPTY, SHALLOW, PRESSED = "empty", "shallow", "pressed"
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """An image, and what is pressed in it.
+    """An image, and how deep the contact in it is.
 
     Attributes
     ----------

@@ -2,7 +2,7 @@
 
     protocol.toml   presses/*.png   presses/truth.csv   refused.csv   discarded/*.png
 
-A press counts once its row stands in ``truth.csv``; its image is on the disk before. Nothing
+A press counts once ``truth.csv`` has a row for it; its image is written first. Nothing
 else is kept of where a run stands, so a run that was killed goes on with the press it was at.
 """
 

@@ -117,7 +117,7 @@ def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float)
     if share > ONE_DARK_SHARE:
         notes.append(
             tr(
-                "{percent:.0f} % of what is pressed lies in the shadow of an LED, which the "
+                "{percent:.0f} % of the contact lies in the shadow of an LED, which the "
                 "paper's model does not know: features on steep walls may come out too low; "
                 "use the full model"
             ).format(percent=100.0 * share)

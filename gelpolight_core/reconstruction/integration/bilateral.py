@@ -80,7 +80,7 @@ def integrate_bilateral(
 
     Examples
     --------
-    A block of 1 mm that stands on one side only, beside a ramp up to its top:
+    A block 1 mm high with a wall on one side, and a ramp up to its top on the other:
 
     >>> import numpy as np
     >>> x, y = np.meshgrid(np.arange(60) * 0.1, np.arange(60) * 0.1)
