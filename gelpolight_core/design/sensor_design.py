@@ -28,7 +28,12 @@ from gelpolight_core.design.parts import (
 )
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import MAX_PIXELS
-from gelpolight_core.io.reading import NAME_LIMIT, brief, parse_toml, plain_text, read_file
+from gelpolight_core.io.reading import (
+    NAME_LIMIT,
+    brief,
+    plain_text,
+    read_toml,
+)
 from gelpolight_core.translation import tr
 
 _THREE_LEDS = (
@@ -236,18 +241,7 @@ def read_design(path: Path) -> SensorDesign:
         of range.
     """
     path = Path(path)
-    try:
-        table = parse_toml(read_file(path))
-    except FileNotFoundError as error:
-        raise InputError(
-            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
-        ) from error
-    except ValueError as error:
-        raise InputError(
-            tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct the line named in the message"),
-        ) from error
+    table = read_toml(path)
     return design_from_table(table, where=str(path))
 
 

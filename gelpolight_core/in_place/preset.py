@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.io.reading import brief, parse_toml, read_file
+from gelpolight_core.io.reading import brief, read_toml
 from gelpolight_core.session.closed import SCALE_RANGE
 from gelpolight_core.session.table import Table
 from gelpolight_core.translation import tr
@@ -134,18 +134,7 @@ def read_preset(path: Path) -> Preset:
         If the file is missing, is not TOML, or has a key that is unknown, missing, of the wrong
         kind or out of range.
     """
-    try:
-        content = parse_toml(read_file(path))
-    except FileNotFoundError as error:
-        raise InputError(
-            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
-        ) from error
-    except ValueError as error:
-        raise InputError(
-            tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct this line"),
-        ) from error
+    content = read_toml(path)
     return _parse(content, path)
 
 

@@ -104,6 +104,35 @@ def parse_toml(data: bytes) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from error
 
 
+def read_toml(path: Path, *, missing: InputError | None = None) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    missing : InputError, optional
+        Raised where there is no such file; by default that the file does not exist.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or is not TOML.
+    """
+    try:
+        return parse_toml(read_file(path))
+    except FileNotFoundError as error:
+        raise missing or InputError(
+            tr("The file does not exist"), where=str(path), advice=tr("Check the file name")
+        ) from error
+    except ValueError as error:
+        raise InputError(
+            tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
+            where=str(path),
+            advice=tr("Correct this line"),
+        ) from error
+
+
 def parse_json(data: bytes | str) -> Any:
     """Return the content of a JSON text; NaN and infinite values are refused.
 

@@ -11,7 +11,7 @@ from gelpolight_core.channels import CHANNEL_KEYS
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse, declared_response
-from gelpolight_core.io.reading import brief, parse_toml, read_file
+from gelpolight_core.io.reading import read_toml
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.camera_settings import CameraSettings, parse_settings
 from gelpolight_core.session.decisions import Decisions, read_decisions
@@ -169,20 +169,12 @@ def read_description(folder: Path) -> dict[str, Any]:
         If the folder or file is missing or is not TOML.
     """
     path = folder / "session.toml"
-    try:
-        return parse_toml(read_file(path))
-    except FileNotFoundError as error:
-        raise InputError(
-            tr("There is no session.toml"),
-            where=str(folder),
-            advice=tr("Choose a session folder, or create one with gelpolight simulate"),
-        ) from error
-    except ValueError as error:
-        raise InputError(
-            tr("The file is not valid TOML ({error})").format(error=brief(str(error), 200)),
-            where=str(path),
-            advice=tr("Correct this line"),
-        ) from error
+    missing = InputError(
+        tr("There is no session.toml"),
+        where=str(folder),
+        advice=tr("Choose a session folder, or create one with gelpolight simulate"),
+    )
+    return read_toml(path, missing=missing)
 
 
 def parse_session(content: dict[str, Any], path: Path) -> Session:
