@@ -51,3 +51,18 @@ def usable(
         Light of the untouched membrane, and its reflectance factors (Eq. 9).
     """
     return np.asarray(valid & lit(background) & (factors > 0.0).all(axis=-1))
+
+
+def throws_light(valid: Mask, background: NDArray[np.floating[Any]]) -> Mask:
+    """Return the nodes (rows, columns) that throw light onto other parts of the membrane.
+
+    Other than :func:`usable` nodes, they may be saturated or lack a channel: only holes throw none.
+
+    Parameters
+    ----------
+    valid : (rows, columns) bool
+        In view and inside the working circle.
+    background : (rows, columns, 3)
+        Light of the untouched membrane.
+    """
+    return np.asarray(valid & (background > LEAST_LIGHT).any(axis=-1))

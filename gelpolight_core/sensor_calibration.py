@@ -126,7 +126,7 @@ class FullModel:
         ``refined`` or ``mirror``: which LEDs `led_positions_mm` holds.
     membrane_sd : mapping
         Standard deviations of the parameters refined with the LEDs: exponent, gloss, roughness,
-        bounce, decay_mm; 0 for fixed parameters. Empty in files of version 1.
+        interreflection, decay_mm; 0 for fixed parameters. Empty in files of version 1.
     membrane_held_out : tuple of 2 floats
         The same loss with a two-lobe membrane, and with a one-dimensional one.
     membrane_kept : str

@@ -182,7 +182,10 @@ if [ "$found" != "$kind $libraries" ] && [ "$found" != "test $libraries" ]; then
     [ "$found" = "run $libraries" ] || make_environment
     rm -f "$libraries_stamp"
     begin "installing the libraries of $lock" "the first time, about a minute"
-    pip install --quiet --require-hashes --only-binary :all: --requirement "$lock"
+    # Tests import a part of the libraries, and compile it then.
+    compiled=--compile
+    [ "$kind" = run ] || compiled=--no-compile
+    pip install --quiet $compiled --require-hashes --only-binary :all: --requirement "$lock"
     echo "$kind $libraries" >"$libraries_stamp"
 fi
 

@@ -6,8 +6,9 @@ import os
 import pickle
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 from hypothesis import settings
@@ -40,21 +41,27 @@ SETTINGS_OF_PYTEST_QT = ("qt_api", "qt_log_level_fail")
 LONGEST_FIRST = (
     "test_accuracy_on_rendered_sensors.py",
     "image/test_camera_response.py",
-    "app/calibrate/test_wizard.py",
-    "optics/test_pose.py",
-    "app/test_rounds.py",
-    "optics/test_lens.py",
-    "reconstruction/test_solver_efforts.py",
-    "experiments/test_ablation.py",
-    "app/calibrate/test_wizard_killed.py",
-    "measurement/test_measure.py",
-    "command_line/test_without_window_libraries.py",
-    "response/test_bent_sessions.py",
-    "reconstruction/test_uncertainty.py",
-    "reconstruction/test_best.py",
     "reflectance/test_detect_ball.py",
+    "measurement/test_measure.py",
+    "app/calibrate/test_wizard.py",
+    "reconstruction/test_solver_efforts.py",
     "command_line/test_commands.py",
-    "app/live/test_first_calibration.py",
+    "response/test_bent_sessions.py",
+    "batch/test_batch_run.py",
+    "report/test_report.py",
+    "command_line/test_without_window_libraries.py",
+    "app/inspect/test_inspect_page.py",
+    "reconstruction/test_contact.py",
+    "reconstruction/test_boundary.py",
+    "experiments/test_stability.py",
+    "measurement/test_honest_sizes.py",
+    "experiments/test_ablation.py",
+    "app/test_rounds.py",
+    "calibration/test_joint.py",
+    "experiments/test_virtual_protocol.py",
+    "app/calibrate/test_wizard_killed.py",
+    "reconstruction/test_uncertainty.py",
+    "strangers/test_real_disks.py",
 )
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -114,16 +121,43 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> MadeOnce:
 
 
 @pytest.fixture(scope="session")
+def rendered_optics(shared_data: Path, made_once: MadeOnce) -> Callable[[str], StageResults]:
+    """Return a function that gives a rendered session's results up to its top surface."""
+    from gelpolight_core.calibration.inputs import Stage
+    from gelpolight_core.calibration.results import StageResults
+    from gelpolight_core.calibration.stages import run_stage
+    from gelpolight_core.session.session import read_session
+
+    def found(sensor: str) -> StageResults:
+        def make(_folder: Path) -> StageResults:
+            session, results = read_session(shared_data / sensor), StageResults()
+            for stage in (Stage.RESPONSE, Stage.LENS, Stage.TOP_POSE):
+                results = run_stage(stage, session, results)
+            return results
+
+        return cast("StageResults", made_once(f"optics-{sensor}", make))
+
+    return found
+
+
+@pytest.fixture(scope="session")
 def virtual_session(made_once: MadeOnce) -> Path:
     """Return a session folder of the virtual sensor with its truth, at half the image's size."""
+    return _simulated(made_once, "virtual-session", balls=6, scale=0.5)
+
+
+def _simulated(made_once: MadeOnce, name: str, *, balls: int, scale: float) -> Path:
+    """Return a session with some of the design's balls; a calibration's cost grows with them."""
     from gelpolight_core.design.sensor_design import SensorDesign
     from gelpolight_core.simulation.session import simulate_session
 
     def make(folder: Path) -> Path:
-        simulate_session(SensorDesign(), folder / "session", scale=0.5)
+        design = SensorDesign()
+        fewer = replace(design, balls=design.balls[:balls])
+        simulate_session(fewer, folder / "session", scale=scale)
         return folder / "session"
 
-    return made_once("virtual-session", make)
+    return made_once(name, make)
 
 
 @pytest.fixture(scope="session")
@@ -161,14 +195,13 @@ def virtual_calibration(virtual_run: CalibrationRun) -> Calibration:
 @pytest.fixture(scope="session")
 def small_session(made_once: MadeOnce) -> Path:
     """Return the virtual sensor's session at a quarter of its size: what it costs is counted."""
-    from gelpolight_core.design.sensor_design import SensorDesign
-    from gelpolight_core.simulation.session import simulate_session
+    return _simulated(made_once, "small-session", balls=5, scale=0.25)
 
-    def make(folder: Path) -> Path:
-        simulate_session(SensorDesign(), folder / "session", scale=0.25)
-        return folder / "session"
 
-    return made_once("small-session", make)
+@pytest.fixture(scope="session")
+def small_session_of_ten_balls(made_once: MadeOnce) -> Path:
+    """Return the small session with all balls, which a closed sensor needs."""
+    return _simulated(made_once, "small-session-of-ten-balls", balls=10, scale=0.25)
 
 
 @pytest.fixture(scope="session")

@@ -51,6 +51,11 @@ class Detection:
     found: Found | None = None
     warns: bool = False
 
+    @property
+    def good(self) -> bool:
+        """Whether the frame may be captured, and there is nothing to read first."""
+        return self.ready and not self.warns
+
 
 Detector = Callable[[NDArray[Any]], Detection]
 NOTHING = Detection(Overlay(), "", True)

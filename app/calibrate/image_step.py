@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.calibrate.detection import Detection, Detector, read_raw
 from app.calibrate.film_strip import Capture
+from app.calibrate.states import OPEN
 from app.calibrate.step import Parts, StepPresenter, no_camera
 from app.live.live_detection import Seen
 from app.live.overlay import Overlay
@@ -80,6 +81,16 @@ class ImageStep(StepPresenter):
     def stage(self) -> Stage:
         """The stage of the images."""
         return self.step.stages[0]
+
+    def obstacle(self) -> str:
+        """Return what is missing or wrong; empty if the step is complete or being computed."""
+        state, sentence = self.model.states[self.step.key]
+        if state not in OPEN:
+            return ""
+        if state == StageState.EMPTY.value:
+            sentence = tr("Nothing is captured yet")
+        text = tr("{title} is not complete: {why}. To skip it for now, choose a step in the list.")
+        return text.format(title=self.step.title, why=sentence.rstrip("."))
 
     def focus(self) -> QWidget:
         """Return the button that the user needs next."""
@@ -164,12 +175,15 @@ class ImageStep(StepPresenter):
 
         title = tr("Analysing the image")
         self.model.short_jobs.submit(
-            Job(title, lambda _tell: detector(read_raw(path)), done, failed)
+            Job(title, lambda _progress: detector(read_raw(path)), done, failed)
         )
 
-    def _show(self, found: Detection) -> None:
+    def _show(self, found: Detection, *, waits: bool = False) -> None:
         self.area.view.set_overlay(found.overlay)
-        self.panel.show_live(found.sentence, ready=found.ready and not found.warns)
+        sentence = found.sentence
+        if waits:
+            sentence += " " + tr("Move it for an automatic capture, or click Capture.")
+        self.panel.show_live(sentence, ready=found.good)
 
     def detected(self, item: Outcome | Failure) -> None:
         """Show what was detected in a live image, and capture a good one if that is wanted."""
@@ -180,7 +194,7 @@ class ImageStep(StepPresenter):
             self.panel.show_live(item.sentence, ready=False)
         elif isinstance(item.value, Seen):
             if item.frame.settled:
-                self._show(item.value.detection)
+                self._show(item.value.detection, waits=self._waits_for_movement(item.value))
             else:
                 self.area.view.set_overlay(Overlay())
                 self.panel.show_live(tr("The image is changing."), ready=False)
@@ -189,10 +203,19 @@ class ImageStep(StepPresenter):
 
     def _is_good(self, frame: Frame, seen: Seen) -> bool:
         """Return whether the image can be captured automatically: never the same view twice."""
-        enough = self.step.wanted == 1 and self.model.project.session.found(self.step.folder)
-        ready = seen.still and seen.detection.ready and frame.settled and seen.moved
+        ready = seen.still and seen.detection.good and frame.settled and seen.moved
         waiting = self.model.busy_with_images or time.monotonic() < self._paused_until
-        return ready and not enough and not waiting
+        return ready and not self._has_its_image and not waiting
+
+    def _waits_for_movement(self, seen: Seen) -> bool:
+        """Return whether a good image is not captured automatically because nothing has moved."""
+        on = self.panel.automatic.isChecked() and not self.model.busy_with_images
+        return on and seen.detection.good and not seen.moved and not self._has_its_image
+
+    @property
+    def _has_its_image(self) -> bool:
+        """Whether the step needs one image and has it: another one is the user's decision."""
+        return self.step.wanted == 1 and bool(self.model.project.session.found(self.step.folder))
 
     # Images
 

@@ -111,6 +111,7 @@ class _PanelView(QWidget):
         make_bold(self._title)
         for label in (self._title, self._caption):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+            label.setWordWrap(True)
         # The texts stay close to the image, whose height depends on its width.
         column.addStretch(1)
         column.addWidget(self._title)
@@ -136,12 +137,11 @@ class _PanelView(QWidget):
     def _fit(self) -> None:
         if self._pixmap.isNull():
             return
-        words = self._title.sizeHint().height() + self._caption.sizeHint().height()
         around = self.layout().contentsMargins()
+        wide = self.width() - around.left() - around.right()
+        words = sum(max(w.heightForWidth(wide), 0) for w in (self._title, self._caption))
         gaps = around.top() + around.bottom() + 4 * self.layout().spacing()
-        room = QSize(
-            self.width() - around.left() - around.right(), self.height() - words - gaps
-        ).expandedTo(self._image.minimumSize())
+        room = QSize(wide, self.height() - words - gaps).expandedTo(self._image.minimumSize())
         shown = self._pixmap.scaled(
             room, Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
         )

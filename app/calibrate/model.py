@@ -136,7 +136,7 @@ class WizardModel(QObject):
             return
 
         def keep(frames: list[Any]) -> None:
-            def work(_tell: Callable[[float], None]) -> tuple[str, ...]:
+            def work(_progress: Callable[[float], None]) -> tuple[str, ...]:
                 return (self.project.add_capture(stage, frames, radius_mm=radius_mm),)
 
             saved = partial(self._on_saved, stage, by_camera=True)
@@ -149,7 +149,7 @@ class WizardModel(QObject):
     ) -> None:
         """Copy image files into a stage: all of them, or none if one is not valid."""
 
-        def work(_tell: Callable[[float], None]) -> tuple[str, ...]:
+        def work(_progress: Callable[[float], None]) -> tuple[str, ...]:
             return self.project.import_files(stage, files, radius_mm=radius_mm)
 
         saved = partial(self._on_saved, stage)
@@ -237,12 +237,12 @@ class WizardModel(QObject):
     def compute(self, upto: Stage | None = None) -> None:
         """Compute the outdated stages, up to one stage or all of them."""
 
-        def work(tell: Callable[[float], None]) -> None:
+        def work(progress: Callable[[float], None]) -> None:
             while stale := self.project.stale(upto=upto):
-                tell(0.0)
+                progress(0.0)
                 self._running = stale[0]
                 try:
-                    self.project.compute(stale[0], tell)
+                    self.project.compute(stale[0], progress)
                 finally:
                     self._running = None
 

@@ -92,12 +92,18 @@ class SessionCamera(QObject):
 
     def fault(self) -> str:
         """Return why the present camera cannot be used: the session belongs to another camera."""
-        camera = self._context.cameras.of(self._context.source.info)
-        session = self._model.project.session
+        session, now = self._model.project.session, self._present()
         stored = session.camera_settings
-        if camera is None or stored is None or stored.identity == camera.device.identity:
-            return ""
         if not any(session.found(folder) for folder in FOLDERS.values()):
+            return ""
+        serial = self._model.live.serial
+        if now is None and serial not in ("", session.serial):
+            text = tr(
+                "This session belongs to sensor {one}, but the images are those of {other}. Select "
+                "the camera of the sensor, or start a new session for the other sensor."
+            )
+            return text.format(one=session.serial, other=serial)
+        if now is None or stored is None or stored.identity == now.identity:
             return ""
         return tr(
             "This session was captured with the camera {one} ({one_id}), but {other} ({other_id}) "
@@ -105,9 +111,20 @@ class SessionCamera(QObject):
         ).format(
             one=stored.name,
             one_id=stored.identity,
-            other=camera.device.name,
-            other_id=camera.device.identity,
+            other=now.name,
+            other_id=now.identity,
         )
+
+    def _present(self) -> CameraSettings | None:
+        """Return which camera is selected, the virtual one included; None for recorded images."""
+        source = self._context.source
+        camera = self._context.cameras.of(source.info)
+        if camera is not None:
+            return CameraSettings(camera.device.name, camera.device.identity)
+        if source.info is None or source.info.kind != "virtual" or source.bench is None:
+            return None
+        serial = source.bench.design.serial
+        return CameraSettings(serial, f"virtual:{serial}")
 
     def refer(self) -> None:
         """Make the settings of the session the reference of the camera."""
@@ -116,14 +133,16 @@ class SessionCamera(QObject):
 
     def _on_photographed(self, stage: str) -> None:
         """Store the camera settings, as long as no capture depends on the stored ones."""
+        session, now = self._model.project.session, self._present()
         camera = self._context.cameras.of(self._context.source.info)
-        if camera is None or camera.state.phase != "live":
+        if now is None or (camera is not None and camera.state.phase != "live"):
             return
-        session = self._model.project.session
+        if camera is not None:
+            now = camera.settings_now()
         lit = sum(len(session.found(FOLDERS[s])) for s in LIT)
         first = lit == 0 or (lit == 1 and stage in {s.value for s in LIT})
         if session.camera_settings is None or first:
-            self._note(camera.settings_now())
+            self._note(now)
 
     def _note(self, settings: CameraSettings) -> None:
         try:

@@ -126,6 +126,10 @@ def step_state(
     return worst.state.value, worst.sentence
 
 
+OPEN = (StageState.EMPTY.value, BEGUN, StageState.FAIL.value)
+"""States in which a step still needs the user."""
+
+
 def is_done(state: str) -> bool:
     """Return whether a step in this state is complete."""
     return state in (StageState.PASS.value, StageState.WARN.value)

@@ -72,6 +72,8 @@ class StepPresenter(QObject):
     has_image_tab = True
     opens_slowly = False
     """Whether the widget in the middle is created when the step is first opened."""
+    only_shows = False
+    """Whether the step needs no action: it shows what was computed."""
 
     def __init__(self, parts: Parts) -> None:
         super().__init__(parts.area)
@@ -116,6 +118,14 @@ class StepPresenter(QObject):
     def is_finished(self, state: str) -> bool:
         """Return whether nothing is left to do in the step."""
         return is_done(state) and self.count() >= self.step.wanted
+
+    def is_settled(self, state: str) -> bool:
+        """Return whether the wizard may go on by itself: complete, without anything to read."""
+        return self.is_finished(state) and state == StageState.PASS.value
+
+    def obstacle(self) -> str:
+        """Return why the next step cannot follow yet; empty if it can."""
+        return ""
 
     def tables(self) -> Sequence[QualityTable]:
         """Return the quality tables of the step."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from app.calibrate.states import state_icon, state_word
@@ -55,8 +55,8 @@ class StepList(QListWidget):
         item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{step.title}, {state_word(state)}")
 
     def go_to(self, row: int) -> None:
-        """Mark a step as the open one."""
-        if row != self.currentRow():
+        """Mark a step as the open one; this is no choice of the user."""
+        with QSignalBlocker(self):
             self.setCurrentRow(row)
 
     def _on_row(self, row: int) -> None:

@@ -120,9 +120,11 @@ class StepPanel(QWidget):
         self.capture.setMinimumHeight(38)
         self.capture.clicked.connect(self.capture_wanted)
         self.automatic = named(
-            QCheckBox(tr("&Automatic when still")),
+            QCheckBox(tr("&Automatic: capture and continue")),
             "calibrate.automatic",
-            tr("Capture automatically when the image is still and good"),
+            tr(
+                "Capture automatically when the image is still and good, and continue when complete"
+            ),
             tr("Hands-free: after each capture it waits until you have moved something"),
         )
         self.import_files = named(

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QHBoxLayout,
+    QMainWindow,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.calibrate.bench_dock import BenchDock
 from app.calibrate.image_area import ImageArea
 from app.calibrate.model import WizardModel
+from app.calibrate.moving_on import MovingOn
 from app.calibrate.outside_changes import OutsideBar
 from app.calibrate.session_bar import SessionBar, history_dock
 from app.calibrate.session_camera import SessionCamera
-from app.calibrate.states import BEGUN, StepState
+from app.calibrate.states import OPEN, StepState
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_list import StepList
 from app.calibrate.step_panel import StepPanel
@@ -24,8 +32,6 @@ from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.status import StageState
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
-
-OPEN = (StageState.EMPTY.value, BEGUN, StageState.FAIL.value)
 
 
 class Wizard(QMainWindow):
@@ -69,6 +75,7 @@ class Wizard(QMainWindow):
         self._build_docks()
         self._build_keys()
         self.session_camera = SessionCamera(self.model, context=context)
+        self.moving_on = MovingOn(self.model, self.panel, self.presenters, go_to=self.go_to)
         self._connect()
         self.refresh()
         for presenter in self.presenters:
@@ -110,20 +117,19 @@ class Wizard(QMainWindow):
             self, "calibrate.live_again", tr("Back to the live image"), lambda: self.open.live(),
             keys=("Escape",),
         )  # fmt: skip
-        steps: tuple[tuple[str, str, int, str], ...] = (
-            ("next_step", tr("Next step"), 1, "Alt+Right"),
-            ("previous_step", tr("Previous step"), -1, "Alt+Left"),
-        )
-        for name, text, by, keys in steps:
-            make_action(
-                self, f"calibrate.{name}", text, lambda by=by: self._go_by(by), keys=(keys,)
-            )
+        make_action(self, "calibrate.next_step", tr("Next step"), self._next, keys=("Alt+Right",))
+        make_action(
+            self, "calibrate.previous_step", tr("Previous step"), lambda: self._go_by(-1),
+            keys=("Alt+Left",),
+        )  # fmt: skip
 
     def _connect(self) -> None:
         self.step_list.chosen.connect(lambda row: self.go_to(self.presenters[row].step.key))
         self._connect_open_step()
         panel, area, model = self.panel, self.area, self.model
-        panel.next_wanted.connect(lambda: self._go_by(1))
+        panel.next_wanted.connect(self._next)
+        panel.automatic.setChecked(self.context.settings.captures_automatically)
+        panel.automatic.toggled.connect(self._set_automatic)
         panel.cancel_wanted.connect(model.jobs.cancel)
         guide = self.context.requests.guide
         panel.help_wanted.connect(lambda: guide.emit("guide/calibrate", self.open.step.title))
@@ -145,6 +151,7 @@ class Wizard(QMainWindow):
         model.progressed.connect(self._show_progress)
         model.refused.connect(self._refuse)
         model.captured.connect(self._on_captured)
+        model.photographed.connect(self._signal_capture)
         # A toast, not the panel: the user has already left the step.
         model.capture_aborted.connect(lambda text: self.context.toasts.show(text, "fail"))
         self.live.switched.connect(self._on_camera)
@@ -181,6 +188,7 @@ class Wizard(QMainWindow):
 
     def leave(self) -> None:
         """Release the camera when the wizard is hidden."""
+        self.moving_on.stop()
         self.live.enter(False)
         self.outside.watch(False)
 
@@ -219,11 +227,23 @@ class Wizard(QMainWindow):
         self.open.enter()
         self.live.use(self.open.uses_camera)
         self._compute_what_never_was()
+        self.moving_on.enter(self.open)
         self.refresh()
         _add(self.centre, self.open.centre)
         self.centre.setCurrentWidget(self.open.centre)
         self.side.setCurrentWidget(self.open.side)
         self._focus_on_what_comes_next()
+
+    def _next(self) -> None:
+        """Show the next step, or say what is missing in this one."""
+        obstacle = self.open.obstacle()
+        if obstacle:
+            self._refuse(obstacle)
+        else:
+            self._go_by(1)
+
+    def _set_automatic(self, on: bool) -> None:
+        self.context.settings.captures_automatically = on
 
     def _go_by(self, steps: int) -> None:
         row = self.presenters.index(self.open) + steps
@@ -266,6 +286,7 @@ class Wizard(QMainWindow):
         self.model.states = self._states()
         self.step_list.show_states(self.model.states)
         self.open.refresh()
+        self.moving_on.check()
 
     def _states(self) -> dict[str, StepState]:
         """Return state and message of every step; a waiting step names the one it waits for."""
@@ -313,6 +334,12 @@ class Wizard(QMainWindow):
         if self.open.step.stage == stage:
             self.panel.show_notice(tr("Captured {name}.").format(name=name), "pass")
             self.area.strip.show_newest()
+
+    def _signal_capture(self, _stage: str) -> None:
+        """Flash and beep: the user looks at the sensor and may now move it."""
+        self.area.view.flash()
+        if self.panel.automatic.isChecked():
+            QApplication.beep()
 
     def _on_camera(self) -> None:
         self.bench_dock.follow()

@@ -56,12 +56,14 @@ def run(options: argparse.Namespace) -> int:
     folders = options.sessions or [_virtual_session(options.output / VIRTUAL)]
     ablations = []
     for folder in folders:
-        with StageProgress() as tell:
+        with StageProgress() as progress:
             ablation = ablate(
                 read_session(folder),
                 variants=variants,
                 repeats=max(options.repeats, 1),
-                progress=partial(_tell_of, folder.name, tell) if len(folders) > 1 else tell,
+                progress=partial(_progress_of, folder.name, progress)
+                if len(folders) > 1
+                else progress,
             )
         ablations.append(ablation)
         say(ablation_table(ablation), end="\n\n", flush=True)
@@ -70,8 +72,8 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _tell_of(sensor: str, tell: Any, what: str, share: float) -> None:
-    tell(f"{sensor}: {what}" if what else sensor, share)
+def _progress_of(sensor: str, progress: Any, what: str, share: float) -> None:
+    progress(f"{sensor}: {what}" if what else sensor, share)
 
 
 def _chosen(names: str | None) -> tuple[Variant, ...]:
@@ -92,6 +94,6 @@ def _chosen(names: str | None) -> tuple[Variant, ...]:
 def _virtual_session(folder: Path) -> Path:
     """Simulate the virtual sensor, unless an earlier ablation did it."""
     if not (folder / "session.toml").is_file():
-        with StageProgress() as tell:
-            simulate_session(SensorDesign(), folder, progress=tell)
+        with StageProgress() as progress:
+            simulate_session(SensorDesign(), folder, progress=progress)
     return folder

@@ -121,8 +121,8 @@ def run(options: argparse.Namespace) -> int:
         if options.scheduler
         else ProcessRunner(settings, out, options.workers)
     )
-    with _stopped_by_ctrl_c() as stopped, _Progress() as tell:
-        progress = run_batch(plan, settings, out, runner, tell=tell, stopped=stopped)
+    with _stopped_by_ctrl_c() as stopped, _Progress() as report:
+        progress = run_batch(plan, settings, out, runner, report=report, stopped=stopped)
     return _report(progress, options.output)
 
 
@@ -134,14 +134,14 @@ class _Progress:
 
     def __enter__(self) -> Callable[[BatchProgress], None]:
         """Return the function that receives the progress."""
-        return self._tell
+        return self._report
 
     def __exit__(self, *details: object) -> None:
         """Close the bar."""
         if self._bar is not None:
             self._bar.close()
 
-    def _tell(self, progress: BatchProgress) -> None:
+    def _report(self, progress: BatchProgress) -> None:
         if self._bar is None:
             self._bar = tqdm(
                 total=progress.total, initial=progress.before, file=sys.stderr, unit=tr("frame")

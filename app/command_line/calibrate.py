@@ -40,8 +40,8 @@ def run(options: argparse.Namespace) -> int:
     refuse_overwriting(outputs, session_files(session))
     for path in outputs:
         refuse_unwritable(path)
-    with StageProgress() as tell:
-        result = calibrate_any(session, model=options.model, progress=tell)
+    with StageProgress() as progress:
+        result = calibrate_any(session, model=options.model, progress=progress)
     write_calibration(result.calibration, options.output)
     if isinstance(result, InPlaceRun):
         content, lines = in_place_as_json(result), in_place_lines(result)

@@ -7,7 +7,6 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO
 
 from tqdm import tqdm
@@ -27,18 +26,13 @@ class StageProgress:
 
     def __enter__(self) -> Callable[[str, float], None]:
         """Return the function that receives the progress."""
-        return self._tell
+        return self._report
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the bar."""
         self._bar.close()
 
-    def _tell(self, stage: str, share: float) -> None:
+    def _report(self, stage: str, share: float) -> None:
         self._bar.set_description_str(stage)
         self._bar.n = round(100 * share)
         self._bar.refresh()

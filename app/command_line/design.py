@@ -62,8 +62,8 @@ def run(options: argparse.Namespace) -> int:
     if options.lighting:
         from gelpolight_core.design_check.lighting import compare_lighting, lighting_lines
 
-        with StageProgress() as tell:
-            rows = compare_lighting(design, progress=tell)
+        with StageProgress() as progress:
+            rows = compare_lighting(design, progress=progress)
         say("\n".join(lighting_lines(rows)))
     return 0
 

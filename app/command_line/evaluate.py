@@ -12,8 +12,9 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.press_workers import Equipment
 from gelpolight_core.experiments.virtual_protocol import measure_folder
 from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.measurement.evaluation import Evaluation, evaluate_presses
+from gelpolight_core.measurement.evaluation import Evaluation
 from gelpolight_core.measurement.evaluation_report import evaluation_table
+from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.presses import open_ledger, press_measurement
 from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
 from gelpolight_core.measurement.truth import read_truth
@@ -45,14 +46,14 @@ def run(options: argparse.Namespace) -> int:
     crossing = crossing_of(presses)
     make_folder(options.output)
     ledger = open_ledger(None, reconstructor)
-    with StageProgress() as tell:
+    with StageProgress() as progress:
         if options.workers > 1:
             equipment = Equipment(options.calibration, options.model)
-            measure_folder(presses, equipment, ledger, workers=options.workers, progress=tell)
+            measure_folder(presses, equipment, ledger, workers=options.workers, progress=progress)
         evaluation = evaluate_presses(
             presses,
             press_measurement(reconstructor),
-            progress=tell,
+            progress=progress,
             crossing=crossing,
             ledger=ledger,
         )

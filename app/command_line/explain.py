@@ -44,8 +44,8 @@ def run(options: argparse.Namespace) -> int:
     if options.output is not None:  # before the long work
         make_folder(options.output)
         refuse_unwritable(options.output / "height.csv")
-    with StageProgress() as tell:
-        explanation = explain(calibration, session, progress=tell)
+    with StageProgress() as progress:
+        explanation = explain(calibration, session, progress=progress)
     say(explanation_text(explanation))
     if options.output is not None:
         written = write_explanation(explanation, options.output)

@@ -124,7 +124,7 @@ def _print_calibration(path: Path) -> None:
     if c.full is not None:
         m = c.full.membrane
         shown = tr(
-            "{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, interreflection {bounce:.2f}"
+            "{kept}, gloss {gloss:.2f}, roughness {roughness:.2f}, interreflection {thrown:.2f}"
         )
         rows.append(
             (
@@ -133,7 +133,7 @@ def _print_calibration(path: Path) -> None:
                     kept=label(c.full.membrane_kept),
                     gloss=m.gloss,
                     roughness=m.roughness,
-                    bounce=m.bounce,
+                    thrown=m.interreflection,
                 ),
             )
         )

@@ -85,15 +85,15 @@ def run(options: argparse.Namespace) -> int:
     design = read_design(options.design) if options.design else SensorDesign()
     wanted = _wanted(options)
     make_folder(options.output)
-    with RunLock(options.output), StageProgress() as tell:
+    with RunLock(options.output), StageProgress() as progress:
         calibration = options.calibration or calibrate_virtual_sensor(
-            design, options.output, progress=tell
+            design, options.output, progress=progress
         )
         reconstructor = load_reconstructor(calibration, model=options.model)
         protocol_run = _begin_or_go_on(options.output, wanted, reconstructor)
         ledger = run_ledger(protocol_run, reconstructor)
         equipment = Equipment(calibration, options.model, design)
-        press_protocol(protocol_run, equipment, ledger, workers=options.workers, progress=tell)
+        press_protocol(protocol_run, equipment, ledger, workers=options.workers, progress=progress)
         evaluation = evaluate_run(protocol_run, reconstructor, ledger)
     folder = options.output / REPORT
     make_folder(folder)

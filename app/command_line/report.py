@@ -14,7 +14,7 @@ from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.calibration.in_place_session import InPlaceRun
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import refuse_unwritable
-from gelpolight_core.measurement.evaluation import evaluate_presses
+from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.protocol_run import crossing_of, presses_folder
 from gelpolight_core.measurement.truth import read_truth
@@ -98,8 +98,8 @@ def _of_calibration(options: argparse.Namespace, presses: Path | None) -> Report
     refuse_overwriting([options.output], [options.source])
     refuse_unwritable(options.output)
     calibration = read_calibration(options.source)
-    with StageProgress() as tell:
-        validation = _validate(calibration, presses, tell)
+    with StageProgress() as progress:
+        validation = _validate(calibration, presses, progress)
     return calibration_report(calibration, validation=validation)
 
 
@@ -107,19 +107,21 @@ def _of_session(options: argparse.Namespace, presses: Path | None) -> Report:
     session = read_any_session(options.source)
     refuse_overwriting([options.output], session_files(session))
     refuse_unwritable(options.output)
-    with StageProgress() as tell:
-        result = calibrate_any(session, model=options.model, progress=tell)
-        validation = _validate(result.calibration, presses, tell)
-        tell(tr("report"), 1.0)
+    with StageProgress() as progress:
+        result = calibrate_any(session, model=options.model, progress=progress)
+        validation = _validate(result.calibration, presses, progress)
+        progress(tr("report"), 1.0)
         if isinstance(result, InPlaceRun):
             return in_place_report(result, validation=validation)
         assert isinstance(session, Session)
         return run_report(result, session, validation=validation)
 
 
-def _validate(calibration: AnyCalibration, presses: Path | None, tell: Any) -> Validation | None:
+def _validate(
+    calibration: AnyCalibration, presses: Path | None, progress: Any
+) -> Validation | None:
     if presses is None:
         return None
     measure = press_measurement(Reconstructor(calibration))
     crossing = crossing_of(presses)
-    return validation_of(evaluate_presses(presses, measure, progress=tell, crossing=crossing))
+    return validation_of(evaluate_presses(presses, measure, progress=progress, crossing=crossing))

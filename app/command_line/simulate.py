@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Render the session."""
     design = read_design(options.design) if options.design else SensorDesign()
-    with StageProgress() as tell:
-        simulate_session(design, options.output, closed=options.closed, progress=tell)
+    with StageProgress() as progress:
+        simulate_session(design, options.output, closed=options.closed, progress=progress)
     say(tr("Session saved to {folder}").format(folder=options.output))
     return 0

@@ -58,22 +58,22 @@ def run(options: argparse.Namespace) -> int:
     refuse_unwritable(options.output / "stability.html")
     found: tuple[Sensitivity, ...] = ()
     costs: tuple[LengthCost, ...] = ()
-    with StageProgress() as tell:
+    with StageProgress() as progress:
         results = run_cases(
             cases,
-            progress=lambda name, share: tell(name, CASES_SHARE * share),
+            progress=lambda name, share: progress(name, CASES_SHARE * share),
             done=_print_line,
         )
         if wants_sensitivity:
             found = sensitivities(
                 standard_sensor(),
-                progress=lambda name, share: tell(
+                progress=lambda name, share: progress(
                     name, CASES_SHARE + (SENSITIVITY_END - CASES_SHARE) * share
                 ),
             )
         if wants_lengths:
             costs = length_costs(
-                progress=lambda name, share: tell(
+                progress=lambda name, share: progress(
                     name, SENSITIVITY_END + (1 - SENSITIVITY_END) * share
                 )
             )

@@ -94,8 +94,8 @@ def run(options: argparse.Namespace) -> int:
             read_session(folder)
         calibration = read_open_calibration(options.calibration)
 
-        def work(tell: Callable[[str, float], None]) -> list[Point]:
-            common = {"repeats": repeats, "progress": tell}
+        def work(progress: Callable[[str, float], None]) -> list[Point]:
+            common = {"repeats": repeats, "progress": progress}
             if not options.sessions:
                 return [*measure_virtual(calibration, SensorDesign(), chosen, **common)]
             found = [
@@ -109,10 +109,10 @@ def run(options: argparse.Namespace) -> int:
 
     rules: list[RuleFigure] = []
 
-    def work_all(tell: Callable[[str, float], None]) -> list[Point]:
+    def work_all(progress: Callable[[str, float], None]) -> list[Point]:
         points: list[Point] = []
         for number, source in enumerate(found):
-            within = partial(_share_of, tell, number, len(found))
+            within = partial(_share_of, progress, number, len(found))
             points += measure_sensor(
                 source, chosen, widths=widths, repeats=repeats, seed=options.seed, progress=within
             )
@@ -133,11 +133,11 @@ def _measured(
     make_folder(options.output)
     refuse_unwritable(options.output / "work-precision.html")
     integrators: Sequence[IntegratorPoint] = ()
-    with StageProgress() as tell:
-        watch = Watch(max(options.wait, 0.0), tell)
-        points = work(tell)
+    with StageProgress() as progress:
+        watch = Watch(max(options.wait, 0.0), progress)
+        points = work(progress)
         if integration:
-            integrators = measure_integrators(progress=tell)
+            integrators = measure_integrators(progress=progress)
         machine = watch.result()
     say(point_table(points), end="\n\n")
     if integration:
@@ -152,9 +152,9 @@ def _measured(
 
 
 def _share_of(
-    tell: Callable[[str, float], None], number: int, total: int, what: str, share: float
+    progress: Callable[[str, float], None], number: int, total: int, what: str, share: float
 ) -> None:
-    tell(what, (number + share) / total)
+    progress(what, (number + share) / total)
 
 
 def _refuse_none(found: Sequence[Source]) -> None:

@@ -78,7 +78,7 @@ class FileActions(QObject):
         self.saving = ViewSaving(
             views.surface, owner, settings=context.settings, player=self._player
         )
-        self.saving.reported.connect(self._tell)
+        self.saving.reported.connect(self._report)
         views.surface.menu.reference_wanted.connect(self.take_reference)
         views.processing.hold_wanted.connect(self.hold_reference)
         views.surface.menu.mesh_wanted.connect(self.export)
@@ -90,7 +90,7 @@ class FileActions(QObject):
     def export(self) -> None:
         """Ask what to export, and export it."""
         if self._depth.last is None or self._depth.last.heightmap is None:
-            self._tell(tr("There is no depth to export yet."), "warn")
+            self._report(tr("There is no depth to export yet."), "warn")
             return
         source, count, at = self._depth.live.source, 0, 0
         if isinstance(source, RecordingSource):
@@ -113,14 +113,14 @@ class FileActions(QObject):
             # The page's own processing is paused: a reconstructor serves one thread.
             self._depth.live.rest(True)
 
-            def work(tell: Any) -> list[Path]:
-                return export_recording(path, reconstructor, choice, tell)
+            def work(progress: Any) -> list[Path]:
+                return export_recording(path, reconstructor, choice, progress)
 
         elif last is not None and last.heightmap is not None:
             heightmap = last.heightmap
             name = frame_name(last.frame, source, processed=bool(last.processed))
 
-            def work(tell: Any) -> list[Path]:
+            def work(progress: Any) -> list[Path]:
                 return export_frame(heightmap, choice, name)
 
         else:
@@ -130,13 +130,13 @@ class FileActions(QObject):
                 tr("Exporting"),
                 work,
                 self._on_exported,
-                lambda sentence: self._tell(sentence, "fail"),
+                lambda sentence: self._report(sentence, "fail"),
                 ended=lambda: self._depth.live.rest(False),
             )
         )
 
     def _on_exported(self, files: list[Path]) -> None:
-        self._tell(
+        self._report(
             tr("{n} files written to {folder}").format(n=len(files), folder=files[0].parent), "pass"
         )
 
@@ -144,7 +144,7 @@ class FileActions(QObject):
         """Ask for a file, and write the profile as a table."""
         profile = self._views.section.cut.profile
         if profile is None:
-            self._tell(tr("There is no profile yet."), "warn")
+            self._report(tr("There is no profile yet."), "warn")
             return
         last = self._depth.last
         processed = last is not None and bool(last.processed)
@@ -172,7 +172,7 @@ class FileActions(QObject):
         """Keep the height map of now, as reconstructed, as the reference. Return whether it is."""
         last = self._depth.last
         if last is None or last.raw is None:
-            self._tell(tr("There is no depth to use as a reference yet."), "warn")
+            self._report(tr("There is no depth to use as a reference yet."), "warn")
             return False
         name = tr("frame {n}").format(n=last.frame.number)
         self._views.hold(Reference(replace(last.raw, source=name), name))
@@ -196,7 +196,7 @@ class FileActions(QObject):
             if self._depth.last is not None and self._depth.last.raw is not None:
                 difference(self._depth.last.raw, heightmap)
         except InputError as error:
-            self._tell(str(error), "fail")
+            self._report(str(error), "fail")
             return
         self._views.compare_with(Reference(heightmap, path.name))
 
@@ -213,8 +213,8 @@ class FileActions(QObject):
             self._jobs.submit(
                 Job(
                     tr("Playing the recording"),
-                    lambda tell: play_surfaces(path, reconstructor, wanted, put, tell),
-                    failed=lambda sentence: self._tell(sentence, "fail"),
+                    lambda progress: play_surfaces(path, reconstructor, wanted, put, progress),
+                    failed=lambda sentence: self._report(sentence, "fail"),
                     ended=lambda: self._depth.live.rest(False),
                 )
             )
@@ -255,11 +255,11 @@ class FileActions(QObject):
         try:
             write(path)
         except InputError as error:
-            self._tell(str(error), "fail")
+            self._report(str(error), "fail")
             return
-        self._tell(tr("Saved to {path}").format(path=path), "pass")
+        self._report(tr("Saved to {path}").format(path=path), "pass")
 
-    def _tell(self, text: str, kind: str, **more: Any) -> None:
+    def _report(self, text: str, kind: str, **more: Any) -> None:
         self._context.toasts.show(text, kind, **more)
 
 

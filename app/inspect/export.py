@@ -80,7 +80,7 @@ def export_recording(
     path: Path,
     reconstructor: Reconstructor,
     choice: ExportChoice,
-    tell: Callable[[float], None],
+    progress: Callable[[float], None],
 ) -> list[Path]:
     """Reconstruct frames of a recording one after the other and write them.
 
@@ -92,7 +92,7 @@ def export_recording(
         No other thread may use it at the same time.
     choice : ExportChoice
         With the frames.
-    tell : callable
+    progress : callable
         Called with the progress (0 to 1). An exception from it stops the work between two frames.
 
     Raises
@@ -108,7 +108,7 @@ def export_recording(
     try:
         indices: Sequence[int] = range(choice.frames[0], choice.frames[1] + 1)
         for done, index in enumerate(indices):
-            tell(done / len(indices))
+            progress(done / len(indices))
             frame = recording.frame(index)
             heightmap = reconstructor.depth(frame.rgb, name=f"{path.stem}-{index:05d}.png")
             written += write_heightmap(

@@ -168,8 +168,8 @@ class ModeChoice(QObject):
             self._make_paper(live)
 
     def _make_paper(self, live: Reconstructor) -> None:
-        def work(tell: Callable[[float], None]) -> Reconstructor:
-            tell(0.1)
+        def work(progress: Callable[[float], None]) -> Reconstructor:
+            progress(0.1)
             made = Reconstructor(live.calibration, model=PAPER)
             made.warm_up()
             return made

@@ -16,7 +16,7 @@ def play_surfaces(
     reconstructor: Reconstructor,
     wanted: Wanted,
     put: Callable[[Surface | None], bool],
-    tell: Callable[[float], None],
+    progress: Callable[[float], None],
 ) -> None:
     """Make the surface of every frame of a recording and pass it on.
 
@@ -31,7 +31,7 @@ def play_surfaces(
     put : callable
         Gets each surface, and None at the end in every case. Returns False if the surfaces are no
         longer needed.
-    tell : callable
+    progress : callable
         Called with the progress (0 to 1). An exception from it stops the work.
 
     Raises
@@ -45,7 +45,7 @@ def play_surfaces(
         recording = Recording.open(path)
         try:
             for index in range(len(recording)):
-                tell(index / len(recording))
+                progress(index / len(recording))
                 surface = maker(recording.frame(index)).surface
                 if surface is not None and not put(surface):
                     return

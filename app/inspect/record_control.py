@@ -109,7 +109,7 @@ class RecordControl(QObject):
             return
         figures = self._recorder.figures()
         if figures.finished:
-            self._tell_finished(self._recorder, figures)
+            self._report_finished(self._recorder, figures)
             return
         if not self.action.isChecked():
             self.action.setText(tr("Writing…"))
@@ -142,7 +142,7 @@ class RecordControl(QObject):
                 text = tr("The recording stops in {left}: it reaches its size limit.")
             self._context.toasts.show(text.format(left=time_text(room.left_s)), "warn")
 
-    def _tell_finished(self, recorder: Recorder, figures: RecorderFigures) -> None:
+    def _report_finished(self, recorder: Recorder, figures: RecorderFigures) -> None:
         self._recorder = None
         self._timer.stop()
         self.action.setChecked(False)

@@ -28,7 +28,7 @@ from gelpolight_core.translation import tr
 
 FIRST, SECOND = QColor(11, 92, 173, 60), QColor(23, 138, 70, 60)
 DEG = "deg"
-SIDE_WIDTH = 186
+SIDE_WIDTH = 170
 # Those of ISO 21920-3 that fit on a sensor.
 CUTOFFS_MM = (0.25, 0.8, 2.5)
 
@@ -93,7 +93,8 @@ class SectionPanel(QWidget):
         side.addLayout(last)
         side.addWidget(scroll, 1)
         row = QHBoxLayout(self)
-        row.setContentsMargins(2, 2, 6, 4)
+        row.setContentsMargins(2, 2, 2, 4)
+        row.setSpacing(2)
         row.addWidget(self._plot, 1)
         row.addLayout(side)
 

@@ -98,9 +98,7 @@ class Views(QMainWindow):
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setMenu(self._menu)
         bar.addSeparator()
-        self._bar_end = bar.addWidget(
-            SourceButton(context=self._context, page="inspect", none=tr("No camera"))
-        )
+        bar.addWidget(SourceButton(context=self._context, page="inspect", none=tr("No camera")))
         bar.addWidget(button)
         self.addToolBar(bar)
         return bar

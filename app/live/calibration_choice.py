@@ -141,14 +141,14 @@ class CalibrationChoice(QObject):
         self._context.requests.calibrations_changed.emit()
 
     def _read(self, path: Path) -> None:
-        def work(tell: Callable[[float], None]) -> object:
+        def work(progress: Callable[[float], None]) -> object:
             from app.live.frame_results import warm_up
             from gelpolight_core.calibration.file import read_calibration
             from gelpolight_core.reconstruction.reconstructor import Reconstructor
 
             calibration = read_calibration(path)
             live = Reconstructor(calibration, effort="fast")
-            tell(WARM_FROM)
+            progress(WARM_FROM)
             live.warm_up()
             warm_up()
             return path, live, Reconstructor(calibration)

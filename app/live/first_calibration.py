@@ -31,14 +31,14 @@ def begin_first_calibration(jobs: Jobs, *, context: AppContext) -> None:
     jobs.submit(
         Job(
             tr("Calibrating the virtual sensor"),
-            lambda tell: calibrate_virtual_sensor(bench.design, workspace, tell),
+            lambda progress: calibrate_virtual_sensor(bench.design, workspace, progress),
             done,
         )
     )
 
 
 def calibrate_virtual_sensor(
-    design: SensorDesign, workspace: Workspace, tell: Callable[[float], None]
+    design: SensorDesign, workspace: Workspace, progress: Callable[[float], None]
 ) -> Path:
     """Make a session of the virtual sensor, calibrate from it and put the result into use.
 
@@ -48,7 +48,7 @@ def calibrate_virtual_sensor(
         Design of the sensor on the bench.
     workspace : Workspace
         Stores the session and the calibration.
-    tell : callable
+    progress : callable
         Called with the progress (0 to 1). An exception from it stops the work; nothing is kept.
 
     Returns
@@ -66,12 +66,14 @@ def calibrate_virtual_sensor(
     folder, whole = sessions / f".{name}", sessions / name
     make_folder(folder)
     try:
-        simulate_session(design, folder, progress=lambda _file, share: tell(IMAGES_SHARE * share))
+        simulate_session(
+            design, folder, progress=lambda _file, share: progress(IMAGES_SHARE * share)
+        )
         # The calibration stores the session's name.
         folder.rename(whole)
         run = calibrate_session(
             read_session(whole),
-            progress=lambda _stage, share: tell(IMAGES_SHARE + (1.0 - IMAGES_SHARE) * share),
+            progress=lambda _stage, share: progress(IMAGES_SHARE + (1.0 - IMAGES_SHARE) * share),
         )
         path = workspace.keep_calibration(run.calibration, name)
     except BaseException:

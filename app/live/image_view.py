@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QRectF, Qt, Signal
-from PySide6.QtGui import QPainter, QResizeEvent
+from PySide6.QtCore import QEvent, QRectF, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from app.live.drawing import OverlayItem
@@ -23,6 +23,7 @@ from gelpolight_core.translation import tr
 
 # From this magnification on pixels are shown as squares, which is the purpose of zooming in.
 SQUARES_FROM = 1.5
+FLASH, FLASH_MS = QColor(255, 255, 255, 150), 180
 LEAST_SHOWN_PX = 6.0
 FARTHEST_PX = 8000.0
 
@@ -42,10 +43,10 @@ class _Box(pg.ViewBox):  # type: ignore[misc]
             return
         event.accept()
         if event.isStart():
-            self._tell("begin", event.buttonDownPos())
-        self._tell("end" if event.isFinish() else "move", event.pos())
+            self._report("begin", event.buttonDownPos())
+        self._report("end" if event.isFinish() else "move", event.pos())
 
-    def _tell(self, phase: str, at: Any) -> None:
+    def _report(self, phase: str, at: Any) -> None:
         position = self.mapToView(at)
         self.dragged.emit(phase, position.x(), position.y())
 
@@ -149,6 +150,11 @@ class ImageView(pg.GraphicsView):  # type: ignore[misc]
     def hand_drags_on(self, on: bool) -> None:
         """Emit drags with the left button instead of panning; the middle button still pans."""
         self._box.hands_drags_on = on
+
+    def flash(self) -> None:
+        """Brighten the view for a moment."""
+        self.setForegroundBrush(FLASH)
+        QTimer.singleShot(FLASH_MS, self, lambda: self.setForegroundBrush(Qt.BrushStyle.NoBrush))
 
     def say(self, text: str) -> None:
         """Change the text that is shown when there is no image."""

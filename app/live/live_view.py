@@ -216,6 +216,10 @@ class LiveView(QWidget):
         """Show one image pixel on one screen pixel."""
         self._image.full_size()
 
+    def flash(self) -> None:
+        """Brighten the image for a moment: it was captured."""
+        self._image.flash()
+
     def say(self, text: str) -> None:
         """Change the text that is shown when there is no image."""
         self._image.say(text)

@@ -81,7 +81,7 @@ class ZeroControl(QObject):
             self._jobs.submit(
                 Job(
                     tr("Setting zero"),
-                    lambda _tell: zero_calibration(workspace, used, frames),
+                    lambda _progress: zero_calibration(workspace, used, frames),
                     self._on_zeroed,
                     self._on_failed,
                 )

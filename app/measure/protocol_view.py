@@ -108,8 +108,8 @@ class ProtocolView(QWidget):
         """Start a new run with the chosen settings."""
         wanted = self.setup.protocol()
 
-        def work(tell: Callable[[float], None]) -> Equipped:
-            tell(0.0)
+        def work(progress: Callable[[float], None]) -> Equipped:
+            progress(0.0)
             return self._new_run(calibration, wanted)
 
         self._start(tr("Reading the calibration"), work)
@@ -117,8 +117,8 @@ class ProtocolView(QWidget):
     def open_run(self, folder: Path) -> None:
         """Continue a run."""
 
-        def work(tell: Callable[[float], None]) -> Equipped:
-            tell(0.0)
+        def work(progress: Callable[[float], None]) -> Equipped:
+            progress(0.0)
             run = open_run(folder)
             return equip(run, self._calibration_of(run.content.calibration))
 

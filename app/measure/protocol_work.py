@@ -18,7 +18,8 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.experiments.virtual_protocol import evaluate_run, run_ledger
 from gelpolight_core.io.atomic import make_folder
 from gelpolight_core.io.lock import RunLock
-from gelpolight_core.measurement.evaluation import Evaluation, measure_press
+from gelpolight_core.measurement.evaluation import Evaluation
+from gelpolight_core.measurement.evaluation_run import measure_press
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
@@ -162,8 +163,8 @@ class ProtocolWork(QObject):
         """Compare all presses with their true values, after the running measurements."""
         equipped = self._equipped
 
-        def work(tell: Callable[[float], None]) -> Evaluation:
-            tell(0.0)
+        def work(progress: Callable[[float], None]) -> Evaluation:
+            progress(0.0)
             return evaluate_run(equipped.run, equipped.reconstructor, equipped.ledger)
 
         self._jobs.submit(Job(tr("Evaluating"), work, self.evaluated.emit, self.refused.emit))
@@ -190,8 +191,8 @@ class ProtocolWork(QObject):
             Maximum mean absolute errors, planar and in depth, for a pass.
         """
 
-        def work(tell: Callable[[float], None]) -> tuple[Path, ...]:
-            tell(0.1)
+        def work(progress: Callable[[float], None]) -> tuple[Path, ...]:
+            progress(0.1)
             make_folder(folder)
             return write_evaluation_files(
                 evaluation, folder, calibration=self.calibration, limits_percent=limits_percent
@@ -221,8 +222,8 @@ class ProtocolWork(QObject):
     def _measure(self, press: PressWanted) -> None:
         image, shape, ledger = self.run.image(press), press.truth.shape, self._equipped.ledger
 
-        def work(tell: Callable[[float], None]) -> Measurement | str:
-            tell(0.0)
+        def work(progress: Callable[[float], None]) -> Measurement | str:
+            progress(0.0)
             return measure_press(image, shape, self._measure_press, ledger)
 
         def done(outcome: Measurement | str) -> None:

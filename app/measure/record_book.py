@@ -133,7 +133,7 @@ class RecordBook(QObject):
         workspace = self._context.workspace
         folder = workspace.folder
 
-        def work(_tell: object) -> tuple[object, tuple[MeasurementRecord, ...], str]:
+        def work(_progress: object) -> tuple[object, tuple[MeasurementRecord, ...], str]:
             records = workspace.records if workspace.folder == folder else None
             if records is None or records.path != folder / NAME:
                 if change is _nothing:

@@ -137,13 +137,13 @@ class ToolMap(QWidget):
         self.layer.placing = False
         self.layer.show_begun(())
         self.tools.deselect()
-        self._tell()
+        self._report()
 
     def _on_kind(self, name: str) -> None:
         self._kind, self._points = name, []
         self.layer.placing = bool(name)
         self.layer.show_begun(())
-        self._tell()
+        self._report()
         if name:
             self.setFocus()
             self.hold_wanted.emit()
@@ -154,7 +154,7 @@ class ToolMap(QWidget):
         self.layer.show_begun(tuple(self._points))
         if len(self._points) == len(self._asks()):
             self._add_tool(tuple(self._points))
-        self._tell()
+        self._report()
 
     def _add_tool(self, points: tuple[Point, ...]) -> None:
         kind = self._kind
@@ -169,7 +169,7 @@ class ToolMap(QWidget):
     def _asks(self) -> tuple[str, ...]:
         return next((kind.asks for kind in kinds() if kind.name == self._kind), ())
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         asks = self._asks()
         text = ""
         if self._kind and len(self._points) < len(asks):
@@ -190,7 +190,7 @@ class ToolMap(QWidget):
         grips = () if work.tool is None else grips_of(work.tool)
         self.layer.show_tools(drawn, work.chosen, grips, work.grip)
         self.drawn.emit(drawn, work.chosen)
-        self._tell()
+        self._report()
 
     def _on_grip(self, name: str) -> None:
         self.setFocus()

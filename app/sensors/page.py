@@ -56,7 +56,7 @@ class SensorsPage(QWidget):
         self._sessions.wanted.connect(context.requests.session)
         self._reports = ReportWriter(self)
         self._reports.busy_changed.connect(self._show_busy)
-        self._reports.written.connect(self._tell_written)
+        self._reports.written.connect(self._report_written)
         self._reports.refused.connect(lambda text: context.toasts.show(text, "fail"))
         self._details = Details((self.use, self.report, self.reveal, self.remove))
         split = QSplitter(Qt.Orientation.Horizontal, self)
@@ -246,7 +246,7 @@ class SensorsPage(QWidget):
         self._details.busy.setVisible(busy)
         self._show_chosen()
 
-    def _tell_written(self, path: str) -> None:
+    def _report_written(self, path: str) -> None:
         self._context.toasts.show(
             tr("Report saved to {path}.").format(path=path),
             "pass",

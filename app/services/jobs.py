@@ -139,10 +139,10 @@ class Jobs(QObject):
         self._queue.put(None)
         ended = join(thread, timeout_s)
         for job in kept:
-            self._tell_lost(job)
+            self._report_lost(job)
         return ended
 
-    def _tell_lost(self, job: Job) -> None:
+    def _report_lost(self, job: Job) -> None:
         """Report a job that had to run and has not finished."""
         assert job.future is not None
         if not job.future.done():  # it continues as long as the program runs
@@ -153,7 +153,7 @@ class Jobs(QObject):
             return
         future, job.future, job.over = job.future, None, True
         if (error := future.exception()) is not None:
-            self._tell_failure(job, error)
+            self._report_failure(job, error)
 
     def _work(self) -> None:
         """Run the jobs in order, in the thread."""
@@ -166,7 +166,7 @@ class Jobs(QObject):
         if future is None or not future.set_running_or_notify_cancel():
             return
         try:
-            future.set_result(job.work(partial(self._tell, job)))
+            future.set_result(job.work(partial(self._report, job)))
         except BaseException as error:  # passed to the GUI thread, which reports it
             future.set_exception(error)
         finally:
@@ -174,7 +174,7 @@ class Jobs(QObject):
             # be a reference cycle that stays until the garbage collector runs.
             del future, job
 
-    def _tell(self, job: Job, share: float) -> None:
+    def _report(self, job: Job, share: float) -> None:
         """Store the progress. Called in the worker thread."""
         if job.cancel.is_set():
             raise Cancelled
@@ -205,9 +205,9 @@ class Jobs(QObject):
         if error is None:
             job.done(future.result())
         else:
-            self._tell_failure(job, error)
+            self._report_failure(job, error)
 
-    def _tell_failure(self, job: Job, error: BaseException) -> None:
+    def _report_failure(self, job: Job, error: BaseException) -> None:
         if isinstance(error, Cancelled):
             (job.stopped or self.refused.emit)(_stopped(job))
         elif isinstance(error, InputError):

@@ -220,6 +220,15 @@ class Settings:
         self._store.setValue("recording_limit_gb", limit_gb)
 
     @property
+    def captures_automatically(self) -> bool:
+        """Whether the wizard captures good images by itself, and goes on by itself."""
+        return self._text("captures_automatically") != "no"
+
+    @captures_automatically.setter
+    def captures_automatically(self, on: bool) -> None:
+        self._store.setValue("captures_automatically", "yes" if on else "no")
+
+    @property
     def reconstruction(self) -> tuple[str, str]:
         """Model and effort of the live depth. The caller checks that they exist."""
         model, _, effort = self._text("reconstruction", "full/fast").partition("/")

@@ -47,7 +47,7 @@ class Faults(QObject):
         super().__init__()
         self._toasts = toasts
         self._before: tuple[Any, ...] = ()
-        self._reported.connect(self._tell)
+        self._reported.connect(self._report)
 
     def install(self) -> None:
         """Install the handlers of Python and Qt for uncaught exceptions and messages."""
@@ -90,7 +90,7 @@ class Faults(QObject):
         self.take(given.exc_type, error, given.exc_traceback, given.err_msg or "")
 
     @Slot(str, bool)
-    def _tell(self, text: str, with_log: bool) -> None:
+    def _report(self, text: str, with_log: bool) -> None:
         self._toasts.show(text, "fail", with_log=with_log)
 
 

@@ -369,7 +369,7 @@ class MainWindow(QMainWindow):
 
     def show_precision(self) -> None:
         """Show accuracy against run time on this machine."""
-        from app.inspect.precision_dialog import PrecisionDialog  # slow import: loads every method
+        from app.tools.precision_dialog import PrecisionDialog  # slow import: loads every method
 
         self._show_tool("precision", lambda: PrecisionDialog(context=self.context, parent=self))
 

@@ -202,7 +202,7 @@ class Bench:
         with self._lock:
             self._conditions = replace(self._conditions, **within)
             conditions = self._conditions
-        self._tell()
+        self._report()
         return conditions
 
     def switch(self, fault: str, on: bool) -> None:
@@ -212,7 +212,7 @@ class Bench:
         with self._lock:
             faults = self._conditions.faults - {fault} | ({fault} if on else set())
             self._conditions = replace(self._conditions, faults=faults)
-        self._tell()
+        self._report()
 
     def steps(self, stage: str) -> int:
         """Return the number of images of a stage of a simulated session."""
@@ -279,7 +279,7 @@ class Bench:
         with self._lock:
             self._scene = self._within(change(self._scene))
             scene = self._scene
-        self._tell()
+        self._report()
         return scene
 
     def _within(self, scene: Scene) -> Scene:
@@ -300,7 +300,7 @@ class Bench:
             yaw_deg=math.remainder(scene.yaw_deg, 360.0),
         )
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         with self._lock:
             watchers = tuple(self._watchers)
         for watcher in watchers:

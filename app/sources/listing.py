@@ -15,11 +15,6 @@ Finder = Callable[[], Iterable[SourceInfo]]
 """Finds sources of one kind, such as the connected cameras."""
 
 
-def list_sources(finders: Sequence[Finder]) -> tuple[SourceInfo, ...]:
-    """Return the sources that all finders find now, in order."""
-    return tuple(info for find in finders for info in find())
-
-
 def virtual_sensor(bench: Bench) -> Finder:
     """Return the finder of the virtual sensor on a bench."""
     camera = bench.design.camera

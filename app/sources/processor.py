@@ -69,7 +69,6 @@ class ProcessorFigures:
     """Statistics of the function in use, over its last 60 frames; times in ms."""
 
     rate_hz: float = 0.0
-    last_ms: float = 0.0
     median_ms: float = 0.0
 
 
@@ -144,7 +143,7 @@ class Processor(Generic[T]):
         spent = [ms for _, ms in done]
         span_s = done[-1][0] - done[0][0]
         rate = (len(done) - 1) / span_s if span_s > 0.0 else 0.0
-        return ProcessorFigures(rate, spent[-1], statistics.median(spent))
+        return ProcessorFigures(rate, statistics.median(spent))
 
     def _run(self, end: threading.Event) -> None:
         lower_priority(PROCESSING)

@@ -211,7 +211,7 @@ class SurfacePanel(QWidget):
         self._jobs.submit(
             Job(
                 tr("Loading the 3D view"),
-                lambda _tell: _load(),
+                lambda _progress: _load(),
                 self._make,
                 self._fall_back,
                 self._on_stopped,

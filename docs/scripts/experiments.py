@@ -56,17 +56,17 @@ def measure(sessions: Sequence[Path], out: Path, widths: Sequence[int], wait_s: 
     """Measure everything from seed 0, and keep it in OUT."""
     found = sources(sessions, out)
     for source in found:  # what takes no part in any time
-        prepared(source, 0, tell)
-    lighting = compare_lighting(SensorDesign(), progress=tell)
-    watch = Watch(wait_s, tell)
+        prepared(source, 0, progress)
+    lighting = compare_lighting(SensorDesign(), progress=progress)
+    watch = Watch(wait_s, progress)
     steps = measure_steps(next(s for s in found if s.name == STEPS_SENSOR))
     points: list[Point] = []
     rules: list[RuleFigure] = []
     chosen = methods(seed=0)
     for source in found:
-        points += measure_sensor(source, chosen, widths=widths, progress=tell)
-        rules += measure_leaving_out(source, progress=tell)
-    integrators = measure_integrators(progress=tell)
+        points += measure_sensor(source, chosen, widths=widths, progress=progress)
+        rules += measure_leaving_out(source, progress=progress)
+    integrators = measure_integrators(progress=progress)
     machine = watch.result()
     figures = Figures(tuple(points), integrators, tuple(rules), lighting, steps, machine)
     write_work_precision(points, integrators, out, rules=rules, machine=machine)
@@ -77,7 +77,7 @@ def measure(sessions: Sequence[Path], out: Path, widths: Sequence[int], wait_s: 
 
 def measure_steps(source: Any) -> dict[str, list[dict[str, Any]]]:
     """Return the steps of a press and of an untouched frame by every mode."""
-    session, scene = prepared(source, 0, tell)
+    session, scene = prepared(source, 0, progress)
     press = session_presses(session)[0].frame
     bare = np.rint(255.0 * session.averaged("background").rgb).astype(np.uint8)
     found = {}
@@ -107,7 +107,7 @@ def read(out: Path) -> Figures:
     )
 
 
-def tell(what: str, share: float) -> None:
+def progress(what: str, share: float) -> None:
     """Show the progress on one line."""
     sys.stderr.write(f"\r{100 * share:3.0f} %  {what:<70.70}")
     sys.stderr.flush()

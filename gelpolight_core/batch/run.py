@@ -69,7 +69,7 @@ class BatchProgress:
         )
 
 
-def _tell_nobody(progress: BatchProgress) -> None:
+def _ignored(progress: BatchProgress) -> None:
     """Ignore progress."""
 
 
@@ -79,7 +79,7 @@ def run_batch(
     out: Path,
     runner: Runner,
     *,
-    tell: Callable[[BatchProgress], None] = _tell_nobody,
+    report: Callable[[BatchProgress], None] = _ignored,
     stopped: Stopped = never,
 ) -> BatchProgress:
     """Process the frames of a plan that have no result yet; write the summary when all are done.
@@ -97,7 +97,7 @@ def run_batch(
     runner : callable
         Processes the frames: a :class:`~gelpolight_core.batch.processes.ProcessRunner` or a
         :class:`~gelpolight_core.batch.cluster.ClusterRunner`.
-    tell : callable, optional
+    report : callable, optional
         Called with the progress, at the beginning and after each frame.
     stopped : callable, optional
         Returns whether to stop; frames already begun are completed.
@@ -125,10 +125,10 @@ def run_batch(
 
         before = sum(map(is_done, plan))
         progress = BatchProgress(len(plan), before)
-        tell(progress)
+        report(progress)
         if progress.left:
             jobs = (job for job in plan if not is_done(job))
-            progress = _do(jobs, progress, ledger, runner, tell, stopped)
+            progress = _do(jobs, progress, ledger, runner, report, stopped)
         if not progress.left:
             write_summary(ledger, out, measured=settings.shape is not None)
     return progress
@@ -139,7 +139,7 @@ def _do(
     progress: BatchProgress,
     ledger: BatchLedger,
     runner: Runner,
-    tell: Callable[[BatchProgress], None] = _tell_nobody,
+    report: Callable[[BatchProgress], None] = _ignored,
     stopped: Stopped = never,
 ) -> BatchProgress:
     halt: Halt | None = None
@@ -150,7 +150,7 @@ def _do(
                 ledger.keep(rows)
                 for row in rows:
                     progress = progress.after(row)
-                    tell(progress)
+                    report(progress)
                 halt = halt or next((one for one in outcomes if isinstance(one, Halt)), None)
         if halt is not None:
             raise halt.error()

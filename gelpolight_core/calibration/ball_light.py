@@ -57,12 +57,12 @@ def with_light_from_around(
         return []
     view = pixels[0].view_of_field
     flat, returned = flat_light(view, leds_mm, membrane, slab)
-    background = flat + membrane.bounce * returned
+    background = flat + membrane.interreflection * returned
 
     def lit(pair: tuple[BallPixels, BallPose]) -> BallPixels:
         own, ball = pair
         surface, normals, _ = draped_ball(view.points_mm, view.ray_slope, ball, decay_mm=decay_mm)
-        shape = view.usable.shape
+        shape = view.throwing.shape
         field = Surface(
             surface.reshape(*shape, 3),
             normals.reshape(*shape, 3),
@@ -94,7 +94,7 @@ def flat_light(
     leds_mm, membrane, slab
         As in :func:`with_light_from_around`.
     """
-    shape = view.usable.shape
+    shape = view.throwing.shape
     points = np.concatenate([view.points_mm, np.zeros((len(view.points_mm), 1))], axis=1)
     light, distance = light_directions(leds_mm, points)
     up = np.tile([0.0, 0.0, -1.0], (len(points), 1))
@@ -102,7 +102,7 @@ def flat_light(
     flat = (-bright * light[..., 2] / distance**2).reshape(*shape, 3)
     grid, returned = points.reshape(*shape, 3), np.zeros_like(flat)
     for _ in range(2):
-        seen = (flat + membrane.bounce * returned) * view.usable[..., None]
+        seen = (flat + membrane.interreflection * returned) * view.throwing[..., None]
         returned = np.asarray(
             returned_to_flat(seen, grid, view.view, leds_mm, membrane, view.pitch_mm, slab),
             np.float64,

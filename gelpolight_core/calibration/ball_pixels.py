@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reflectance.gathered_light import ratio_thrown
 from gelpolight_core.reflectance.press import LEAST_VALUE, BallPress
 from gelpolight_core.reflectance.surroundings import view_directions
 
@@ -38,8 +39,8 @@ class CoarseView:
         Where the rays meet the flat membrane, and their slope.
     view : (rows, columns, 3)
         Unit directions back to the camera.
-    usable : (rows, columns) bool
-        Nodes with light and membrane.
+    throwing : (rows, columns) float32
+        Share of each facet that throws light onto other parts of the membrane.
     pitch_mm : float
         Distance between nodes.
     factor : int
@@ -49,16 +50,16 @@ class CoarseView:
     points_mm: Array
     ray_slope: Array
     view: Array
-    usable: NDArray[np.bool_]
+    throwing: Map
     pitch_mm: float
     factor: int
 
     @classmethod
-    def of(cls, table: ResamplingTable, usable: NDArray[np.bool_]) -> CoarseView:
-        """Return the coarse view of a table's grid."""
+    def of(cls, table: ResamplingTable, throwing: NDArray[np.bool_]) -> CoarseView:
+        """Return the coarse view of a table's grid, whose nodes (rows, columns) throw light."""
         grid = table.grid
         factor = max(round(FIELD_PITCH_MM / grid.pitch_mm), 1)
-        all_usable = block_means(usable.astype(np.float32), factor) > 0.99
+        share = block_means(throwing.astype(np.float32), factor)
         ray_slope = np.nan_to_num(block_means(table.ray_slope, factor)).astype(np.float64)
         x, y = (
             axis[: axis.size // factor * factor].reshape(-1, factor).mean(axis=1)
@@ -67,7 +68,7 @@ class CoarseView:
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         pitch = factor * grid.pitch_mm
         return cls(
-            points, ray_slope.reshape(-1, 2), view_directions(ray_slope), all_usable, pitch, factor
+            points, ray_slope.reshape(-1, 2), view_directions(ray_slope), share, pitch, factor
         )
 
     def index(self, points_mm: Array) -> Array:
@@ -97,7 +98,7 @@ class BallPixels:
     view_of_field : CoarseView
         The whole membrane that may throw light on them.
     field : (rows, columns, 3) float32
-        Press over background there; 0 where it is not usable.
+        Press over background there; 1 where it is not usable, and 0 where nothing throws light.
     around, around_flat : (N, 3)
         Light that they receive from the rest of a membrane that absorbs nothing, in the press and
         while the membrane is flat, in units of the flat membrane's direct light.
@@ -144,7 +145,9 @@ def gather_ball_pixels(
     grid = table.grid
     base = np.maximum(background, LEAST_VALUE)
     ratio = np.asarray(image / base, np.float32)
-    field = np.clip(block_means(ratio, view.factor), 0.0, MOST_RATIO) * view.usable[..., None]
+    whole = block_means(usable.astype(np.float32), view.factor)[..., None] > 0.99
+    seen = np.minimum(block_means(ratio, view.factor), np.float32(MOST_RATIO))
+    field = ratio_thrown(seen, whole, view.throwing)
     column, row = np.round(grid.to_index(np.asarray(press.pose.centre_mm))).astype(int)
     centre = press.seen_centre_mm(table.ray_slope[row, column].astype(np.float64))
     away = np.hypot(grid.x_mm[None, :] - centre[0], grid.y_mm[:, None] - centre[1])

@@ -7,16 +7,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from gelpolight_core.calibration.editable_session import EditableSession
 from gelpolight_core.calibration.in_place_session import InPlaceRun, calibrate_closed_session
-from gelpolight_core.calibration.inputs import FOLDERS, Stage, StageInputs, changes_between
+from gelpolight_core.calibration.inputs import FOLDERS, Stage, StageInputs
 from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.staged_project import Outcome, StagedProject
 from gelpolight_core.calibration.status import StageState, StageStatus, judged_by
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.bare_membrane import check_bare_membrane
 from gelpolight_core.quality import QualityTable
 from gelpolight_core.session.closed import ClosedSession, read_any_session
-from gelpolight_core.session.file_hashes import CachedHashes
 from gelpolight_core.session.images import require_colour
 from gelpolight_core.translation import tr
 
@@ -39,13 +38,7 @@ class ClosedResults:
     run: InPlaceRun | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class _Outcome:
-    inputs: StageInputs
-    fault: InputError | None
-
-
-class ClosedProject(EditableSession[ClosedSession]):
+class ClosedProject(StagedProject[ClosedSession, ClosedResults]):
     """The session folder of a closed sensor with its results; used as a CalibrationProject.
 
     Parameters
@@ -60,15 +53,7 @@ class ClosedProject(EditableSession[ClosedSession]):
     """
 
     def __init__(self, folder: Path) -> None:
-        super().__init__(folder, _read)
-        self._hashes = CachedHashes()
-        self._results = ClosedResults()
-        self._outcomes: dict[Stage, _Outcome] = {}
-
-    @property
-    def results(self) -> ClosedResults:
-        """The newest results, even if out of date."""
-        return self._results
+        super().__init__(folder, _read, ClosedResults())
 
     @property
     def all_inputs(self) -> str:
@@ -97,28 +82,27 @@ class ClosedProject(EditableSession[ClosedSession]):
         for stage in STAGES[:1] if upto is Stage.BACKGROUND else STAGES:
             if not inputs[stage].images:
                 break
-            outcome = self._outcomes.get(stage)
-            if outcome is None or outcome.inputs != inputs[stage]:
+            if not self._is_current(stage, inputs[stage]):
                 found.append(stage)
-            elif outcome.fault is not None:
+            elif self.fault(stage) is not None:
                 break
         return tuple(found)
 
-    def compute(self, stage: Stage, tell: Callable[[float], None] | None = None) -> StageStatus:
+    def compute(self, stage: Stage, progress: Callable[[float], None] | None = None) -> StageStatus:
         """Run one stage on the present images and decisions, and store its result.
 
         Parameters
         ----------
         stage : Stage
             Background or balls.
-        tell : callable, optional
+        progress : callable, optional
             Called with the share done; it may raise, which leaves everything unchanged.
         """
         with self._lock:
             session, results, dropped = self._session, self._results, self._dropped
             inputs = self._inputs()[stage]
         fault = None
-        say = tell or (lambda _share: None)
+        say = progress or (lambda _share: None)
         try:
             if stage is Stage.BACKGROUND:
                 image = session.averaged("background")
@@ -131,11 +115,7 @@ class ClosedProject(EditableSession[ClosedSession]):
         except InputError as error:
             fault = error
         with self._lock:
-            # An image that was added and removed meanwhile may be in the result, but in no input.
-            if self._dropped == dropped:
-                if fault is None:
-                    self._results = results
-                self._outcomes[stage] = _Outcome(inputs, fault)
+            self._store(stage, Outcome(inputs, fault), results, dropped)
             return self._status(stage, self._inputs()[stage])
 
     def finish(self) -> InPlaceRun:
@@ -148,15 +128,11 @@ class ClosedProject(EditableSession[ClosedSession]):
         """
         with self._lock:
             status, run = self.statuses()[Stage.BALLS], self._results.run
-            fault = self._outcomes[Stage.BALLS].fault if Stage.BALLS in self._outcomes else None
+            fault = self.fault(Stage.BALLS)
             if fault is not None:
                 raise fault
             if run is None or status.state in (StageState.STALE, StageState.WAITING):
-                raise InputError(
-                    tr("The stage {stage} has no up-to-date result").format(stage="balls"),
-                    where=str(self._session.folder),
-                    advice=tr("Complete the stages that are not done yet"),
-                )
+                raise self._no_result(Stage.BALLS)
             provenance = replace(run.calibration.provenance, inputs=self.all_inputs)
         return replace(run, calibration=replace(run.calibration, provenance=provenance))
 
@@ -178,17 +154,13 @@ class ClosedProject(EditableSession[ClosedSession]):
         return StageInputs(images, repr(stated), earlier)
 
     def _status(self, stage: Stage, inputs: StageInputs) -> StageStatus:
-        outcome, nothing = self._outcomes.get(stage), QualityTable()
+        nothing = QualityTable()
         if not self._session.found(FOLDERS[stage]):
             return StageStatus(stage, StageState.EMPTY, tr("No images captured yet"), nothing)
-        if outcome is None:
+        if stage not in self._outcomes:
             return StageStatus(stage, StageState.WAITING, tr("Not computed yet"), nothing)
-        if outcome.inputs != inputs:
-            changes = "; ".join(changes_between(outcome.inputs, inputs))
-            sentence = tr("Out of date: {changes}").format(changes=changes)
-            return StageStatus(stage, StageState.STALE, sentence, nothing)
-        if outcome.fault is not None:
-            return StageStatus(stage, StageState.FAIL, str(outcome.fault), nothing)
+        if (unfinished := self._unfinished(stage, inputs)) is not None:
+            return unfinished
         table, run = self._results.background, self._results.run
         if stage is Stage.BALLS and run is not None:
             tables = run.calibration.quality.values()

@@ -231,7 +231,7 @@ def _shaded(
     shape = usable.shape
     around, seen_as = np.zeros((*shape, 3)), np.zeros((*shape, 3))
     flat = direct_flat(full, flat_light, flat_distance, view).reshape(*shape, 3)
-    for _ in range(THROWN if full.membrane.bounce > LEAST_SHARE else 1):
+    for _ in range(THROWN if full.membrane.interreflection > LEAST_SHARE else 1):
         # Light that is thrown on is thrown on again.
         seen_as = direct.reshape(*shape, 3) + around
         surface = Surface(
@@ -253,12 +253,12 @@ def direct_flat(full: FullModel, light: Array, distance: Array, view: Array) -> 
 def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> Array:
     """Return light from around (rows, columns, 3), in units of the flat membrane's."""
     around = np.zeros_like(flat)
-    if full.membrane.bounce <= LEAST_SHARE:
+    if full.membrane.interreflection <= LEAST_SHARE:
         return around
     tilted = surface.normals[..., 2] > LEVEL_NZ
     leds, receivers = full.led_positions_mm, Receivers.on(surface, tilted)
     found = gathered(surface, receivers, leds, full.membrane, pitch_mm)
-    around[tilted] = full.membrane.bounce * found / flat[tilted]
+    around[tilted] = full.membrane.interreflection * found / flat[tilted]
     return around
 
 
@@ -269,7 +269,7 @@ def _moved(full: FullModel, step: Array) -> FullModel:
         exponent=max(old.exponent + float(step[9]), 0.1),
         gloss=float(np.clip(old.gloss + step[10], 0.0, 0.95)),
         roughness=float(np.clip(old.roughness + step[11], 0.05, 1.0)),
-        bounce=max(old.bounce + float(step[12]), 0.0),
+        interreflection=max(old.interreflection + float(step[12]), 0.0),
         diffuse=bent_curves(old.diffuse, step[COMMON:]) if old.diffuse else (),
     )
     leds = full.led_positions_mm + step[:9].reshape(3, 3)
@@ -291,7 +291,7 @@ def found_depth(full: FullModel, field: SyntheticPress, depth_mm: Map) -> Map:
     scale = _scale(full, field)
     membrane, steps = membrane_numbers(full), Steps(STEPS, SETTLED**2, True, False)
     rows, columns = depth_mm.shape
-    thrown = membrane.bounce is not None
+    thrown = membrane.interreflection is not None
     view = view_directions(np.moveaxis(field.ray_slope, 0, -1).astype(np.float64))
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     x, y = np.meshgrid(field.x_mm, field.y_mm)

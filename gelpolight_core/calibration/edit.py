@@ -111,13 +111,6 @@ def edited_membrane(
     return replace(membrane, diffuse=tuple(tuple(curve) for curve in share.tolist()))
 
 
-def table_membrane(table: ReflectanceTable) -> Membrane:
-    """Return the paper's one-dimensional membrane: no gloss, no interreflection."""
-    even = np.linspace(0.0, 1.0, CURVE_NODES)
-    curves = [table.response(k, even) / table.values[k][-1] for k in range(3)]
-    return Membrane(diffuse=tuple(tuple(curve.tolist()) for curve in curves))
-
-
 def _checked(channel: int, curve: Curve) -> Curve:
     """Return a curve's nodes as float64, or raise an error that says what is wrong."""
     if channel not in range(3):

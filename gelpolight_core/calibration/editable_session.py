@@ -35,7 +35,7 @@ from gelpolight_core.session.description import write_description
 from gelpolight_core.session.known_files import KnownFiles
 from gelpolight_core.session.session import ONE_IMAGE_STAGES, Session
 
-Described = TypeVar("Described", Session, ClosedSession)
+Described = TypeVar("Described", bound=Session | ClosedSession)
 """The session of an open or of a closed sensor."""
 Frame = NDArray[Any]
 Write = Callable[[Path, Path], None]

@@ -143,7 +143,11 @@ def read_calibration(path: str | PathLike[str]) -> AnyCalibration:
                 name: _read_array(archive, name, entry)
                 for name, entry in manifest["arrays"].items()
             }
-        return _build(manifest, arrays)
+        calibration = _build(manifest, arrays)
+        # Records and validations know the name in the file. Other versions of the program may give
+        # another name to the same numbers; a changed copy computes its own.
+        vars(calibration)["identity"] = written_text(manifest["identity"])
+        return calibration
     except UNREADABLE as error:
         raise damaged(path, error) from error
 

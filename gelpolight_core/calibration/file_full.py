@@ -12,7 +12,9 @@ from gelpolight_core.reflectance.membrane import CURVE_NODES, MEMBRANES, Membran
 from gelpolight_core.sensor_calibration import FullModel, ScaleSd
 
 CURVES = "full_membrane_diffuse"
-OLDER_BOUNCE_SD = 0.03
+OLDER_NAME = "bounce"
+"""Of the interreflection, in files of earlier programs."""
+OLDER_INTERREFLECTION_SD = 0.03
 """Of the height, share. Older files hold the share of the neighbourhood's light that came back: it
 is near the membrane's reflectance, but not equal to it."""
 
@@ -67,16 +69,21 @@ def read_full(entry: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> FullMod
         raise ValueError(f"unknown membrane {kept!r}")
     two_lobe, one_dimensional = (float(v) for v in entry.get("membrane_held_out", (0.0, 0.0)))
     sd = {str(name): float(value) for name, value in entry.get("membrane_sd", {}).items()}
+    membrane = dict(entry["membrane"])
+    for named in (sd, membrane):
+        if OLDER_NAME in named:
+            named["interreflection"] = named.pop(OLDER_NAME)
     figures = np.array([two_lobe, one_dimensional, *sd.values()], float)
     if not np.isfinite(figures).all() or figures.min() < 0.0:
         raise ValueError("the figures of the membrane are impossible")
-    membrane = dict(entry["membrane"])
     reach_mm = float(membrane.pop("bounce_reach_mm", np.inf))
     if not reach_mm > 0.0:
         raise ValueError("the membrane has impossible values")
     scale_sd = _read_scale(entry["scale_sd"]) if "scale_sd" in entry else None
-    if reach_mm < np.inf and scale_sd is not None and float(membrane["bounce"]) > 0.0:
-        scale_sd = replace(scale_sd, depth=float(np.hypot(scale_sd.depth, OLDER_BOUNCE_SD)))
+    if reach_mm < np.inf and scale_sd is not None and float(membrane["interreflection"]) > 0.0:
+        scale_sd = replace(
+            scale_sd, depth=float(np.hypot(scale_sd.depth, OLDER_INTERREFLECTION_SD))
+        )
     return FullModel(
         led_positions_mm=arrays["full_led_positions_mm"],
         led_sd_mm=arrays["full_led_sd_mm"],
@@ -117,6 +124,6 @@ def _read_membrane(entry: dict[str, Any], curves: NDArray[Any] | None) -> Membra
         raise ValueError("the membrane has impossible values")
     if membrane.exponent <= 0.0 or not 0.0 < membrane.roughness <= 1.0:
         raise ValueError("the membrane has impossible values")
-    if membrane.bounce < 0.0:
+    if membrane.interreflection < 0.0:
         raise ValueError("the membrane has impossible values")
     return membrane

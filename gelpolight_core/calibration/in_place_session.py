@@ -80,17 +80,17 @@ def calibrate_closed_session(
     InputError
         If background or balls are missing or cannot be used.
     """
-    tell = progress or (lambda _stage, _share: None)
+    progress = progress or (lambda _stage, _share: None)
     _refuse_missing(session)
     files = tuple(path for stage in session.stages for path in session.files(stage))
     refuse_copies(files)
-    tell(tr("background"), 0.0)
+    progress(tr("background"), 0.0)
     background = session.averaged("background")
     require_colour(background, where=str(session.folder / "background"))
     scale = None if session.mm_per_px is not None else _measured_scale(session, background)
     mm_per_px, scale_sd = _scale(session, scale)
     grid = WorkingGrid(ImageSize(*background.size), mm_per_px)
-    tell(tr("ball presses"), 0.05)
+    progress(tr("ball presses"), 0.05)
     presses, unreadable = _presses(session, background)
     result = calibrate_in_place(
         background.rgb,
@@ -98,7 +98,7 @@ def calibrate_closed_session(
         grid,
         scale_sd=scale_sd,
         towards=towards,
-        tell=lambda share: tell(tr("ball presses"), 0.05 + 0.95 * share),
+        progress=lambda share: progress(tr("ball presses"), 0.05 + 0.95 * share),
     )
     result = replace(result, refused={**result.refused, **unreadable})
     calibration = InPlaceCalibration(
@@ -110,7 +110,7 @@ def calibrate_closed_session(
         provenance=provenance_of(session.folder, files, session.camera_settings),
         response=session.response,
     )
-    tell(tr("done"), 1.0)
+    progress(tr("done"), 1.0)
     return InPlaceRun(calibration, result, scale)
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_light import with_light_from_around
 from gelpolight_core.calibration.ball_pixels import BallPixels, thinned
+from gelpolight_core.calibration.board_reflectance import BesideBoard
 from gelpolight_core.calibration.jackknife import jackknife_covariance
 from gelpolight_core.calibration.joint_kernel import CORRELATION
 from gelpolight_core.calibration.joint_problem import (
@@ -39,10 +40,10 @@ from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
 from gelpolight_core.reflectance.press import BallPress
 
 Array = NDArray[np.float64]
-BOUNCE = 12
+INTERREFLECTION = 12
 SIGNIFICANT = 3.0
 """Standard deviations from which on light from around counts as seen."""
-_NAMES = ("exponent", "gloss", "roughness", "bounce", "decay_mm")
+_NAMES = ("exponent", "gloss", "roughness", "interreflection", "decay_mm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +101,7 @@ def refine_jointly(
     led_positions_mm: Array,
     slab: Slab,
     *,
+    board: BesideBoard | None = None,
     terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
 ) -> JointResult:
     """Refine LEDs, membrane and balls together.
@@ -115,22 +117,34 @@ def refine_jointly(
         From the mirror spots.
     slab : Slab
         What is below the membrane.
+    board : BesideBoard, optional
+        The membrane beside the white board, which says what it reflects.
     terms : CalibrationTerms, optional
         The effects to model; by default all.
     """
-    if terms.bounce:
+    if terms.interreflection:
         seen = _first_light(presses, pixels, led_positions_mm, slab, terms)
         # A membrane that shows no light from around needs none to be gathered in any frame.
-        pixels, terms = (pixels, replace(terms, bounce=False)) if seen is None else (seen, terms)
+        pixels, terms = (
+            (pixels, replace(terms, interreflection=False)) if seen is None else (seen, terms)
+        )
     held_out, membranes = _held_out(presses, pixels, led_positions_mm, terms)
     refine = held_out[1] <= held_out[0]
     curves = membranes[1] <= membranes[0]
     solved = _solve(presses, pixels, led_positions_mm, terms, refine=refine, curves=curves)
-    if terms.bounce:
+    if terms.interreflection:
         pixels = _lit(pixels, solved.x, slab)
         start = solved.x
+        expected = None if board is None else _expected(board, solved, COMMON + 3 * len(pixels))
         solved = _solve(
-            presses, pixels, led_positions_mm, terms, refine=refine, curves=curves, near=start
+            presses,
+            pixels,
+            led_positions_mm,
+            terms,
+            refine=refine,
+            curves=curves,
+            near=start,
+            reflectance=expected,
         )
     x, sd = solved.x, solved.sd
     end = COMMON + 3 * len(pixels)
@@ -152,10 +166,17 @@ def refine_jointly(
 
 
 def _membrane_of(x: Array, balls_end: int) -> Membrane:
-    bounce = float(x[12])
+    interreflection = float(x[12])
     if x.size == balls_end:
-        return Membrane(float(x[9]), float(x[10]), float(x[11]), bounce)
-    return Membrane(bounce=bounce, diffuse=diffuse_curves(x[balls_end:]))
+        return Membrane(float(x[9]), float(x[10]), float(x[11]), interreflection)
+    return Membrane(interreflection=interreflection, diffuse=diffuse_curves(x[balls_end:]))
+
+
+def _expected(board: BesideBoard, solved: _Solution, balls_end: int) -> tuple[float, float] | None:
+    """Return the reflectance to expect beside the board, and its standard deviation."""
+    x = solved.x
+    shown = float(x[INTERREFLECTION]), float(solved.sd[INTERREFLECTION])
+    return board.expected(x[:9].reshape(3, 3), _membrane_of(x, balls_end), shown)
 
 
 def _lit(pixels: Sequence[BallPixels], x: Array, slab: Slab) -> list[BallPixels]:
@@ -181,7 +202,7 @@ def _first_light(
     x, _ = _start(presses, leds, terms, curves=False)
     some = _lit([thinned(p) for p in pixels], x, slab)
     fitted = _solve(presses, some, leds, terms, refine=terms.led_refinement)
-    if fitted.x[BOUNCE] <= SIGNIFICANT * fitted.sd[BOUNCE]:
+    if fitted.x[INTERREFLECTION] <= SIGNIFICANT * fitted.sd[INTERREFLECTION]:
         return None
     return _lit(pixels, fitted.x, slab)
 
@@ -212,13 +233,13 @@ def _start(
     """Return the start values of the fit, and which parameters are free."""
     balls = [[*p.pose.centre_mm, p.pose.depth_mm] for p in presses]
     glossy = terms.gloss and not curves
-    common = [1.0, 0.05 * glossy, 0.5, 0.1 * terms.bounce, 0.7]
+    common = [1.0, 0.05 * glossy, 0.5, 0.1 * terms.interreflection, 0.7]
     heights = np.zeros(CURVE_SIZE if curves else 0)
     start = np.concatenate([leds.ravel(), common, np.ravel(balls), heights])
     free = np.ones(start.size, dtype=bool)
     free[:9] = terms.led_refinement
     # Deviations from Lambert's cosine law are covered by the one-dimensional curves.
-    free[9:DECAY] = [False, glossy, glossy, terms.bounce]
+    free[9:DECAY] = [False, glossy, glossy, terms.interreflection]
     return start, free
 
 
@@ -232,10 +253,11 @@ def _solve(
     curves: bool = False,
     judging: Array | None = None,
     near: Array | None = None,
+    reflectance: tuple[float, float] | None = None,
 ) -> _Solution:
     """Solve for all parameters or, when judging a fit to other presses, for the balls alone.
 
-    Starts from a solution that is `near`, if there is one.
+    Starts from a solution that is `near`, if there is one. A `reflectance` may be expected.
     """
     start, free = _start(presses, leds, terms, curves=curves)
     balls = slice(COMMON, COMMON + 3 * len(pixels))
@@ -253,7 +275,7 @@ def _solve(
         start[balls.stop :] = judging[judging.size - (start.size - balls.stop) :]
         free[:COMMON] = False
         free[balls.stop :] = False
-    problem = Problem(pixels, start, free)
+    problem = Problem(pixels, start, free, reflectance)
     scale = np.full(start.size, 0.1)
     scale[DECAY] = 0.05
     scale[balls] = np.tile([0.02, 0.02, 0.05], len(pixels))

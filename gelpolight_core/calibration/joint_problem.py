@@ -69,12 +69,14 @@ class Problem:
     """Residuals of all presses, with priors.
 
     The parameters are the common ones, then x, y and depth of each ball and, if the membrane is
-    one-dimensional, the heights of its curves; only those that are `free` are solved for.
+    one-dimensional, the heights of its curves; only those that are `free` are solved for. The
+    reflectance for light from around may be expected, with a standard deviation.
     """
 
     presses: Sequence[BallPixels]
     start: Array
     free: NDArray[np.bool_]
+    reflectance: tuple[float, float] | None = None
 
     @property
     def balls_end(self) -> int:
@@ -125,6 +127,7 @@ class Problem:
     def priors(self, x: Array) -> Array:
         """Return the residuals of the prior knowledge."""
         moved = (x[:9] - self.start[:9]).reshape(3, 3)
+        expected = self.reflectance
         return np.concatenate(
             [
                 PRIOR_STRENGTH * moved[:, :2].ravel() / LED_LATERAL_SD_MM,
@@ -132,6 +135,7 @@ class Problem:
                 # Exponent and gloss trade off; the data must clearly show a diffuse share that
                 # deviates from Lambert's law (the loss allows large deviations), or an unseen lobe.
                 [PRIOR_STRENGTH * (x[9] - 1.0) / 0.01, (x[11] - 0.5) / 0.3],
+                [] if expected is None else [(x[12] - expected[0]) / expected[1]],
                 x[self.balls_end :] / CURVE_SD,
             ]
         )

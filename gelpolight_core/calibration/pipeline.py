@@ -87,22 +87,22 @@ def calibrate_session(
     InputError
         If a stage is missing or cannot be used; the message names the file.
     """
-    tell = progress or (lambda _stage, _share: None)
+    progress = progress or (lambda _stage, _share: None)
     refuse_copies(source_files(session))
     results = StageResults()
     stages = stages_of(model)
     ends = [_BEGINS[stage] for stage in stages[1:]] + [1.0]
     for stage, end in zip(stages, ends, strict=True):
         name, begin = stage_title(stage), _BEGINS[stage]
-        tell(name, begin)
+        progress(name, begin)
 
         def within(share: float, name: str = name, begin: float = begin, end: float = end) -> None:
-            tell(name, begin + share * (end - begin))
+            progress(name, begin + share * (end - begin))
 
-        results = run_stage(stage, session, results, tell=within)
+        results = run_stage(stage, session, results, progress=within)
         if stage is Stage.BALLS:
             require_balls(results)
-    tell(tr("done"), 1.0)
+    progress(tr("done"), 1.0)
     return assemble(session, results, model=model)
 
 
@@ -229,7 +229,12 @@ def judge_joint(full: FullModel) -> QualityTable:
             *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
-            judge("bounce", tr("Interreflection of the membrane"), full.membrane.bounce, warn=1.2),
+            judge(
+                "interreflection",
+                tr("Interreflection of the membrane"),
+                full.membrane.interreflection,
+                warn=1.2,
+            ),
             judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
         )
     )

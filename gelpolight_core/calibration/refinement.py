@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import CoarseView, gather_ball_pixels
+from gelpolight_core.calibration.board_reflectance import BesideBoard
 from gelpolight_core.calibration.depth_scale import (
     ball_height_error,
     depth_scale_sd,
@@ -18,6 +19,7 @@ from gelpolight_core.calibration.results import StageResults, need
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import LightResult
+from gelpolight_core.masks import throws_light
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.sensor_calibration import (
@@ -30,6 +32,9 @@ from gelpolight_core.sensor_calibration import (
 from gelpolight_core.session.session import SensorData, Session
 
 CHECKED_BALLS = 4
+GATHERED_SD = 0.005
+"""Of the height, where light between parts of the membrane is gathered: what finite facets and
+near windows change, besides the reflectance."""
 
 
 def refine(session: Session, results: StageResults) -> StageResults:
@@ -75,7 +80,7 @@ def refine_with(
     crosstalk = found.matrix
     background = unmix(bare, crosstalk)
     noise = press_noise(results.presses)
-    view = CoarseView.of(table, factors.usable)
+    view = CoarseView.of(table, throws_light(table.valid, background))
     pixels = [
         gather_ball_pixels(
             press, unmix(image, crosstalk), background, table, view, factors.usable, noise
@@ -83,7 +88,10 @@ def refine_with(
         for press, image in zip(results.presses, results.images, strict=True)
     ]
     slab = Slab.of(sensor_stack(sensor, need(results.top_pose, "balls").plane))
-    joint = refine_jointly(results.presses, pixels, lights.led_positions_mm, slab, terms=terms)
+    leds = lights.led_positions_mm
+    radiance = need(results.radiance, "balls").radiance
+    board = BesideBoard.of(table, factors.usable, background, radiance, crosstalk, leds)
+    joint = refine_jointly(results.presses, pixels, leds, slab, board=board, terms=terms)
     full = FullModel(
         joint.led_positions_mm,
         joint.led_sd_mm if joint.kept == "refined" else _mirror_sd(lights),
@@ -122,7 +130,8 @@ def _scale_sd(
         calibration.stack, pose.distance_sd_mm, lens.focal_sd_px[0] / lens.camera.fx
     )
     fitted = depth_scale_sd(full, calibration.table, covariance)
-    together = float(np.linalg.norm([fitted, unexplained, lateral]))
+    gathered = GATHERED_SD if full.membrane.interreflection > 0.0 else 0.0
+    together = float(np.linalg.norm([fitted, unexplained, lateral, gathered]))
     return ScaleSd(together, lateral, unexplained)
 
 

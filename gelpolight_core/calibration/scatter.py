@@ -59,12 +59,12 @@ def gather_scatter(
     InputError
         If a ball image can no longer be read.
     """
-    tell = progress or (lambda _name, _share: None)
+    progress = progress or (lambda _name, _share: None)
     table = run.calibration.table
     presses = run.reflectance.presses
     parts: list[list[tuple[Array, Array, NDArray[np.intp]]]] = [[], [], []]
     for index, press in enumerate(presses):
-        tell(press.name, index / len(presses))
+        progress(press.name, index / len(presses))
         image = table.apply(
             read_image(session.folder / press.name, response=run.calibration.response).rgb
         )

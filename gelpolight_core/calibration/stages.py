@@ -58,7 +58,7 @@ Progress = Callable[[float], None]
 
 
 def run_stage(
-    stage: Stage, session: Session, results: StageResults, *, tell: Progress | None = None
+    stage: Stage, session: Session, results: StageResults, *, progress: Progress | None = None
 ) -> StageResults:
     """Run one stage on the results of the earlier ones.
 
@@ -71,7 +71,7 @@ def run_stage(
     results : StageResults
         Results of all stages that this one needs; balls found earlier are reused if their inputs
         have not changed.
-    tell : callable, optional
+    progress : callable, optional
         Called with the share of this stage done, 0..1.
 
     Returns
@@ -88,10 +88,10 @@ def run_stage(
     """
     if results.response is not None:
         session = replace(session, response=results.response.response)
-    return _RUNS[stage](session, results, tell or (lambda _share: None))
+    return _RUNS[stage](session, results, progress or (lambda _share: None))
 
 
-def _run_response(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+def _run_response(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     if "response" in session.optional_stages:
         response = measure_response(*session.series(), declared=session.declared_response)
     else:
@@ -99,13 +99,13 @@ def _run_response(session: Session, results: StageResults, _tell: Progress) -> S
     return replace(results, response=response)
 
 
-def _run_lens(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+def _run_lens(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     images, refused = session.usable_images("checkerboard")
     lens = calibrate_lens(images, session.checkerboard, refused=refused)
     return replace(results, lens=lens)
 
 
-def _run_top_pose(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+def _run_top_pose(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     lens = need(results.lens, "top_pose")
     images, refused = session.usable_images("top_pose")
     _same_size(images[0], lens, "top_pose")
@@ -125,7 +125,7 @@ def _run_top_pose(session: Session, results: StageResults, _tell: Progress) -> S
     return replace(results, top_pose=pose, table=table)
 
 
-def _run_lights(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+def _run_lights(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     lens, pose = need(results.lens, "mirror"), need(results.top_pose, "mirror")
     spots = find_mirror_spots(
         _stage_image(session, "mirror", lens), placed=session.decisions.spots_px
@@ -152,14 +152,14 @@ def _single_led(session: Session, lens: LensResult) -> tuple[LinearImage, ...]:
     return images
 
 
-def _run_radiance(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+def _run_radiance(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     lens, table = need(results.lens, "whiteboard"), need(results.table, "whiteboard")
     lights = need(results.lights, "whiteboard")
     whiteboard = _stage_image(session, "whiteboard", lens)
     return replace(results, radiance=calibrate_radiance(whiteboard, table, lights.led_positions_mm))
 
 
-def _run_background(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+def _run_background(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     lens, table = need(results.lens, "background"), need(results.table, "background")
     background = _stage_image(session, "background", lens)
     _refuse_unlit(background)
@@ -179,7 +179,7 @@ def _run_background(session: Session, results: StageResults, _tell: Progress) ->
     )
 
 
-def _run_balls(session: Session, results: StageResults, tell: Progress) -> StageResults:
+def _run_balls(session: Session, results: StageResults, progress: Progress) -> StageResults:
     known = {ball.key: ball for ball in results.balls}
     inputs = inputs_of(session)
     rests_on = tuple(inputs[need].fingerprint for need in NEEDS[Stage.BALLS])
@@ -194,7 +194,7 @@ def _run_balls(session: Session, results: StageResults, tell: Progress) -> Stage
 
     balls: list[SeenBall] = []
     for found in in_parallel(ball, files):
-        tell(len(balls) / len(files))
+        progress(len(balls) / len(files))
         balls.append(found)
     return replace(results, balls=tuple(balls))
 
@@ -262,7 +262,7 @@ def placed_contact(
     return PlacedContact((float(middle[0]), float(middle[1])), radius_mm)
 
 
-def _run_reflectance(session: Session, results: StageResults, _tell: Progress) -> StageResults:
+def _run_reflectance(session: Session, results: StageResults, _progress: Progress) -> StageResults:
     """Fit the table, then the factors, and feed these back once (section V-E)."""
     del session
     table, lights = need(results.table, "balls"), need(results.lights, "balls")
@@ -285,7 +285,7 @@ _RUNS: Mapping[Stage, Callable[[Session, StageResults, Progress], StageResults]]
         Stage.BACKGROUND: _run_background,
         Stage.BALLS: _run_balls,
         Stage.REFLECTANCE: _run_reflectance,
-        Stage.JOINT: lambda session, results, _tell: refine(session, results),
+        Stage.JOINT: lambda session, results, _progress: refine(session, results),
     }
 )
 

@@ -18,7 +18,7 @@ class CalibrationTerms:
         The membrane has a glossy lobe; otherwise it is diffuse only.
     curves : bool
         The membrane may be a one-dimensional curve for each channel, if two lobes do no better.
-    bounce : bool
+    interreflection : bool
         Interreflection: the membrane receives light from the membrane around it.
     crosstalk : bool
         Each LED's light is removed from the other channels; otherwise the raw channels are used.
@@ -29,7 +29,7 @@ class CalibrationTerms:
 
     gloss: bool = True
     curves: bool = True
-    bounce: bool = True
+    interreflection: bool = True
     crosstalk: bool = True
     led_refinement: bool = True
 

@@ -201,8 +201,8 @@ def blocked_pixels(design: SensorDesign) -> tuple[NDArray[np.bool_], float]:
 def veil_share(design: SensorDesign) -> float:
     """Return the largest share of light that arrives via the outer lower face.
 
-    One bounce from the flat diffuse membrane to the face and back (Fresnel, total reflection past
-    the critical angle); the window counts as elastomer.
+    One reflection from the flat diffuse membrane to the face and back (Fresnel, total reflection
+    past the critical angle); the window counts as elastomer.
 
     Parameters
     ----------

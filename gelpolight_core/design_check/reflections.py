@@ -61,7 +61,7 @@ def led_reflections(design: SensorDesign) -> tuple[Reflection, ...]:
         if led.height_mm > face_mm:
             found.append(_below_lower_face(design, name, led, face_mm))
         else:
-            found.extend(_by_top_surface(design, name, led, bounces) for bounces in (1, 2))
+            found.extend(_by_top_surface(design, name, led, times) for times in (1, 2))
     return tuple(found)
 
 
@@ -86,11 +86,11 @@ def _below_lower_face(
     )
 
 
-def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, bounces: int) -> Reflection:
-    """Mirror image in the top surface; with two bounces the lower face reflects in between."""
+def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, times: int) -> Reflection:
+    """Mirror image in the top surface; with two reflections the lower face reflects in between."""
     layers = design.layers
-    # Unfolded, each further bounce adds the path down and up through all layers.
-    again = 2.0 * (bounces - 1)
+    # Unfolded, each further reflection adds the path down and up through all layers.
+    again = 2.0 * (times - 1)
     unfolded = LayerDesign(
         top_distance_mm=layers.top_distance_mm
         + again * (layers.elastomer_thickness_mm + layers.window_thickness_mm),
@@ -111,10 +111,10 @@ def _by_top_surface(design: SensorDesign, name: str, led: LedDesign, bounces: in
     rim = 0.5 * design.membrane.working_diameter_mm
     return Reflection(
         name,
-        "top surface" if bounces == 1 else "top surface twice",
+        "top surface" if times == 1 else "top surface twice",
         _pair(pixel),
         at,
-        top ** (2 * bounces - 1),
+        top ** (2 * times - 1),
         _in_image(design, pixel) and radius <= rim,
     )
 

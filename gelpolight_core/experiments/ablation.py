@@ -91,7 +91,12 @@ VARIANTS = (
     Variant("weights", marked("plain sine transform, no weights"), Terms(weights=False)),
     Variant("free_rim", marked("rim always held at depth 0"), Terms(free_rim=False)),
     Variant("denoising", marked("even parts not averaged"), Terms(denoising=False)),
-    Variant("bounce", marked("no light from around"), calibration=CalibrationTerms(bounce=False)),
+    Variant("sharpening", marked("images as blurred as they are"), Terms(sharpening=False)),
+    Variant(
+        "interreflection",
+        marked("no light from around"),
+        calibration=CalibrationTerms(interreflection=False),
+    ),
     Variant("gloss", marked("no glossy lobe"), calibration=CalibrationTerms(gloss=False)),
     Variant(
         "curves",
@@ -213,18 +218,18 @@ def ablate(
     InputError
         If the session cannot be calibrated, or a press has no image or no truth.
     """
-    tell = progress or (lambda _what, _share: None)
+    progress = progress or (lambda _what, _share: None)
     radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
     seen = run_stage(Stage.RESPONSE, session, StageResults()).response
     linear = session if seen is None else replace(session, response=seen.response)
     presses = read_presses(linear, radius_mm)
-    candidates = _calibrated(session, (EVERYTHING, *variants), workers, tell)
+    candidates = _calibrated(session, (EVERYTHING, *variants), workers, progress)
     for candidate in candidates:
         candidate.reconstruct.depth(presses[0].rgb, normals=False)  # makes maps and kernels ready
     for number, press in enumerate(presses):
-        tell(press.row.file, CALIBRATING + (1.0 - CALIBRATING) * number / len(presses))
+        progress(press.row.file, CALIBRATING + (1.0 - CALIBRATING) * number / len(presses))
         _take_in_turn(candidates, press, repeats, radius_mm)
-    tell("", 1.0)
+    progress("", 1.0)
     everything = np.array(candidates[0].times_ms)
     results = tuple(
         TermResult(
@@ -301,7 +306,7 @@ def _take_in_turn(
 
 
 def _calibrated(
-    session: Session, variants: Sequence[Variant], workers: int, tell: Progress
+    session: Session, variants: Sequence[Variant], workers: int, progress: Progress
 ) -> list[_Candidate]:
     """Calibrate the stages once, and refine them for every set of terms that is asked for."""
     asked = {variant.calibration for variant in variants}
@@ -309,7 +314,7 @@ def _calibrated(
     results = StageResults()
     stages = stages_of("paper")
     for number, stage in enumerate(stages):
-        tell(stage.value, CALIBRATING * number / len(stages) / whole)
+        progress(stage.value, CALIBRATING * number / len(stages) / whole)
         results = run_stage(stage, session, results)
     paper = assemble(session, results, model="paper").calibration
     made: dict[CalibrationTerms, tuple[Calibration, float]] = {}
@@ -317,7 +322,7 @@ def _calibrated(
     for variant in variants:
         terms = variant.calibration
         if terms not in made:
-            tell(variant.label, CALIBRATING * (1 + len(made)) / whole)
+            progress(variant.label, CALIBRATING * (1 + len(made)) / whole)
             begin = time.process_time()
             refined = bare_calibration(session, refine_with(session.sensor, results, terms=terms))
             made[terms] = refined, time.process_time() - begin

@@ -16,17 +16,17 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gelpolight_core.calibration.board_reflectance import BesideBoard
 from gelpolight_core.experiments.ablation import RIM_MM, TruePress, read_presses
 from gelpolight_core.experiments.true_view import TrueView, lit_by, true_view
-from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.masks import LEAST_LIGHT
 from gelpolight_core.measurement.score import TrueDepth
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
 from gelpolight_core.reconstruction.misfit import direct_light
+from gelpolight_core.reconstruction.near_light.maps import SensorMaps
 from gelpolight_core.reconstruction.near_light.region_solver import Solved
 from gelpolight_core.reconstruction.near_light.solver import NearLightSolver
-from gelpolight_core.reflectance.gathered_light import Receivers, Slab, Surface, gathered
+from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered, ratio_thrown
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 from gelpolight_core.session.session import Session
@@ -42,8 +42,6 @@ ALL_COUNT = 0.9
 LEAST_NODES = 20
 PLATEAU = 0.98
 STEEP_DEG = 30.0
-THIN = 8
-"""Nodes between those at which membrane and white board are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,13 +151,13 @@ def explain(
     """
     full = calibration.full
     assert full is not None
-    tell = progress or (lambda _what, _share: None)
+    progress = progress or (lambda _what, _share: None)
     radius_mm = 0.5 * session.sensor.working_diameter_mm - RIM_MM
     presses = read_presses(replace(session, response=calibration.response), radius_mm)
     solver = NearLightSolver(calibration, full, workers=2)
     losses, parts = [], []
     for number, press in enumerate(presses):
-        tell(press.row.file, number / len(presses))
+        progress(press.row.file, number / len(presses))
         solved = solver.solved(press.rgb, effort="fast")
         if solved is None:
             continue
@@ -167,8 +165,8 @@ def explain(
         # Walls mirror even distant membrane: light is gathered from the whole field.
         whole = solver.solved(press.rgb, effort="fast", everywhere=True)
         assert whole is not None
-        parts.append(_light_at(full, Slab.of(calibration.stack), press.truth, whole))
-    tell("", 1.0)
+        parts.append(_light_at(solver.maps, press.truth, whole))
+    progress("", 1.0)
     values = np.concatenate(parts) if parts else np.empty((0, 6))
     return Explanation(
         session.folder.resolve().name,
@@ -180,30 +178,13 @@ def explain(
 
 
 def membrane_reflectance(calibration: Calibration, full: FullModel) -> float:
-    """Return the membrane's reflectance in units of the white board's.
-
-    Both were seen under the same light; the board is Lambertian (Eq. 5), the membrane is as the
-    full model describes it.
-
-    Parameters
-    ----------
-    calibration, full
-        The sensor's.
-    """
-    grid, thin = calibration.table.grid, np.s_[::THIN, ::THIN]
-    x, y = np.meshgrid(grid.x_mm[::THIN], grid.y_mm[::THIN])
-    usable = (calibration.table.valid & (calibration.factors > 0.0).all(axis=-1))[thin]
-    points = np.stack([x, y, np.zeros_like(x)], axis=-1)[usable]
-    light, _ = light_directions(full.led_positions_mm, points)
-    cosine = -light[..., 2]
-    view = view_directions(calibration.table.ray_slope[thin][usable].astype(np.float64))
-    up = np.broadcast_to([0.0, 0.0, -1.0], view.shape)
-    raw = (calibration.radiance[thin][usable] * cosine).astype(np.float32)
-    board = unmix(raw, calibration.crosstalk)
-    bright = full.membrane.response(light, up, view)
-    seen = full.background[thin][usable] / np.maximum(board, LEAST_LIGHT) * cosine / np.pi / bright
-    lit = (board > LEAST_LIGHT).all(axis=-1)
-    return float(np.median(seen[lit])) if lit.any() else float("nan")
+    """Return the membrane's reflectance in units of the white board's, by their brightness."""
+    table, leds = calibration.table, full.led_positions_mm
+    usable = table.valid & (calibration.factors > 0.0).all(axis=-1)
+    both = BesideBoard.of(
+        table, usable, full.background, calibration.radiance, calibration.crosstalk, leds
+    )
+    return both.reflectance(leds, full.membrane)
 
 
 def _needed(values: Array) -> float:
@@ -247,28 +228,33 @@ def _loss(press: TruePress, solved: Solved, view: TrueView, radius_mm: float) ->
     return Loss(press.row.file, error(own), error(true), error(mixed(dark)), error(mixed(~dark)))
 
 
-def _light_at(full: FullModel, slab: Slab, truth: TrueDepth, solved: Solved) -> Array:
+def _light_at(maps: SensorMaps, truth: TrueDepth, solved: Solved) -> Array:
     """Return side, slope, image, direct light, the model's addition and the gathered one (N, 6).
 
     Every second node along both axes, where it is tilted.
     """
     view, ray_slope = _view(solved, truth)
-    image, scale, leds = solved.compared.coarse, solved.scale, full.led_positions_mm
+    image, scale, full = solved.compared.coarse, solved.scale, maps.full
+    leds = full.led_positions_mm
     slope = np.degrees(np.arccos(np.clip(-view.normals[..., 2], 0.0, 1.0)))
     usable = scale.kind == 2
     seen = np.moveaxis(image.ratio, 0, -1).astype(np.float64)
     around = np.moveaxis(np.broadcast_to(solved.compared.fine.around, image.ratio.shape), 0, -1)
     flat = -np.moveaxis(scale.flat, 0, -1).astype(np.float64)
     towards_camera = view_directions(ray_slope)
-    facets = Surface(view.points_mm, view.normals, towards_camera, seen * flat * usable[..., None])
+    sent = ratio_thrown(seen, usable[..., None], maps.throwing) * flat
+    facets = Surface(view.points_mm, view.normals, towards_camera, sent)
     where = usable & view.known & (slope >= BANDS[0])
     thinned = np.zeros_like(where)
     thinned[::2, ::2] = where[::2, ::2]
     at = Receivers.on(facets, thinned)
-    thrown = gathered(facets, at, leds, full.membrane, scale.pitch_mm, slab=slab) / flat[thinned]
+    thrown = (
+        gathered(facets, at, leds, full.membrane, scale.pitch_mm, slab=maps.slab) / flat[thinned]
+    )
     points, normals = view.points_mm[thinned], view.normals[thinned]
     lit = lit_by(truth, view, leds)[thinned]
     direct = direct_light(full, points[:, :2], -points[:, 2], normals, ray_slope[thinned])
+    direct *= 1.0 - np.moveaxis(maps.returned, 0, -1)[thinned]
     light, _ = light_directions(leds, points)
     tilted = np.einsum("nkc,nc->nk", light, normals) > -light[..., 2]
     side = np.where(lit, np.where(tilted, 0, 1), 2)

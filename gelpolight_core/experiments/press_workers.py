@@ -21,7 +21,7 @@ import numpy as np
 
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
-from gelpolight_core.measurement.evaluation import measure_press
+from gelpolight_core.measurement.evaluation_run import measure_press
 from gelpolight_core.measurement.presses import press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
 from gelpolight_core.measurement.result import Measurement, Truth

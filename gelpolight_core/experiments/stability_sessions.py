@@ -187,12 +187,12 @@ def length_costs(*, progress: Progress | None = None) -> tuple[LengthCost, ...]:
     progress : callable, optional
         Told the length and the share done.
     """
-    tell = progress or (lambda _name, _share: None)
+    progress = progress or (lambda _name, _share: None)
     with _changed(lambda _: None, SCALE) as folder:
         base = _best_size(_calibrated(folder), folder)
     costs = []
     for n, length in enumerate(LENGTHS):
-        tell(length.label, n / len(LENGTHS))
+        progress(length.label, n / len(LENGTHS))
         try:
             with _changed(partial(state_wrongly, length, 1.0), SCALE) as folder:
                 run = _calibrated(folder)
@@ -202,7 +202,7 @@ def length_costs(*, progress: Progress | None = None) -> tuple[LengthCost, ...]:
             continue
         changes = (100.0 * (height / base[0] - 1.0), 100.0 * (size / base[1] - 1.0))
         costs.append(LengthCost(length, *changes, _verdict(run).value))
-    tell("", 1.0)
+    progress("", 1.0)
     return tuple(costs)
 
 

@@ -14,7 +14,8 @@ from gelpolight_core.calibration.pipeline import calibrate_session
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.experiments.press_workers import Equipment, PressTask, work_through
 from gelpolight_core.io.atomic import make_folder
-from gelpolight_core.measurement.evaluation import Evaluation, evaluate_presses
+from gelpolight_core.measurement.evaluation import Evaluation
+from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.presses import open_ledger, press_measurement
 from gelpolight_core.measurement.protocol import PressWanted
@@ -56,11 +57,11 @@ def calibrate_virtual_sensor(
     """
 
     def part(start: float, width: float) -> Progress:
-        def tell(name: str, share: float) -> None:
+        def report(name: str, share: float) -> None:
             if progress is not None:
                 progress(name, start + width * share)
 
-        return tell
+        return report
 
     made, session = folder / CALIBRATION, folder / SESSION
     if made.is_file():

@@ -69,8 +69,8 @@ class HealthCheck:
         self._run_change = np.zeros((3, runs))
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
         full = calibration.full
-        bounce = 0.0 if full is None else full.membrane.bounce
-        self._limits = Limits.of(bounce)
+        interreflection = 0.0 if full is None else full.membrane.interreflection
+        self._limits = Limits.of(interreflection)
         self._stripe = 0
         self._lock = Lock()
 

@@ -31,16 +31,16 @@ LEAST_OFFSET, LEAST_LOSS = 0.0002, 0.0006
 
 A shallow press over much of the field looks like a loss of up to 0.0005.
 """
-GAIN_BY_BOUNCE = 0.004
+GAIN_BY_INTERREFLECTION = 0.004
 """A deep press changes the light from the membrane around by so much, times its strength."""
 LEAST_CORRECTED, LEAST_MEAN_CORRECTED = 0.001, 0.0005
 """Smaller changes of a channel, and of all, are left as they are: they cost 3 to 5 um, and shallow
 faces look like as much."""
 CLEAR_ROOM_LIGHT = 3.0
 """Room light of so many times the limit counts although a gain may cancel it."""
-MEAN_BY_BOUNCE = 0.002
-"""As `GAIN_BY_BOUNCE`, of the mean of the channels."""
-PRESS_BY_BOUNCE = 0.0015
+MEAN_BY_INTERREFLECTION = 0.002
+"""As `GAIN_BY_INTERREFLECTION`, of the mean of the channels."""
+PRESS_BY_INTERREFLECTION = 0.0015
 """Standard deviation of what presses change of the light around, times the interreflection."""
 CORRECTABLE = ("exposure", "led_weak")
 LEAST_SHIFT_PX = 0.5
@@ -79,16 +79,16 @@ class Limits:
     press_sd: float
 
     @staticmethod
-    def of(bounce: float) -> Limits:
+    def of(interreflection: float) -> Limits:
         """Return the limits of a sensor, by the strength of its interreflection."""
-        more = GAIN_BY_BOUNCE * bounce
+        more = GAIN_BY_INTERREFLECTION * interreflection
         return Limits(
             LEAST_GAIN + more,
             LEAST_CHANNEL + more,
             LEAST_OFFSET,
             LEAST_CORRECTED + more,
-            LEAST_MEAN_CORRECTED + MEAN_BY_BOUNCE * bounce,
-            PRESS_BY_BOUNCE * bounce,
+            LEAST_MEAN_CORRECTED + MEAN_BY_INTERREFLECTION * interreflection,
+            PRESS_BY_INTERREFLECTION * interreflection,
         )
 
 

@@ -167,7 +167,7 @@ def calibrate_in_place(
     *,
     scale_sd: float = 0.0,
     towards: Array | None = None,
-    tell: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> InPlaceResult:
     """Calibrate a closed sensor.
 
@@ -183,7 +183,7 @@ def calibrate_in_place(
         Relative standard deviation of the scale.
     towards : (terms, 2), optional
         Coefficients of an earlier calibration that few presses are to correct.
-    tell : callable, optional
+    progress : callable, optional
         Told the share done.
 
     Raises
@@ -192,7 +192,7 @@ def calibrate_in_place(
         If fewer than 3 images show a ball that the others explain, or the background is of
         another gel, crop or exposure.
     """
-    say = tell or (lambda _share: None)
+    say = progress or (lambda _share: None)
     reduced = grid.reduce(background)
     base = reference(reduced)
     images = list(in_parallel(lambda press: grid.reduce(press.rgb), presses))

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.reconstruction.in_place.change import Reference
+from gelpolight_core.reflectance.ball_detection import detect_ball
 from gelpolight_core.reflectance.contour import Circle
-from gelpolight_core.reflectance.indentation import detect_ball
 
 Map = NDArray[np.float32]
 

@@ -35,8 +35,6 @@ class LightResult:
         Points on the mirror where each LED is reflected, sensor frame.
     spots : MirrorSpots
         Spots found in the mirror image.
-    condition_number : float
-        Of the three light directions at the sensor frame's origin.
     quality : QualityTable
         Figures, limits and advice.
     """
@@ -45,7 +43,6 @@ class LightResult:
     led_covariance_mm2: Array
     bright_points_mm: Array
     spots: MirrorSpots
-    condition_number: float
     quality: QualityTable
 
 
@@ -130,7 +127,6 @@ def locate_leds(
         np.array(covariances),
         np.array(brights),
         spots,
-        condition,
         _judge(np.array(covariances), condition, positions, spots),
     )
 

@@ -59,7 +59,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
     Parameters
     ----------
     evaluation : Evaluation
-        From :func:`~gelpolight_core.measurement.evaluation.evaluate_presses`.
+        From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
     """
     lines = [_press_head(evaluation), *(_press_line(evaluation, r) for r in evaluation.results)]
     head = f"{'':44}{'n':>4}{'mean |e|':>10}{'mean':>9}{'sd':>8}{'lowest':>9}{'highest':>9}  (%)"
@@ -101,7 +101,7 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     Parameters
     ----------
     evaluation : Evaluation
-        From :func:`~gelpolight_core.measurement.evaluation.evaluate_presses`.
+        From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
     """
     return {
         "paper_percent": dict(PAPER_PERCENT),
@@ -139,7 +139,7 @@ def evaluation_figure(evaluation: Evaluation) -> Figure:
     Parameters
     ----------
     evaluation : Evaluation
-        From :func:`~gelpolight_core.measurement.evaluation.evaluate_presses`.
+        From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
     """
     kinds = region_kinds(evaluation.results)
     series = [name for name in kinds if name != ALL] or [ALL]
@@ -167,7 +167,7 @@ def write_evaluation(evaluation: Evaluation, folder: Path) -> tuple[Path, ...]:
     Parameters
     ----------
     evaluation : Evaluation
-        From :func:`~gelpolight_core.measurement.evaluation.evaluate_presses`.
+        From :func:`~gelpolight_core.measurement.evaluation_run.evaluate_presses`.
     folder : Path
         Where to; it must exist.
 

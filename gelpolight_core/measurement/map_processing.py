@@ -18,7 +18,6 @@ from gelpolight_core.translation import tr
 
 Mask = NDArray[np.bool_]
 Counts = NDArray[np.int64]
-Edges = NDArray[np.float64]
 Point = tuple[float, float]
 LEAST_NODES = 3
 MOST_NEAR_LINE = 1e-3

@@ -195,25 +195,3 @@ def membrane_to_camera(points_mm: Array, plane: TopPlane, stack: LayerStack) -> 
         [unit * tangent[..., None], np.ones_like(tangent)[..., None]], axis=-1
     )
     return np.asarray(in_sensor @ plane.rotation)
-
-
-def corrected_radius_paper(
-    radius_px: Array, focal_px: float, *, index: float, gel_mm: float, air_mm: float
-) -> Array:
-    """Return the corrected image radius d' of the paper's Eq. (3).
-
-    Parameters
-    ----------
-    radius_px : (...)
-        Distance d of a pixel from the principal point.
-    focal_px : float
-        Focal length f.
-    index : float
-        Refractive index n of the elastomer.
-    gel_mm, air_mm : float
-        Z1 (elastomer) and Z2 (air).
-    """
-    tan_alpha = np.asarray(radius_px) / focal_px
-    sin_beta = np.sin(np.arctan(tan_alpha)) / index
-    tan_beta = np.tan(np.arcsin(sin_beta))
-    return np.asarray(focal_px * (air_mm * tan_alpha + gel_mm * tan_beta) / (gel_mm + air_mm))

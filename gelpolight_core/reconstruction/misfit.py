@@ -22,7 +22,7 @@ from gelpolight_core.reconstruction.in_place.calibration import InPlaceCalibrati
 from gelpolight_core.reconstruction.linear import as_linear
 from gelpolight_core.reconstruction.near_light.maps import COARSE, LEAST_SHARE, SensorMaps
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
-from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered
+from gelpolight_core.reflectance.gathered_light import Receivers, Surface, gathered, ratio_thrown
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import Calibration, FullModel
 
@@ -133,26 +133,27 @@ def _image_misfit(
     pitch = heightmap.pitch_mm * (thin[0].step or 1)
     normals = heightmap.normals[thin].astype(np.float64)
     explained = direct_light(full, np.stack([x, y], axis=-1), depth, normals, ray_slope)
-    if full.membrane.bounce > LEAST_SHARE:
+    if full.membrane.interreflection > LEAST_SHARE:
         maps = SensorMaps(calibration, full)
         scale = maps.scale(COARSE)
         at = (np.asarray((m + 0.5) / COARSE - 0.5, np.float32) for m in (column, row))
-        flat, returned = _between((-scale.flat, maps.returned), *at)
+        sources = (-scale.flat, maps.returned, maps.throwing[None])
+        flat, returned, throwing = _between(sources, *at)
         points = np.stack([x, y, -depth], axis=-1)
-        seen = np.where(of_use, ratio * flat, 0.0)
+        seen = ratio_thrown(ratio, of_use, throwing[..., 0]) * flat
         surface = Surface(points, normals, view_directions(ray_slope), seen)
         receivers = Receivers.on(surface, inside)
         leds, membrane, slab = full.led_positions_mm, full.membrane, maps.slab
         found = gathered(surface, receivers, leds, membrane, pitch, slab=slab)
         explained *= 1.0 - returned
-        explained[inside] += membrane.bounce * found / flat[inside]
+        explained[inside] += membrane.interreflection * found / flat[inside]
     left = np.where(of_use, ratio - explained, 0.0)
     count = np.maximum(of_use.sum(axis=-1), 1)
     return np.asarray(np.sqrt((left**2).sum(axis=-1) / count), np.float32)
 
 
 def _between(maps: tuple[Map, ...], column: Map, row: Map) -> list[Map]:
-    """Return maps (3, rows, columns) between their nodes, (..., 3) each."""
+    """Return maps (planes, rows, columns) between their nodes, (..., planes) each."""
     return [
         np.stack([cv2.remap(plane, column, row, cv2.INTER_LINEAR) for plane in planes], axis=-1)
         for planes in maps

@@ -33,6 +33,8 @@ class Terms:
         The boundary is free where a contact crosses it; else depth 0 is held all around.
     denoising : bool
         Even parts of the image are averaged over a few nodes.
+    sharpening : bool
+        The blur of the image is undone, to first order.
     """
 
     near_light_rounds: int = 2
@@ -43,6 +45,7 @@ class Terms:
     weights: bool = True
     free_rim: bool = True
     denoising: bool = True
+    sharpening: bool = True
 
 
 ALL_TERMS = Terms()

@@ -7,13 +7,13 @@ import os
 import struct
 import zlib
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import MAX_PIXELS
+from gelpolight_core.io.closing import Closing
 from gelpolight_core.io.reading import open_file, parse_json, unreadable
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.layout import FrameMark
@@ -24,7 +24,7 @@ from gelpolight_core.translation import tr
 SEARCH_BYTES = 1 << 20
 
 
-class Recording:
+class Recording(Closing):
     """A recording file, open for reading; any thread may read.
 
     Attributes
@@ -136,19 +136,6 @@ class Recording:
         if self._file is not None:
             os.close(self._file)
             self._file = None
-
-    def __enter__(self) -> Recording:
-        """Return the recording."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the file."""
-        self.close()
 
 
 def is_recording(path: Path) -> bool:

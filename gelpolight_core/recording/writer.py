@@ -7,13 +7,13 @@ import math
 import os
 import time
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.file import MAX_PIXELS
 from gelpolight_core.io.atomic import cannot_write, sync_folder
+from gelpolight_core.io.closing import Closing
 from gelpolight_core.recording import layout
 from gelpolight_core.recording.pixels import pack_pixels
 from gelpolight_core.recording.recording import VERSION, RecordingHeader, Rgb
@@ -22,7 +22,7 @@ from gelpolight_core.translation import tr
 SYNC_S = 2.0
 
 
-class RecordingWriter:
+class RecordingWriter(Closing):
     """A recording that is being written; for one thread.
 
     Parameters
@@ -140,19 +140,6 @@ class RecordingWriter:
         finally:
             file, self._file = self._file, None
             os.close(file)
-
-    def __enter__(self) -> RecordingWriter:
-        """Return the writer."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the recording."""
-        self.close()
 
     def _check(self, rgb: Rgb, number: int, time_s: float) -> None:
         if rgb.ndim != 3 or rgb.shape[2] != 3 or not 0 < rgb.shape[0] * rgb.shape[1] <= MAX_PIXELS:

@@ -13,20 +13,16 @@ import sqlite3
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
-
-import numpy as np
 
 from gelpolight_core.errors import InputError
+from gelpolight_core.io.closing import Closing
 from gelpolight_core.io.reading import brief, written_text
 from gelpolight_core.records.database import connect, keep_aside
 from gelpolight_core.records.database_errors import in_plain_words, is_damage
 from gelpolight_core.records.entry import MeasurementRecord
 from gelpolight_core.records.rows import quantity_rows, records_of, row_of, text_of
-from gelpolight_core.records.statistics import Drift, Statistics, statistics_of
 from gelpolight_core.records.table import write_csv
 from gelpolight_core.translation import tr
 
@@ -34,27 +30,7 @@ NAME = "records.sqlite"
 BUSY_S = 5.0
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Measurements of the same quantity.
-
-    Attributes
-    ----------
-    serial : str
-        The sensor.
-    shape, quantity : str
-        The shape, and the measured quantity.
-    truth : float or None
-        Its true value; None for those without.
-    """
-
-    serial: str
-    shape: str
-    quantity: str
-    truth: float | None = None
-
-
-class Records:
+class Records(Closing):
     """The records of a workspace, open; any thread may use them.
 
     Created by :meth:`open`.
@@ -211,62 +187,6 @@ class Records:
         """
         self._change(number, "removed = ?", None)
 
-    def groups(self, serial: str | None = None) -> tuple[Group, ...]:
-        """Return the measured quantities, each once, in the order of their first measurement."""
-        found = (
-            Group(record.serial, record.shape, quantity.name, quantity.truth)
-            for record in self.measurements(serial)
-            for quantity in record.quantities
-        )
-        return tuple(dict.fromkeys(found))
-
-    def statistics(self, group: Group) -> Statistics:
-        """Return the statistics of the measurements of one quantity.
-
-        Raises
-        ------
-        InputError
-            If there are none, or they cannot be read.
-        """
-        records = self.measurements(group.serial, group.shape)
-        found = [record.quantity(group.quantity) for record in records]
-        values = [q.value for q in found if q is not None and q.truth == group.truth]
-        if not values:
-            raise InputError(
-                tr("{quantity} of a {shape} was not measured with this sensor").format(
-                    quantity=group.quantity, shape=group.shape
-                ),
-                where=group.serial,
-                advice=tr("Make a measurement first"),
-            )
-        return statistics_of(values)
-
-    def drift(self, serial: str, quantity: str | None = None) -> Drift:
-        """Return the errors of a sensor's measurements with a known truth, in order.
-
-        Parameters
-        ----------
-        serial : str
-            The sensor.
-        quantity : str, optional
-            Only the errors of this quantity, such as ``height_mm``.
-        """
-        found = [
-            (record, q, q.error_percent)
-            for record in self.measurements(serial)
-            for q in record.quantities
-            if q.error_percent is not None and quantity in (None, q.name)
-        ]
-        return Drift(
-            times=tuple(record.time for record, _, _ in found),
-            times_s=np.array([record.time.timestamp() for record, _, _ in found], np.float64),
-            error_percent=np.array([error for _, _, error in found], np.float64),
-            quantities=tuple(q.name for _, q, _ in found),
-            shapes=tuple(record.shape for record, _, _ in found),
-            calibration_ids=tuple(record.calibration_id for record, _, _ in found),
-            ids=tuple(record.id or 0 for record, _, _ in found),
-        )
-
     def export_csv(self, path: Path, serial: str | None = None) -> int:
         """Write a table with one line per measured value; return the number of measurements.
 
@@ -347,19 +267,6 @@ class Records:
         """Close the file; may be called repeatedly."""
         with self._lock:
             self._connection.close()
-
-    def __enter__(self) -> Records:
-        """Return the records."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the file."""
-        self.close()
 
     def _no_measurement(self, error: Exception) -> InputError:
         return InputError(

@@ -1,14 +1,12 @@
-"""Statistics of repeated measurements, and the change of a sensor's error over time."""
+"""Statistics of repeated measurements."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,30 +64,3 @@ def statistics_of(values: Sequence[float]) -> Statistics:
     return Statistics(
         int(array.size), float(array.mean()), sd, float(np.ptp(array)), REPEATABILITY_SDS * sd
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Drift:
-    """The error of a sensor's measurements, oldest first.
-
-    Attributes
-    ----------
-    times : tuple of datetime
-        Times of the measurements, in UTC.
-    times_s : (N,) float64
-        The same in seconds since 1970, for a chart.
-    error_percent : (N,) float64
-        Measured minus true, in percent of the truth.
-    quantities, shapes, calibration_ids : tuple of str
-        Quantity, shape and calibration of each measurement.
-    ids : tuple of int
-        The measurements.
-    """
-
-    times: tuple[datetime, ...]
-    times_s: NDArray[np.float64]
-    error_percent: NDArray[np.float64]
-    quantities: tuple[str, ...]
-    shapes: tuple[str, ...]
-    calibration_ids: tuple[str, ...]
-    ids: tuple[int, ...]

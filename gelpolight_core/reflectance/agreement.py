@@ -52,8 +52,6 @@ class PressAgreement:
         How far the shading moves the centre, of the contact radius.
     misfit : float
         Relative misfit (robust) of the shading with the stated radius.
-    own_misfit : float
-        The same with the radius and centre that fit best.
     odd_share : float
         Share of the contact that differs by more than a fifth from that best fit.
     usual_odd_share : float
@@ -65,7 +63,6 @@ class PressAgreement:
     radius_mm: float
     moved_share: float
     misfit: float
-    own_misfit: float
     odd_share: float
     usual_odd_share: float = 0.0
 
@@ -266,7 +263,6 @@ def _agreement(press: BallPress, pixels: _PressPixels, curve: Array) -> PressAgr
         contact / float(best.x[2]),
         float(np.hypot(best.x[0], best.x[1])),
         _spread(stated),
-        _spread(error(best.x)),
         float(np.mean(np.abs(error(best.x)) > ODD_CHANGE)),
     )
 

@@ -51,12 +51,6 @@ class ShadingFit:
     inner_change : float
         Change of brightness across the inner half over that of the fit: 1 for a ball, near 0 for
         a flat face.
-    direction_share : float
-        Share of the explained change that has a direction, the slope's own part: near 1 for
-        coloured lights from the sides, near 0 for a membrane that only darkens with depth.
-    colour_spread : float
-        Smaller over larger singular value of the channels' directions, 0..1: 1 for lights from
-        all sides, 0 if all channels change alike.
     """
 
     circle: Circle
@@ -65,8 +59,6 @@ class ShadingFit:
     axis_ratio: float
     explained: float
     inner_change: float
-    direction_share: float
-    colour_spread: float
 
 
 def fit_shading(
@@ -265,10 +257,6 @@ def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -
     signal = max(float((values**2).sum()) - floor, 1e-12)
     left = max(float((raw**2).sum()) - floor, 0.0)
     stretch = min(float(np.hypot(oval.shape[4], oval.shape[5])), 0.9)
-    directions = best.coefficients[:2]
-    large, small = np.linalg.svd(directions, compute_uv=False)[:2]
-    odd = float(((best.design[:, :2] @ directions) ** 2).sum())
-    even = float(((best.design[:, 2:] @ best.coefficients[2:]) ** 2).sum())
     # Residuals of a smooth misfit hang together over a fraction of the radius: there are far
     # fewer independent ones than pixels.
     spacing = np.sqrt(np.pi * (_REACH * circle.radius) ** 2 / len(values))
@@ -284,8 +272,6 @@ def _describe(best: _Solution, oval: _Solution, pixels: _Pixels, noise: float) -
         float((1.0 - stretch) / (1.0 + stretch)),
         1.0 - left / signal,
         _inner_change(pixels, best),
-        odd / max(odd + even, 1e-12),
-        float(small / max(large, 1e-12)),
     )
 
 

@@ -26,7 +26,7 @@ from gelpolight_core.reflectance.membrane_kernel import LEAST_COSINE, LEAST_VIEW
 Map = NDArray[np.float32]
 WIDE = 4
 """Facets to a wide one, along an axis, and wide ones to a widest one."""
-NEAR = 2
+NEAR = 1
 """A point gathers facets from its own next larger one and so many around it; what is further away
 comes from the larger ones, and from all of the field: walls mirror even distant membrane."""
 
@@ -105,6 +105,21 @@ class Receivers(NamedTuple):
         """Return some (rows, columns) of a surface's own facets."""
         place = np.stack(np.nonzero(where), axis=-1)
         return cls(surface.points_mm[where], surface.normals[where], surface.view[where], place)
+
+
+def ratio_thrown(ratio: NDArray[np.floating], known: NDArray[np.bool_], throwing: Map) -> Map:
+    """Return press over background (rows, columns, 3) as facets throw it onto others.
+
+    Parameters
+    ----------
+    ratio : (rows, columns, 3)
+        As the camera sees it.
+    known : (rows, columns, 3) or (rows, columns, 1) bool
+        Where it is known; elsewhere facets throw as much as untouched ones.
+    throwing : (rows, columns) float32
+        Share of each facet that throws light.
+    """
+    return np.asarray(np.where(known, np.maximum(ratio, 0.0), 1.0) * throwing[..., None])
 
 
 def facets(

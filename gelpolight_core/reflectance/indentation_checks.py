@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.image.noise import LARGEST_GAIN_CHANGE, ScaledDifference
-from gelpolight_core.quality import Figure, QualityTable, judge
+from gelpolight_core.image.noise import ScaledDifference
 from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit
 from gelpolight_core.reflectance.contour import (
     Circle,
@@ -36,12 +35,12 @@ SMALLEST_RADIUS_PX = 6.0
 # 0.75.
 _LEAST_AXIS_RATIO = 0.8
 # A square's edge scatters by 0.08 to 0.1 of its mean radius.
-_LARGEST_RESIDUAL = 0.07
-_ALLOWED_RESIDUAL_PX = 1.5
-_LEAST_COVERAGE = 0.35
+LARGEST_RESIDUAL = 0.07
+ALLOWED_RESIDUAL_PX = 1.5
+LEAST_COVERAGE = 0.35
 # 12 % of a usual contact are 4 degrees; more is no place to start a refinement from.
-_LARGEST_SD = 0.12
-_LARGEST_LIGHT_CHANGE = 0.1
+LARGEST_SD = 0.12
+LARGEST_LIGHT_CHANGE = 0.1
 # The inner half of a ball changes as the whole does: 0.9 to 1.6 on all sensors seen. Flat faces
 # give 0.2 and less, domed ones 0.5.
 _LEAST_INNER_CHANGE = 0.7
@@ -123,7 +122,7 @@ def check_whole(contour: Contour, area: Mask, reaches: bool, name: str) -> None:
     """
     # A kink shows only with some membrane on its far side.
     outside = 1.0 - share_in_view(contour.circle, area, margin_px=1.0)
-    unclear = reaches and contour.coverage < _LEAST_COVERAGE
+    unclear = reaches and contour.coverage < LEAST_COVERAGE
     if outside > 0.0 or unclear:
         raise BallRefusal(
             Reason.CUT,
@@ -322,11 +321,11 @@ def check_round(contour: Contour, name: str) -> None:
         If it was seen in too few directions, or is oval, jagged or too small.
     """
     radius = contour.circle.radius
-    if contour.coverage < _LEAST_COVERAGE:
+    if contour.coverage < LEAST_COVERAGE:
         _refuse_shape(Reason.NOT_ROUND, tr("no round edge of a contact can be made out"), name)
     if contour.coverage > 0.75 and contour.axis_ratio < _LEAST_AXIS_RATIO:
         _refuse_oval(contour.axis_ratio, name)
-    if contour.residual_px > max(_LARGEST_RESIDUAL * radius, _ALLOWED_RESIDUAL_PX):
+    if contour.residual_px > max(LARGEST_RESIDUAL * radius, ALLOWED_RESIDUAL_PX):
         _refuse_shape(
             Reason.NOT_ROUND,
             tr("the indentation's edge lies {res:.1f} px about a circle of {r:.1f} px").format(
@@ -391,7 +390,7 @@ def check_light_change(light_change: float, name: str) -> None:
     InputError
         If it is more than a tenth.
     """
-    if light_change > _LARGEST_LIGHT_CHANGE:
+    if light_change > LARGEST_LIGHT_CHANGE:
         raise BallRefusal(
             Reason.LIGHT_CHANGED,
             tr("the light changed by {drift:.0f} % far from the contact").format(
@@ -418,75 +417,4 @@ def _refuse_shape(reason: Reason, found: str, name: str) -> NoReturn:
         found,
         where=name,
         advice=tr("Press a single clean ball straight down, or leave this image out"),
-    )
-
-
-def judge_indentation(
-    contour: Contour,
-    found_by: str,
-    signal: float,
-    gain: tuple[float, float, float],
-    light_change: float,
-    saturated: float,
-) -> QualityTable:
-    """Judge the figures of an indentation that was not refused.
-
-    Parameters
-    ----------
-    contour : Contour
-        The contact's edge.
-    found_by : str
-        What its circle rests on; the scatter is judged only where it was traced.
-    signal : float
-        Root mean square difference inside the contact over the noise of one pixel.
-    gain : tuple of 3 floats
-        Brightness of the image over the background's, per channel.
-    light_change : float
-        Relative change far from the contact.
-    saturated : float
-        Share of the contact at the end of the scale.
-    """
-    again = tr("Capture the press again, or leave it out")
-    light = tr("Let the lights warm up and take the background again")
-    radius = contour.circle.radius
-    residual = 100.0 * contour.residual_px / radius
-    worst_residual = 100.0 * max(_LARGEST_RESIDUAL, _ALLOWED_RESIDUAL_PX / radius)
-    gain_change = 100.0 * max(abs(g - 1.0) for g in gain)
-    label = {
-        "edge_residual": tr("Edge off the circle"),
-        "centre_sd": tr("Uncertainty of the centre"),
-        "axis_ratio": tr("Roundness"),
-        "coverage": tr("Edge seen"),
-        "signal_to_noise": tr("Signal to noise"),
-        "gain_change": tr("Brightness against the background"),
-        "drift": tr("Change far from the contact"),
-        "saturated": tr("Saturated inside the contact"),
-    }
-
-    def figure(
-        key: str, value: float, unit: str, warn: float, fail: float | None, advice: str
-    ) -> Figure:
-        high = key in {"axis_ratio", "coverage", "signal_to_noise"}
-        limits = {"warn": warn, "fail": fail}
-        return judge(key, label[key], value, unit, **limits, advice=advice, higher_is_better=high)
-
-    lowest = 100.0 * _LEAST_COVERAGE
-    middle, deeper = (
-        tr("Press the ball nearer to the middle"),
-        tr("Average several frames or press deeper"),
-    )
-    largest_sd = max(1.0, _LARGEST_SD * radius)
-    traced = (figure("edge_residual", residual, "%", 4.0, worst_residual, again),)
-    return QualityTable(
-        (
-            judge("contact_radius", tr("Contact radius"), radius, "px"),
-            *(() if found_by == "shading" else traced),
-            figure("centre_sd", contour.centre_sd_px, "px", largest_sd, None, again),
-            figure("axis_ratio", contour.axis_ratio, "", 0.9, None, again),
-            figure("coverage", 100.0 * contour.coverage, "%", 70.0, lowest, middle),
-            figure("signal_to_noise", signal, "", 2.0, None, deeper),
-            figure("gain_change", gain_change, "%", 5.0, 100.0 * LARGEST_GAIN_CHANGE, light),
-            figure("drift", 100.0 * light_change, "%", 3.0, 100.0 * _LARGEST_LIGHT_CHANGE, light),
-            figure("saturated", 100.0 * saturated, "%", 5.0, None, tr("Use a shorter exposure")),
-        )
     )

@@ -33,7 +33,7 @@ class Membrane:
         Share of the glossy lobe, 0..1.
     roughness : float
         GGX alpha of the glossy lobe.
-    bounce : float
+    interreflection : float
         Reflectance for light from other parts of the membrane, in units of the reflectance that
         :meth:`response` describes; 0: it gives none to itself.
     diffuse : tuple of 3 tuples of `CURVE_NODES` floats
@@ -44,7 +44,7 @@ class Membrane:
     exponent: float = 1.0
     gloss: float = 0.0
     roughness: float = 0.5
-    bounce: float = 0.0
+    interreflection: float = 0.0
     diffuse: tuple[tuple[float, ...], ...] = ()
 
     @property

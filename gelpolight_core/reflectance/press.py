@@ -17,12 +17,9 @@ from gelpolight_core.reflectance.ball import (
     ball_depth_from_contact,
     refine_centre,
 )
+from gelpolight_core.reflectance.ball_detection import find_indentation
 from gelpolight_core.reflectance.contour import Circle
-from gelpolight_core.reflectance.indentation import (
-    Indentation,
-    find_indentation,
-    indentation_at,
-)
+from gelpolight_core.reflectance.indentation import Indentation, indentation_at
 from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]

@@ -100,8 +100,6 @@ class ChannelFit:
         The curve.
     coverage : (2,)
         Lowest and highest cosine with data.
-    bin_cosines, bin_values, bin_counts : (bins,)
-        Robust centre of each bin before it was made monotone.
     spread : float
         Robust relative scatter of the points about the curve.
     outlier_share : float
@@ -111,9 +109,6 @@ class ChannelFit:
     cosines: Array
     values: Array
     coverage: Array
-    bin_cosines: Array
-    bin_values: Array
-    bin_counts: Array
     spread: float
     outlier_share: float
 
@@ -166,9 +161,6 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
         node_cosines,
         node_values,
         np.array([centre[0], centre[-1]]),
-        centre,
-        middle,
-        count,
         spread,
         outliers,
     )

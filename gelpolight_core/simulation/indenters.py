@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from gelpolight_core.errors import InputError
-from gelpolight_core.image.file import decode_image
 from gelpolight_core.simulation.compiled import Interrupt, never
 from gelpolight_core.simulation.drape import (
     NOWHERE_MM,
@@ -21,7 +18,6 @@ from gelpolight_core.simulation.drape import (
     solve_drape,
 )
 from gelpolight_core.simulation.surface import PressedSurface
-from gelpolight_core.translation import tr
 
 Array = NDArray[np.float64]
 
@@ -308,43 +304,6 @@ def _turned_drape(
     )
     touched = map_coordinates(settled.contact.astype(np.float64), position, order=1, cval=0.0) > 0.5
     return np.clip(turned, 0.0, indenter.depth_mm), touched
-
-
-def relief_from_image(path: Path, *, width_mm: float, relief_mm: float, depth_mm: float) -> Relief:
-    """Read a relief from a grey image of 8 or 16 bit; black is the base, white the highest.
-
-    Parameters
-    ----------
-    path : Path
-        PNG or TIFF.
-    width_mm : float
-        Width of the image on the object.
-    relief_mm : float
-        Height of white above black.
-    depth_mm : float
-        Depth of the highest point.
-
-    Raises
-    ------
-    InputError
-        If the file is not a grey image of 8 or 16 bit, or has only one grey level.
-    """
-    image = decode_image(path)
-    if image is None or image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
-        raise InputError(
-            tr("The file is not a grey image of 8 or 16 bit"),
-            where=str(path),
-            advice=tr("Save the heights as a grey PNG or TIFF"),
-        )
-    if min(image.shape) < 2 or image.min() == image.max():
-        raise InputError(
-            tr("The image has only one grey level"),
-            where=str(path),
-            advice=tr("Use an image whose grey level represents the height"),
-        )
-    full = 255.0 if image.dtype == np.uint8 else 65535.0
-    height = image.astype(np.float64) / full * relief_mm
-    return Relief(height, width_mm / (image.shape[1] - 1), depth_mm)
 
 
 def _heights(half_mm: float, pitch_mm: float, height: Callable[[Array, Array], Array]) -> Array:

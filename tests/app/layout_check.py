@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pyqtgraph import PlotWidget
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -13,6 +14,7 @@ from PySide6.QtWidgets import (
     QDockWidget,
     QLabel,
     QLineEdit,
+    QScrollArea,
     QTableView,
     QToolBar,
     QToolButton,
@@ -25,6 +27,8 @@ from app.widgets.qt_tree import below
 CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QAbstractSpinBox, QLabel)
 EXTENSION = "qt_toolbar_ext_button"
 SLACK_PX = 2
+LEAST_PLOT_PX = 80
+"""Curves in a narrower plot cannot be told apart."""
 
 
 def faults(window: QWidget) -> list[str]:
@@ -37,6 +41,10 @@ def faults(window: QWidget) -> list[str]:
             found += _lost_actions(widget)
         elif isinstance(widget, QTableView):
             found += _cut_columns(widget)
+        elif isinstance(widget, QScrollArea):
+            found += _scrolled_sideways(widget)
+        elif isinstance(widget, PlotWidget):
+            found += _narrow_plot(widget)
         elif isinstance(widget, CONTROLS):
             found += _cut(widget)
     return list(dict.fromkeys(found))
@@ -126,6 +134,19 @@ def _lost_actions(bar: QToolBar) -> Iterator[str]:
             yield f"{bar.objectName()}: {action.objectName() or widget.objectName()} is lost"
         elif isinstance(action, QWidgetAction) and not action.objectName():
             pass  # Qt shows it in the menu of the arrow
+
+
+def _scrolled_sideways(area: QScrollArea) -> Iterator[str]:
+    """Find pages that can only be read by scrolling along every line."""
+    if area.horizontalScrollBar().maximum() > SLACK_PX:
+        needed = area.viewport().width() + area.horizontalScrollBar().maximum()
+        yield f"{name_of(area)}: {needed} px wide content in {area.viewport().width()}"
+
+
+def _narrow_plot(plot: PlotWidget) -> Iterator[str]:
+    inside = plot.getPlotItem().getViewBox().width()
+    if inside < LEAST_PLOT_PX:
+        yield f"{name_of(plot)}: a plot of {inside:.0f} px"
 
 
 def _cut_columns(table: QTableView) -> Iterator[str]:

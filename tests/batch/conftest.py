@@ -92,7 +92,7 @@ def go(settings: BatchSettings, plan: Callable[..., BatchPlan]) -> Go:
             settings,
             out,
             runner,
-            tell=rows.append,
+            report=rows.append,
             stopped=lambda: until is not None and len(rows) > until,
         )
 

@@ -68,14 +68,14 @@ def test_a_bad_frame_is_named_and_counted_in_one_line(
 def test_ctrl_c_ends_with_the_frames_at_hand(
     command, day: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tell = batch._Progress._tell
+    report = batch._Progress._report
 
     def pressed(self, progress):
-        tell(self, progress)
+        report(self, progress)
         if progress.done == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr(batch._Progress, "_tell", pressed)
+    monkeypatch.setattr(batch._Progress, "_report", pressed)
     assert command(day) == INTERRUPTED
     told = capsys.readouterr().err
     assert "2 of 6 frames are done" in told

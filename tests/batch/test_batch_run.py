@@ -217,7 +217,7 @@ def test_another_model_in_the_same_folder_is_refused(
                 other,
                 out,
                 ProcessRunner(other, out, 1),
-                tell=lambda _: None,
+                report=lambda _: None,
                 stopped=lambda: False,
             )
 

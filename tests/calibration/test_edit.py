@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gelpolight_core.calibration.edit import edited, table_membrane
+from gelpolight_core.calibration.edit import edited
 from gelpolight_core.calibration.file import read_calibration, write_calibration
 from gelpolight_core.errors import InputError
 from gelpolight_core.factors.background import flat_cosines
@@ -84,7 +84,7 @@ def test_the_full_models_diffuse_share_changes_as_the_curve_did() -> None:
     assert np.ptp(ratio) / ratio.mean() < 2e-3
     for k in (0, 2):
         np.testing.assert_allclose(share[:, k], old[:, k], atol=2e-5)
-    assert (after.gloss, after.roughness, after.bounce) == (0.2, 0.5, 0.3)
+    assert (after.gloss, after.roughness, after.interreflection) == (0.2, 0.5, 0.3)
 
 
 def test_what_was_changed_is_on_record_and_in_the_file(tmp_path: Path) -> None:
@@ -166,23 +166,3 @@ def test_a_papers_calibration_without_full_model_can_be_edited() -> None:
     after = drawn(scene.calibration())
     assert after.full is None
     assert len(after.provenance.edits) == 1
-
-
-def test_the_papers_table_is_a_membrane_exactly() -> None:
-    """Without gloss and interreflection, brightness equals the table, for any view."""
-    random = np.random.default_rng(1)
-    bins = np.sort(random.uniform(0.02, 0.98, 12))
-    nodes = np.concatenate([[0.0], bins, [1.0]])
-    values = tuple(0.03 + np.cumsum(random.uniform(0.02, 0.2, nodes.size)) for _ in range(3))
-    table = ReflectanceTable((nodes,) * 3, (values[0], values[1], values[2]), np.zeros((3, 2)))
-    membrane = table_membrane(table)
-    tilt = np.linspace(0.0, 1.5, 60)
-    normals = np.stack([np.sin(tilt), 0.0 * tilt, -np.cos(tilt)], -1)
-    light = np.tile([0.0, 0.0, -1.0], (60, 3, 1))
-    view = random.normal(size=(60, 3)) - [0.0, 0.0, 3.0]
-    view /= np.linalg.norm(view, axis=1, keepdims=True)
-    shown = np.pi * membrane.response(light, normals, view)
-    for k in range(3):
-        expected = table.response(k, np.cos(tilt)) / table.values[k][-1]
-        # Straight lines between 257 nodes: curvature times the step squared over 8.
-        np.testing.assert_allclose(shown[:, k], expected, atol=1e-3)

@@ -117,6 +117,7 @@ def test_a_full_model_of_version_1_is_read(whole: Path, tmp_path: Path) -> None:
         del manifest["arrays"]["full_membrane_diffuse"]
         # The share of a neighbourhood's light was the membrane's reflectance, too.
         manifest["full"]["membrane"]["bounce_reach_mm"] = 1.0
+        manifest["full"]["membrane"]["bounce"] = manifest["full"]["membrane"].pop("interreflection")
 
     read = read_calibration(forged(whole, tmp_path / "old.gplcal", older))
     assert read.full is not None
@@ -207,7 +208,7 @@ def test_an_unchanged_forgery_is_accepted(whole: Path, tmp_path: Path) -> None:
         {"exponent": -1.0},
         {"roughness": 0.0},
         {"roughness": 1.5},
-        {"bounce": float("inf")},
+        {"interreflection": float("inf")},
         {"bounce_reach_mm": float("nan")},
         {"colour": 1.0},
         {"exponent": "steep"},
@@ -289,7 +290,7 @@ def test_arrays_that_are_not_finite_are_refused(
         {"decay_mm": -1.0},
         {"misfit": -0.1},
         {"held_out": [float("nan"), 1.0]},
-        {"membrane": {"bounce": -1.0}},
+        {"membrane": {"interreflection": -1.0}},
         {"membrane": {"bounce_reach_mm": 0.0}},
         {"membrane_kept": "velvet"},
         {"membrane_sd": {"gloss": -0.1}},

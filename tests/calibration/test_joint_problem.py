@@ -11,7 +11,7 @@ from gelpolight_core.calibration.joint_problem import COMMON, CURVE_SIZE, Proble
 STEP = 1e-4
 # Light from around is given: none is gathered.
 NO_VIEW = CoarseView(
-    np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 0, 3)), np.zeros((0, 0), bool), 1.0, 1
+    np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 0, 3)), np.zeros((0, 0), np.float32), 1.0, 1
 )
 
 

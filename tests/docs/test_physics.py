@@ -64,4 +64,4 @@ def test_the_terms_are_worth_what_the_ablation_found() -> None:
         compared.add(term)
         stated = [float(cell) for cell in cells[2:6]]
         assert stated == pytest.approx([worth[term] for worth in found], abs=0.0501), term
-    assert {"near_light_0", "bounce", "gloss", "weights", "paper", "all"} <= compared
+    assert {"near_light_0", "interreflection", "gloss", "weights", "paper", "all"} <= compared

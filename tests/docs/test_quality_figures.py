@@ -32,9 +32,9 @@ IN_WORDS = {
     "camera.width / 50.0": "width / 50",
     "edge_limit_px(view.image_size[0])": "width / 200, at least 3 px",
     "LED_OFF_OF_WIDTH * rgb.shape[1]": "{LED_OFF_OF_WIDTH:g} widths",
-    "worst_residual": "{100_LARGEST_RESIDUAL:g} %, or {_ALLOWED_RESIDUAL_PX:g} px",
-    "largest_sd": "1 px, or {100_LARGEST_SD:g} % of the radius",
-    "lowest": "{100_LEAST_COVERAGE:g} %",
+    "worst_residual": "{100LARGEST_RESIDUAL:g} %, or {ALLOWED_RESIDUAL_PX:g} px",
+    "largest_sd": "1 px, or {100LARGEST_SD:g} % of the radius",
+    "lowest": "{100LEAST_COVERAGE:g} %",
     "0.9 * radius_mm": "0.9 ball radii",
     "0.15 * contact_mm": "0.15 contact radii",
     "0.4 * contact_mm": "0.4 contact radii",
@@ -103,7 +103,7 @@ def figures_of(path: Path) -> Iterator[Judged]:
             warn, fail = named.get("warn", "None"), named.get("fail", "None")
             high = named.get("higher_is_better") == "True"
             yield Judged(module, _key(call.args[0]), unit, warn, fail, high)
-        if call.func.id == "figure" and module.endswith("indentation_checks.py"):
+        if call.func.id == "figure" and module.endswith("reflectance/indentation.py"):
             key, unit = (ast.literal_eval(call.args[n]) for n in (0, 2))
             warn, fail = (ast.unparse(call.args[n]) for n in (3, 4))
             yield Judged(module, key, unit, warn, fail, key in HIGHER_IS_BETTER)
@@ -158,7 +158,7 @@ def limit_text(figure: Judged, expression: str) -> str | float:
         return float(eval(expression, dict(names)))
     except NameError:
         words = IN_WORDS[expression]
-        filled = {f"100{name}": 100.0 * names[name] for name in names if name.startswith("_L")
+        filled = {f"100{name}": 100.0 * names[name] for name in names if name.startswith("L")
                   and isinstance(names[name], float)}  # fmt: skip
         return words.format(**{**names, **filled}) if "{" in words else words
 

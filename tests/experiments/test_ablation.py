@@ -19,7 +19,7 @@ from gelpolight_core.experiments.ablation import VARIANTS
 from gelpolight_core.session.session import read_session
 
 PRESSES = ("cylinder_s5_d100.png", "cuboid_s4_d100.png")
-BALLS = (0, 3, 6, 8)
+BALLS = (0, 2, 4, 5)
 
 
 @pytest.fixture(scope="module")

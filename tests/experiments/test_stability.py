@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app.command_line.main import MENDABLE, main
+from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.errors import InputError
+from gelpolight_core.experiments import stability_sessions
 from gelpolight_core.experiments.sensitivity import parameters, sensitivities
 from gelpolight_core.experiments.stability import (
     Case,
@@ -152,7 +155,12 @@ def test_each_stated_length_is_stated_wrongly_alone(length, tmp_path: Path) -> N
         assert new == pytest.approx(1.05 * old, rel=1e-4)
 
 
-def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode() -> None:
+def test_a_sensor_that_is_calibrated_from_small_images_is_measured_in_every_mode(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = SensorDesign()
+    fewer = replace(whole, balls=whole.balls[:5])
+    monkeypatch.setattr(stability_sessions, "SensorDesign", lambda: fewer)
     case = next(c for c in CASES if c.name == "session_scale_0.25")
     result = run_case(case)
     assert result.outcome is not Outcome.FAILED, result.summary

@@ -71,8 +71,10 @@ ENCODINGS: dict[str, tuple[Encode, np.ndarray]] = {
 }
 
 
-@pytest.mark.parametrize("bits", [8, 16])
-@pytest.mark.parametrize("name", ENCODINGS)
+@pytest.mark.parametrize(
+    ("name", "bits"),
+    [("gamma 2.2", 8), ("gamma 2.2", 16), ("gamma 0.7", 16), ("srgb", 8), ("shoulder", 8)],
+)
 def test_the_curve_of_a_noisy_series_is_the_camera_s_within_a_third_of_a_percent(
     name: str, bits: int
 ) -> None:
@@ -105,7 +107,7 @@ def test_a_gamma_that_would_cost_four_percent_of_depth_is_not_called_linear() ->
     assert np.abs(result.response.curves - EVEN**0.95).max() < 0.0033
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(st.floats(0.7, 3.0), st.integers(0, 2**16), st.floats(1.3, 8.0))
 def test_any_gamma_is_found_in_any_fall_off_of_light(
     gamma: float, seed: int, fall_off: float

@@ -44,10 +44,12 @@ def close_session(opened: Path, folder: Path, mm_per_px: float) -> Path:
 
 
 @pytest.fixture(scope="session")
-def closed_folder(small_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def closed_folder(
+    small_session_of_ten_balls: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     """Return a closed sensor's session folder."""
     folder = tmp_path_factory.mktemp("closed") / "session"
-    return close_session(small_session, folder, MM_PER_PX)
+    return close_session(small_session_of_ten_balls, folder, MM_PER_PX)
 
 
 @pytest.fixture(scope="session")

@@ -62,13 +62,13 @@ def measure(options: argparse.Namespace, out: Path) -> None:
     plan = plan_batch([options.recording], out, calibration, Selection(end=options.frames))
     told: list[tuple[float, FrameRow]] = []
 
-    def tell(progress: BatchProgress) -> None:
+    def progress(progress: BatchProgress) -> None:
         if progress.row is not None:
             told.append((time.perf_counter(), progress.row))
 
     began, used_s = time.perf_counter(), processor_s()
     with workers(options.way, options.workers, settings, out) as runner:
-        run_batch(plan, settings, out, runner, tell=tell, stopped=lambda: False)
+        run_batch(plan, settings, out, runner, progress=progress, stopped=lambda: False)
     used_s = processor_s() - used_s
     # Outcomes come in groups: what the first group took is the start.
     first_s, last_s = told[0][0], told[-1][0]

@@ -129,7 +129,7 @@ class Measurement:
         self._before = None if stream is None else stream.figures()
         self._spent, self._threads, self._memory_mb = Spent(), ThreadTimes(), resident_mb()
 
-    def tell(self) -> None:
+    def progress(self) -> None:
         """Print what was measured."""
         stream, span_s = self.page.live.stream, self._spent.wall_s
         assert stream is not None and self._before is not None
@@ -221,7 +221,7 @@ def main() -> None:
         QTimer.singleShot(int(1e3 * options.warm_up), measurement.begin)
         QTimer.singleShot(int(1e3 * (options.warm_up + options.seconds)), application.quit)
         application.exec()
-        measurement.tell()
+        measurement.progress()
         if options.picture is not None:
             measurement.page.grab().save(str(options.picture))
         measurement.stop()

@@ -126,7 +126,7 @@ class Measurement:
     def _note_memory(self) -> None:
         self._memory_mb.append(resident_mb())
 
-    def tell(self) -> None:
+    def progress(self) -> None:
         """Print what was measured."""
         figures, camera = self.stream.figures(), self.bench.design.camera
         span_s = self._spent.wall_s
@@ -182,7 +182,7 @@ def main() -> None:
     QTimer.singleShot(int(1e3 * options.warm_up), measurement.begin)
     QTimer.singleShot(int(1e3 * (options.warm_up + 60.0 * options.minutes)), application.quit)
     application.exec()
-    measurement.tell()
+    measurement.progress()
     if options.picture is not None:
         measurement.window.grab().save(str(options.picture))
     measurement.stop()

@@ -20,7 +20,6 @@ from gelpolight_core.measurement.evaluation import (
     Crossing,
     Evaluation,
     evaluate,
-    evaluate_presses,
 )
 from gelpolight_core.measurement.evaluation_report import (
     evaluation_figure,
@@ -28,6 +27,7 @@ from gelpolight_core.measurement.evaluation_report import (
     evaluation_table,
     write_evaluation,
 )
+from gelpolight_core.measurement.evaluation_run import evaluate_presses
 from gelpolight_core.measurement.gauge import gauge_rows
 from gelpolight_core.measurement.indenter_tools import measure_heightmap
 from gelpolight_core.measurement.result import Measurement, Truth
@@ -347,6 +347,7 @@ def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
         "gauge.csv",
     }
     page = (tmp_path / "evaluation.html").read_text()
+    assert "Fail</span>" not in page
     for said in ("T-1", "Repeatability, depth", "60 of 60 presses", "cuboid_5_1_r24_29.png"):
         assert said in page
     assert (tmp_path / "evaluation.pdf").read_bytes().startswith(b"%PDF")
@@ -360,10 +361,7 @@ def test_the_report_is_whole_in_html_and_pdf(tmp_path: Path) -> None:
 
 
 def test_the_reports_files_are_judged_by_the_limits_that_are_given(tmp_path: Path) -> None:
-    evaluation = paper_protocol(sizes=[5.0])
-    write_evaluation_files(evaluation, tmp_path)
-    assert "Fail</span>" not in (tmp_path / "evaluation.html").read_text()
-    write_evaluation_files(evaluation, tmp_path, limits_percent=(5.0, 0.1))
+    write_evaluation_files(paper_protocol(sizes=[5.0]), tmp_path, limits_percent=(5.0, 0.1))
     assert "Fail</span>" in (tmp_path / "evaluation.html").read_text()
 
 

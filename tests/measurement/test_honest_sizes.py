@@ -40,7 +40,7 @@ def sizes(measurement: Measurement) -> list[tuple[float, float]]:
 
 
 @pytest.mark.parametrize("edge_mm", [0.05, 0.1])
-@pytest.mark.parametrize("depth_mm", [0.3, 0.5, 1.0])
+@pytest.mark.parametrize("depth_mm", [0.3, 1.0])
 def test_a_cuboid_with_sharp_corners_is_not_measured_too_wide(
     depth_mm: float, edge_mm: float
 ) -> None:
@@ -79,8 +79,7 @@ def departures(sensor: KnownSensor) -> dict[str, np.ndarray]:
     of = {mode: full.at_effort(mode) for mode in MODES if mode != "paper"}
     of["paper"] = Reconstructor(sensor.calibration, model="paper")
     for n, (shape, size, depth) in enumerate(
-        [("cylinder", 3.0, 0.5), ("cuboid", 5.0, 0.5), ("cylinder", 6.0, 1.0), ("cuboid", 4.0, 1.0),
-         ("cuboid", 5.0, 0.3), ("cylinder", 5.0, 1.5)]
+        [("cylinder", 3.0, 0.5), ("cuboid", 4.0, 1.0), ("cuboid", 5.0, 0.3), ("cylinder", 5.0, 1.5)]
     ):  # fmt: skip
         indenter = Cylinder(size, depth) if shape == "cylinder" else Cuboid(size, depth, 0.1)
         place = {"x_mm": 1.5 - n, "y_mm": 0.5 * n - 1.0, "yaw_deg": 13.0 * n}

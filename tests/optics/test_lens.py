@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from boards import BOARD, CAMERA, board_pose, render_board
 
+from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
@@ -209,17 +211,12 @@ def test_cameras_of_sensors_are_not_nonsense() -> None:
 
 @pytest.mark.parametrize("sensor", ["sensor-A", "sensor-B"])
 def test_rendered_sessions_give_the_focal_length_to_a_thousandth(
-    shared_data: Path, sensor: str
+    shared_data: Path, rendered_optics: Callable[[str], StageResults], sensor: str
 ) -> None:
     """Every length of the sensor depends on this one."""
     truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["camera"]
-    images = [
-        LinearImage(
-            path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255)
-        )
-        for path in sorted((shared_data / sensor / "checkerboard").glob("*.png"))
-    ]
-    lens = calibrate_lens(images, BOARD)
+    lens = rendered_optics(sensor).lens
+    assert lens is not None
     assert lens.camera.fx == pytest.approx(truth["fx"], rel=1e-3)
     assert lens.camera.fy == pytest.approx(truth["fy"], rel=1e-3)
     # 1 px of the principal point is 0.03 mm on the membrane, and the pose compensates most of it.

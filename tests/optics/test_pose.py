@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from boards import CAMERA, board_pose, render_board
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
+from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.frame import TopPlane
-from gelpolight_core.optics.lens import calibrate_lens
 from gelpolight_core.optics.pose import Decision, estimate_top_pose
 from gelpolight_core.quality import Verdict
 from gelpolight_core.session.board import BoardSpec
@@ -190,30 +190,17 @@ def test_without_a_usable_image_the_reason_is_given() -> None:
         estimate_top_pose([LinearImage("cut.png", image.rgb[:200])], BOARD, CAMERA)
 
 
-def read(path: Path) -> LinearImage:
-    """Return the pixels of an 8-bit image file."""
-    return LinearImage(
-        path.name, cv2.imread(str(path))[:, :, ::-1].astype(np.float32) / np.float32(255.0)
-    )
-
-
 @pytest.mark.parametrize(("sensor", "normal_deg"), [("sensor-A", 0.05), ("sensor-B", 0.1)])
 def test_rendered_sessions_give_the_surface_with_our_own_lens(
-    shared_data: Path, sensor: str, normal_deg: float
+    shared_data: Path,
+    rendered_optics: Callable[[str], StageResults],
+    sensor: str,
+    normal_deg: float,
 ) -> None:
     """0.1 % of the distance is 0.1 % of every length; 0.1 degrees moves a light by 0.1 mm."""
-    folder = shared_data / sensor
-    truth = json.loads((folder / "truth.json").read_text("utf-8"))["top_plane"]
-    lens = calibrate_lens(
-        [read(path) for path in sorted((folder / "checkerboard").glob("*.png"))],
-        BoardSpec((9, 6), 3.0),
-    )
-    result = estimate_top_pose(
-        [read(folder / "top_pose" / "top_pose.png")],
-        BOARD,
-        lens.camera,
-        focal_sd_px=lens.focal_sd_px[0],
-    )
+    truth = json.loads((shared_data / sensor / "truth.json").read_text("utf-8"))["top_plane"]
+    result = rendered_optics(sensor).top_pose
+    assert result is not None
     x, y, z = truth["normal_camera"]
     plane = TopPlane((x, y, z), truth["offset_mm"])
     assert result.plane.distance_mm == pytest.approx(plane.distance_mm, rel=1e-3)

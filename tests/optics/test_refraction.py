@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,7 +15,6 @@ from gelpolight_core.optics.frame import TopPlane
 from gelpolight_core.optics.refraction import (
     build_stack,
     camera_to_membrane,
-    corrected_radius_paper,
     membrane_to_camera,
 )
 
@@ -23,6 +24,15 @@ def tilted_plane(tilt_x: float, tilt_y: float, distance_mm: float = 39.0) -> Top
     normal = np.array([tilt_x, tilt_y, 1.0])
     normal /= np.linalg.norm(normal)
     return TopPlane((float(normal[0]), float(normal[1]), float(normal[2])), distance_mm)
+
+
+def corrected_radius_px(
+    radius_px: float, focal_px: float, *, index: float, gel_mm: float, air_mm: float
+) -> float:
+    """Return the corrected image radius d' of the paper's Eq. (3)."""
+    tan_alpha = radius_px / focal_px
+    tan_beta = math.tan(math.asin(math.sin(math.atan(tan_alpha)) / index))
+    return focal_px * (air_mm * tan_alpha + gel_mm * tan_beta) / (gel_mm + air_mm)
 
 
 @given(
@@ -38,10 +48,10 @@ def test_one_face_on_the_axis_is_the_papers_equation_3(
     stack = build_stack(air_mm + gel_mm, elastomer_thickness_mm=gel_mm, elastomer_index=index)
     direction = np.array([radius_px / focal_px, 0.0, 1.0])
     point, _ = camera_to_membrane(direction, TopPlane((0.0, 0.0, 1.0), air_mm + gel_mm), stack)
-    expected_px = corrected_radius_paper(
-        np.array(radius_px), focal_px, index=index, gel_mm=gel_mm, air_mm=air_mm
+    expected_px = corrected_radius_px(
+        radius_px, focal_px, index=index, gel_mm=gel_mm, air_mm=air_mm
     )
-    assert point[0] * focal_px / (air_mm + gel_mm) == pytest.approx(float(expected_px), abs=1e-9)
+    assert point[0] * focal_px / (air_mm + gel_mm) == pytest.approx(expected_px, abs=1e-9)
     assert point[1] == 0.0
 
 

@@ -83,10 +83,10 @@ def error_um(found: HeightMap, press: KnownPress) -> float:
 @pytest.mark.parametrize(
     "name",
     [
-        *(f"cylinder {width} at 11" for width in (6, 8, 10, 12)),
+        *(f"cylinder {width} at 11" for width in (6, 12)),
         "cylinder 12 at 10.5",
         "cylinder 12 at 12",
-        *(f"edge {share}" for share in (0.23, 0.33, 0.42, 0.5)),
+        *(f"edge {share}" for share in (0.23, 0.5)),
         "half plane",
         "quadrant",
     ],

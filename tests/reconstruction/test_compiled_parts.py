@@ -69,7 +69,7 @@ def dented(membrane: Membrane, seed: int) -> tuple[ShadedField, Map]:
     ratio = membrane.response(light, normals, view) / membrane.response(light, flat, view)
     ratio = ratio.reshape(ROWS, COLUMNS, 3) * random.normal(1.0, 0.004, (ROWS, COLUMNS, 3))
     around = random.uniform(0.7, 1.2, 3) * np.ones_like(ratio)
-    around *= membrane.bounce * 0.5 * (1.0 + normals[:, 2].reshape(ROWS, COLUMNS, 1))
+    around *= membrane.interreflection * 0.5 * (1.0 + normals[:, 2].reshape(ROWS, COLUMNS, 1))
     ratio += around
     usable = random.random((ROWS, COLUMNS)) > 0.01
     field = ShadedField(
@@ -101,7 +101,9 @@ def test_the_compiled_solve_finds_the_normals_of_the_scalar_one(
     Nodes at the edge of darkness may fall to either side of it.
     """
     if diffuse:
-        membrane = Membrane(gloss=membrane.gloss, bounce=membrane.bounce, diffuse=diffuse)
+        membrane = Membrane(
+            gloss=membrane.gloss, interreflection=membrane.interreflection, diffuse=diffuse
+        )
     field, depth = dented(membrane, seed)
     plain = solve_near_light(field, depth, LEDS, membrane)
     found = compiled.solve(field, depth, LEDS, membrane, steps=steps[0])

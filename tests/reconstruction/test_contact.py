@@ -8,7 +8,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from gelpolight_core.experiments.known_sensor import KnownSensor, known_sensor, matt_design
+from gelpolight_core.experiments.known_sensor import (
+    KnownPress,
+    KnownSensor,
+    known_sensor,
+    matt_design,
+)
 from gelpolight_core.experiments.stability_trial import depth_error, rms_um
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.reconstruction.checks import small_image_note, visible_depth_note
@@ -17,7 +22,7 @@ from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Ball, Cylinder
 
 AT_MM = (1.0, -2.0)
-EMPTY_FRAMES = 300
+EMPTY_FRAMES = 150
 
 
 @lru_cache(maxsize=3)
@@ -35,7 +40,7 @@ def face_um(found: object, at_mm: tuple[float, float]) -> float:
 
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("noisy", [False, True], ids=["clean", "noisy"])
-@pytest.mark.parametrize("depth_um", [10.0, 15.0, 20.0])
+@pytest.mark.parametrize("depth_um", [10.0, 20.0])
 def test_shallow_faces_are_seen(depth_um: float, noisy: bool, effort: str) -> None:
     """By single blocks of pixels all of these read 0."""
     known = sensor(0.5)
@@ -149,29 +154,41 @@ def test_images_of_ordinary_size_are_solved_as_wanted(effort: str) -> None:
     assert rms_um(depth_error(found, press.truth, radius_mm=12.0)) < 10.0
 
 
-@pytest.mark.parametrize("effort", EFFORTS)
-@pytest.mark.parametrize("decay_mm", [0.35, 0.18, 0.1])
-def test_walls_are_right_or_said_to_be_too_steep(decay_mm: float, effort: str) -> None:
-    """Walls of 71, 80 and 84 degrees."""
+@lru_cache(maxsize=1)
+def steep_press(decay_mm: float) -> tuple[KnownSensor, KnownPress]:
+    """Return a press with steep walls, and its sensor."""
     design = matt_design(0.5)
     steep = known_sensor(
         replace(design, membrane=replace(design.membrane, decay_length_mm=decay_mm))
     )
-    press = steep.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+    return steep, steep.pressed(Cylinder(5.0, 1.0), x_mm=0.5, y_mm=0.3)
+
+
+@pytest.mark.parametrize("effort", EFFORTS)
+@pytest.mark.parametrize("decay_mm", [0.35, 0.18, 0.1])
+def test_walls_are_right_or_said_to_be_too_steep(decay_mm: float, effort: str) -> None:
+    """Walls of 71, 80 and 84 degrees."""
+    steep, press = steep_press(decay_mm)
     found = Reconstructor(steep.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=12.0))
     assert found.notes or error_um < 15.0
+
+
+@lru_cache(maxsize=1)
+def wide_press(focal_px: float) -> tuple[KnownSensor, KnownPress]:
+    """Return a press seen through a wide lens, and its sensor."""
+    design = matt_design(0.25)
+    camera = replace(design.camera, fx=focal_px, fy=focal_px, distortion=(0.0, 0.0, 0.0, 0.0))
+    wide = replace(design.membrane, working_diameter_mm=100.0)
+    known = known_sensor(replace(design, camera=camera, membrane=wide))
+    return known, known.pressed(Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
 
 
 @pytest.mark.parametrize("effort", EFFORTS)
 @pytest.mark.parametrize("focal_px", [150.0, 80.0, 40.0])
 def test_wide_lenses_are_right_or_said_to_see_too_little(focal_px: float, effort: str) -> None:
     """Rays up to 47, 63 and 76 degrees: wide pixels."""
-    design = matt_design(0.25)
-    camera = replace(design.camera, fx=focal_px, fy=focal_px, distortion=(0.0, 0.0, 0.0, 0.0))
-    wide = replace(design.membrane, working_diameter_mm=100.0)
-    known = known_sensor(replace(design, camera=camera, membrane=wide))
-    press = known.pressed(Ball(4.0, 1.0), x_mm=1.2, y_mm=-0.8)
+    known, press = wide_press(focal_px)
     found = Reconstructor(known.calibration, effort=effort).depth(press.frame, normals=False)
     error_um = rms_um(depth_error(found, press.truth, radius_mm=7.0))
     assert found.notes or error_um < 10.0

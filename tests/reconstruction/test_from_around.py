@@ -48,14 +48,28 @@ def test_a_plateau_hides_the_light_behind_it_as_far_as_its_shadow_reaches() -> N
     assert not hidden[np.abs(AXIS) < 1.0 - PITCH].any()
 
 
-def test_a_picture_is_told_what_is_hidden_and_what_comes_from_around() -> None:
+def test_an_image_gets_what_is_hidden_and_what_comes_from_around() -> None:
     ratio = np.ones((3, 8, 8), np.float32)
     marks = np.full((8, 8), 1, np.uint8)
     around, clear = np.full((3, 4, 4), 0.2, np.float32), np.ones((3, 4, 4), np.float32)
     clear[1, :2] = -1.0
-    found = with_surroundings(RatioImage(ratio, ratio, ratio, marks), around, clear)
+    coarse = RatioImage(*(np.ones((3, 4, 4), np.float32),) * 3, marks[::2, ::2])
+    found = with_surroundings(RatioImage(ratio, ratio, ratio, marks), coarse, around, clear)
     assert found.around == pytest.approx(np.full_like(ratio, 0.2))
     assert (found.marks & 1).all() and (found.marks & JUDGED).all()
     assert ((found.marks[:3] & (HIDDEN << 1)) > 0).all()
     assert not (found.marks[5:] & (HIDDEN << 1)).any()
     assert not (found.marks & (HIDDEN | HIDDEN << 2)).any()
+
+
+def test_light_from_around_jumps_where_the_image_jumps() -> None:
+    """A wall begins in the middle of a coarse node: bilinear values would smear its light."""
+    wall = np.arange(64) >= 30
+    fine = np.where(wall, np.array([[0.4], [1.4], [0.9]]), 1.0)[:, None, :].repeat(32, axis=1)
+    light = np.where(wall, 0.35, 0.02)[None, None, :].repeat(32, axis=1).repeat(3, axis=0)
+    means = [m.reshape(3, 8, 4, 16, 4).mean((2, 4)).astype(np.float32) for m in (fine, light)]
+    marks = np.zeros((32, 64), np.uint8)
+    image = RatioImage(*(fine.astype(np.float32),) * 3, marks)
+    coarse = RatioImage(*(means[0],) * 3, marks[::4, ::4])
+    found = with_surroundings(image, coarse, means[1], np.ones_like(means[1])).around
+    assert found == pytest.approx(light, abs=0.02)

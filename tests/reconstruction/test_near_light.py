@@ -84,7 +84,7 @@ def scene_of(membrane: Membrane) -> tuple[ShadedField, Array, Array]:
     ratio = brightness(place, normals, view, membrane) / brightness(flat, up, view, membrane)
     around = np.full_like(ratio, 1.1)
     around[..., 0] = 0.8
-    around *= membrane.bounce * 0.5 * (1.0 + normals[..., 2:])
+    around *= membrane.interreflection * 0.5 * (1.0 + normals[..., 2:])
     ratio = ratio + around
     single = [np.asarray(a, np.float32) for a in (ratio, np.full_like(ratio, SIGMA), around)]
     field = ShadedField(
@@ -122,7 +122,7 @@ def angle_deg(found: NDArray[np.float32], expected: Array) -> Array:
         MATT,
         Membrane(1.2),
         GLOSSY,
-        replace(GLOSSY, bounce=0.4),
+        replace(GLOSSY, interreflection=0.4),
         CURVED,
         replace(GLOSSY, diffuse=BENT),
     ],

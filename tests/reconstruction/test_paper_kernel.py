@@ -106,7 +106,7 @@ def by_numpy(raw: NDArray[np.generic], maps: ShadingMaps) -> tuple[Array, Array,
     return slopes, flags, np.where(usable, np.abs(length - 1.0), 0.0), close
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @example((1, 1), (1, 1), np.uint8, 0)
 @example((3, 64), (2, 2), np.uint8, 1)
 @example((2, 129), (1, 7), np.uint8, 2)
@@ -126,7 +126,7 @@ def test_blocks_of_nodes_are_solved_as_plain_arrays_are(
     np.testing.assert_allclose(field.length_error, length, atol=1e-4)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(GRIDS, IMAGES, KINDS, SEEDS)
 def test_any_number_of_threads_and_any_run_gives_the_same_bits(
     grid: tuple[int, int], image: tuple[int, int], kind: type, seed: int
@@ -155,7 +155,7 @@ def test_an_image_is_left_as_it_was_and_may_be_a_view(kind: type) -> None:
     np.testing.assert_array_equal(raw, before)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(GRIDS, IMAGES, KINDS, SEEDS)
 def test_one_pass_to_the_divergence_is_slopes_and_then_integration(
     grid: tuple[int, int], image: tuple[int, int], kind: type, seed: int

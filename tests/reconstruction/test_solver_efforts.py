@@ -209,7 +209,7 @@ def test_a_trace_says_what_was_done_and_why(
     assert all(step.milliseconds is not None for step in trace.steps if step.done)
     numbers = reconstruct.near_light.maps.membrane
     assert ("gloss" in trace.left_out) is (numbers.gloss is None)
-    assert ("interreflection" in trace.left_out) is (numbers.bounce is None)
+    assert ("interreflection" in trace.left_out) is (numbers.interreflection is None)
 
 
 @pytest.mark.parametrize("model", ["paper", "full"])
@@ -310,13 +310,17 @@ def test_a_curve_with_a_kink_is_solved_at_every_effort(
     assert 0.3 < found.depth_mm.max() < 3.0
 
 
+@pytest.fixture(scope="module")
+def pressed_to_the_lights(shown: Callable[[State], Frame]) -> Frame:
+    """Return an image of a press almost to the lights."""
+    return shown(PressedMembrane(pressed(Ball(8.0, 12.0), x_mm=1.2, y_mm=-0.8)))
+
+
 @pytest.mark.parametrize("effort", EFFORTS)
 def test_a_press_almost_to_the_lights_stays_finite(
-    effort: str, shown: Callable[[State], Frame], virtual_calibration: Calibration
+    effort: str, pressed_to_the_lights: Frame, virtual_calibration: Calibration
 ) -> None:
-    surface = pressed(Ball(8.0, 12.0), x_mm=1.2, y_mm=-0.8)
-    image = shown(PressedMembrane(surface))
-    found = Reconstructor(virtual_calibration, effort=effort).depth(image)
+    found = Reconstructor(virtual_calibration, effort=effort).depth(pressed_to_the_lights)
     assert found.normals is not None
     assert np.isfinite(found.depth_mm).all()
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=-1), 1.0, atol=1e-4)

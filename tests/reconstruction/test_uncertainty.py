@@ -19,7 +19,7 @@ from gelpolight_core.simulation.indenters import press
 from gelpolight_core.simulation.session import indenter_of
 from gelpolight_core.simulation.virtual_sensor import PressedMembrane, VirtualSensor
 
-REPEATS = 30
+REPEATS = 16
 HONEST = 1.5
 
 
@@ -50,28 +50,38 @@ class Repeats:
         }
 
 
+DESIGN = SensorDesign().scaled(0.5)
+
+
+@pytest.fixture(scope="module")
+def light() -> NDArray[np.float64]:
+    """Return the light of a pressed cylinder, without noise."""
+    item = DESIGN.presses[1]
+    surface = press(
+        indenter_of(item),
+        x_mm=item.x_mm,
+        y_mm=item.y_mm,
+        decay_mm=DESIGN.membrane.decay_length_mm,
+        pitch_mm=0.04,
+    )
+    return VirtualSensor(DESIGN, 0).brightness(PressedMembrane(surface))
+
+
 @pytest.fixture(scope="module", params=[1.0, 4.0], ids=["8-bit, 43 dB", "8-bit, 31 dB"])
-def repeats(request: pytest.FixtureRequest, virtual_calibration: Calibration) -> Repeats:
-    """Press a cylinder and take its image again and again."""
-    design = SensorDesign().scaled(0.5)
-    quiet, item = design.camera, design.presses[1]
+def repeats(
+    request: pytest.FixtureRequest, light: NDArray[np.float64], virtual_calibration: Calibration
+) -> Repeats:
+    """Take the image of the press again and again."""
+    quiet, item = DESIGN.camera, DESIGN.presses[1]
     camera = replace(
         quiet,
         shot_variance=quiet.shot_variance * request.param**2,
         read_sd=quiet.read_sd * request.param,
     )
-    surface = press(
-        indenter_of(item),
-        x_mm=item.x_mm,
-        y_mm=item.y_mm,
-        decay_mm=design.membrane.decay_length_mm,
-        pitch_mm=0.04,
-    )
-    image = VirtualSensor(design, 0).brightness(PressedMembrane(surface))
     random = np.random.default_rng(11)
     reconstruct = Reconstructor(virtual_calibration)
     maps = [
-        reconstruct.depth(exposed(image, camera, random), uncertainty=k == 0)
+        reconstruct.depth(exposed(light, camera, random), uncertainty=k == 0)
         for k in range(REPEATS)
     ]
     slopes = [m.normals[..., :2] / m.normals[..., 2:] for m in maps if m.normals is not None]

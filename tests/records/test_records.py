@@ -24,7 +24,7 @@ from gelpolight_core.records.entry import (
     indenter_record,
     verdict_of,
 )
-from gelpolight_core.records.records import NAME, Group, Records
+from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.records.statistics import statistics_of
 
 NOON = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
@@ -119,7 +119,6 @@ def test_what_was_removed_can_be_brought_back(records: Records) -> None:
     records.remove(removed)
     assert [r.id for r in records.measurements()] == [kept]
     assert [r.id for r in records.measurements(removed=True)] == [removed]
-    assert records.statistics(Group("A-1", "cylinder", "height_mm", 1.0)).n == 1
     records.restore(removed)
     assert [r.id for r in records.measurements()] == [kept, removed]
 
@@ -132,24 +131,13 @@ def test_a_note_can_be_written_later(records: Records) -> None:
         records.update_note(99, "?")
 
 
-def test_statistics_are_of_one_thing_only(records: Records) -> None:
+def test_statistics_of_repeated_measurements() -> None:
     heights = [1.00, 1.02, 1.05, 0.99]
-    for height in heights:
-        records.add(cylinder(height))
-    records.add(cylinder(3.0, serial="B-2"))
-    records.add(MeasurementRecord("A-1", "", "distance", (Quantity("height_mm", 9.0),)))
-    assert records.groups("A-1") == (
-        Group("A-1", "cylinder", "diameter_mm", 5.0),
-        Group("A-1", "cylinder", "height_mm", 1.0),
-        Group("A-1", "distance", "height_mm", None),
-    )
-    found = records.statistics(Group("A-1", "cylinder", "height_mm", 1.0))
+    found = statistics_of(heights)
     assert found.n == 4
     assert found.mean == pytest.approx(np.mean(heights))
     assert found.sd == pytest.approx(np.std(heights, ddof=1))
     assert found.spread == pytest.approx(0.06)
-    with pytest.raises(InputError, match="was not measured with this sensor"):
-        records.statistics(Group("A-1", "ball", "height_mm", 1.0))
 
 
 def test_two_measurements_differ_by_less_than_the_repeatability_in_95_of_100() -> None:
@@ -163,19 +151,6 @@ def test_one_measurement_says_nothing_of_scatter() -> None:
     assert (found.n, found.mean, found.spread) == (1, 2.0, 0.0)
     assert math.isnan(found.sd)
     assert math.isnan(found.repeatability)
-
-
-def test_the_error_over_time_is_that_of_measurements_with_a_truth(records: Records) -> None:
-    for hours, height in ((5.0, 1.05), (0.0, 1.01), (2.0, 0.98)):
-        records.add(cylinder(height, hours=hours))
-    records.add(MeasurementRecord("A-1", "", "distance", (Quantity("distance_mm", 9.0),)))
-    drift = records.drift("A-1", "height_mm")
-    assert drift.error_percent == pytest.approx([5.0, 1.0, -2.0])
-    assert np.diff(drift.times_s) == pytest.approx([-18000.0, 7200.0])
-    assert drift.times[1] == NOON
-    assert set(drift.quantities) == {"height_mm"}
-    assert len(records.drift("A-1").times) == 6
-    assert records.drift("unknown").error_percent.shape == (0,)
 
 
 def test_the_table_opens_in_a_spreadsheet(records: Records, tmp_path: Path) -> None:

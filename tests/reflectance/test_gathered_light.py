@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gelpolight_core.masks import throws_light
 from gelpolight_core.optics.refraction import LayerStack
-from gelpolight_core.reflectance.gathered_light import Slab, returned_to_flat
+from gelpolight_core.reflectance.gathered_light import Slab, ratio_thrown, returned_to_flat
 from gelpolight_core.reflectance.membrane import Membrane
 
 LEDS = np.array([[0.0, 10.0, -8.0], [-9.0, -5.0, -8.0], [9.0, -5.0, -8.0]])
@@ -52,3 +53,15 @@ def test_a_face_to_the_same_medium_returns_nothing() -> None:
 def test_a_window_counts_by_its_optical_thickness() -> None:
     slab = Slab.of(LayerStack((20.0, 2.0, 14.0), (1.0, 1.49, 1.41)))
     assert slab == pytest.approx((14.0 + 2.0 * 1.41 / 1.49, 1.41))
+
+
+def test_a_saturated_or_dim_part_throws_light_and_a_hole_throws_none() -> None:
+    valid = np.array([[True, True, True, False]])
+    # Saturated; without green and blue; a hole; outside.
+    background = np.array([[[1.0, 0.3, 0.3], [0.4, 0.0, 0.0], [0.0, 0.0, 0.0], [0.5, 0.5, 0.5]]])
+    throwing = throws_light(valid, background)
+    assert throwing.tolist() == [[True, True, False, False]]
+    ratio = np.full((1, 4, 3), 0.7)
+    known = np.array([[[False], [True], [False], [False]]])
+    sent = ratio_thrown(ratio, known, throwing.astype(np.float32))
+    assert sent[0, :, 0] == pytest.approx([1.0, 0.7, 0.0, 0.0])

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import k0, k1
 
-from gelpolight_core.errors import InputError
 from gelpolight_core.simulation.drape import contact_radius, solve_drape
 from gelpolight_core.simulation.indenters import (
     Ball,
@@ -22,7 +19,6 @@ from gelpolight_core.simulation.indenters import (
     coin,
     nut,
     press,
-    relief_from_image,
 )
 
 
@@ -97,27 +93,6 @@ def test_reliefs_are_pressed_to_the_depth_asked_for(make: object) -> None:
     # The contact is larger than the rim and smaller than the whole circle.
     assert 3.0 < surface.contact.sum() * 0.08**2 < math.pi * 4.0**2
     assert surface.depth_mm[surface.contact].std() > 0.01
-
-
-def test_a_height_image_is_pressed_with_its_shape(tmp_path: Path) -> None:
-    grey = np.zeros((41, 61), np.uint16)
-    grey[10:31, 10:51] = 65535
-    path = tmp_path / "plate.png"
-    path.write_bytes(cv2.imencode(".png", grey)[1].tobytes())
-    plate = relief_from_image(path, width_mm=6.0, relief_mm=0.4, depth_mm=0.3)
-    x, y = np.meshgrid(np.array([0.0, 1.9, 2.5]), np.array([0.0, 0.9]))
-    # White is 0.3 mm deep, black 0.4 mm higher up, above the undeformed membrane.
-    expected = [[0.3, 0.3, -0.1], [0.3, 0.3, -0.1]]
-    assert plate.obstacle(x, y) == pytest.approx(np.array(expected))
-
-
-@pytest.mark.parametrize("content", [None, b"", b"no image"])
-def test_an_invalid_height_image_is_refused(tmp_path: Path, content: bytes | None) -> None:
-    path = tmp_path / "heights.png"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(InputError, match=r"heights\.png"):
-        relief_from_image(path, width_mm=6.0, relief_mm=0.4, depth_mm=0.3)
 
 
 def test_membrane_is_at_rest_at_the_edge_of_the_patch() -> None:

@@ -45,14 +45,12 @@ from gelpolight_core.records.records import NAME, Records
 from gelpolight_core.session.decisions import read_decisions
 from gelpolight_core.session.images import read_image
 from gelpolight_core.session.session import read_session
-from gelpolight_core.simulation.indenters import relief_from_image
 
 READERS: dict[str, Callable[[Path], object]] = {
     "c.gplcal": read_calibration,
     "s.gplcal": read_summary,
     "r.gplrec": Recording.open,
     "p.png": read_image,
-    "g.png": lambda p: relief_from_image(p, width_mm=1.0, relief_mm=1.0, depth_mm=1.0),
     "t.npz": read_true_depth,
     "session.toml": lambda p: read_session(p.parent),
     "d.toml": read_design,
@@ -171,13 +169,13 @@ def test_a_tiff_that_declares_a_gigantic_size_is_refused_unread(
         read_image(tmp_path / "p.tif")
 
 
-def test_a_relief_of_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
+def test_a_png_of_gigantic_size_is_refused_unread(tmp_path: Path) -> None:
     good = bytearray(cv2.imencode(".png", np.zeros((2, 2), np.uint8))[1].tobytes())
     struct.pack_into(">II", good, 16, 30_000, 30_000)
     struct.pack_into(">I", good, 29, zlib.crc32(good[12:29]))
     (tmp_path / "g.png").write_bytes(good)
     with pytest.raises(InputError, match="declares 30000 x 30000 pixels"):
-        READERS["g.png"](tmp_path / "g.png")
+        read_image(tmp_path / "g.png")
 
 
 def sessions_toml(more: str) -> str:

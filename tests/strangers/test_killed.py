@@ -46,27 +46,27 @@ ledger, rows = Ledger(root / "measured.jsonl", "c"), BatchLedger(root / "frames.
 session, workspace = read_session(root / "session"), Workspace(root / "workspace")
 made = calibration()
 
-def tell(kind, number):
+def progress(kind, number):
     print(kind, number, flush=True)
 
 for number, press in enumerate(run.wanted):
     run.accept(press, [noisy(number)])
-    tell("press", press.file)
+    progress("press", press.file)
     run.refuse(press, "nothing is pressed")
-    tell("refusal", number)
+    progress("refusal", number)
     ledger.keep(f"k{number}", "no object is pressed")
-    tell("measurement", number)
+    progress("measurement", number)
     rows.keep([FrameRow(f"a{number}", "s", "a.png")])
-    tell("frame", number)
+    progress("frame", number)
     radii = {f"ball_{k}.png": 2.0 for k in range(number + 1)}
     write_description(replace(session, ball_radii_mm=radii))
-    tell("radius", number)
+    progress("radius", number)
     write_indenters(first_indenters()[number % 3 :], workspace.folder)
-    tell("indenters", number % 3)
+    progress("indenters", number % 3)
     path = workspace.calibration_path("T-1", f"c{number}")
     write_calibration(replace(made, noise=made.noise * (number + 1)), path)
     workspace.use(path)
-    tell("calibration", path.name)
+    progress("calibration", path.name)
 """
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from app.calibrate.detection import Detection, judged, or_refusal
 from app.calibrate.light_checks import enlarged, marked, refuse_grey
 from app.calibrate.marks import working_rim
@@ -41,6 +43,7 @@ def detect_background(
         marks = Overlay(
             lines=rim.lines, masks=marked(saturated(rgb) > 0, enlarged(found.pressed, rgb))
         )
-        return judged(marks, found.quality.figures, good)
+        result = judged(marks, found.quality.figures, good)
+        return result if compared else replace(result, warns=True)
 
     return or_refusal(detect, marks=rim)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,6 +25,9 @@ Array = NDArray[np.float64]
 
 # Radius of the contact circle drawn when no contact was found; the user moves it into position.
 FIRST_RADIUS = 0.1
+# A ball pressed in by half its radius has a contact of this radius.
+CONTACT_OF_RADIUS = 0.87
+COARSER = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +61,7 @@ def detect_ball(
     *,
     radius_mm: float,
     earlier_mm: Sequence[tuple[float, float]] = (),
+    next_mm: tuple[float, float] | None = None,
     editable: bool = False,
 ) -> Detection:
     """Find a pressed ball.
@@ -71,12 +76,15 @@ def detect_ball(
         Radius of the ball.
     earlier_mm : sequence of (x, y)
         Centres of the presses captured before, sensor frame.
+    next_mm : (x, y), optional
+        Where to press next, from :func:`next_press_mm`.
     editable : bool, optional
         Whether the contact circle can be dragged; its handle is ball.
     """
     table = setting.table
-    nodes = table.grid.to_index(np.array(earlier_mm, np.float64).reshape(-1, 2))
-    done = tuple(Marker(float(u), float(v), "dot", "info") for u, v in seen_at(table, nodes))
+    done = tuple(Marker(u, v, "dot", "info") for u, v in _pixels(earlier_mm, table))
+    there = () if next_mm is None else _pixels([next_mm], table)
+    wanted = tuple(Marker(u, v, "ring", "expected", text=tr("next press")) for u, v in there)
     rim = working_rim(table)
 
     def detect() -> Detection:
@@ -100,7 +108,39 @@ def detect_ball(
         text = good.format(c=press.contact_radius_mm, d=press.pose.depth_mm)
         return judged(marks, press.quality.figures, text, press)
 
-    return or_refusal(detect, marks=Overlay(markers=done, lines=(rim,)))
+    return or_refusal(detect, marks=Overlay(markers=(*done, *wanted), lines=(rim,)))
+
+
+def next_press_mm(
+    table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[tuple[float, float]]
+) -> tuple[float, float] | None:
+    """Return the place (x, y) in the working area that is farthest from all earlier presses.
+
+    The first press is in the middle. Nowhere is it so near to the border that the contact of the
+    ball would be cut. None if the ball is too large for the field.
+    """
+    pitch_mm = COARSER * table.grid.pitch_mm
+    valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
+    inside_mm = pitch_mm * cv2.distanceTransform(valid, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    points = table.grid.points_mm()[::COARSER, ::COARSER]
+    room = inside_mm > CONTACT_OF_RADIUS * radius_mm
+    if not room.any():
+        return None
+    apart_mm = inside_mm.astype(np.float64)
+    if earlier_mm:
+        away = points[:, :, None] - np.array(earlier_mm, np.float64)
+        apart_mm = np.linalg.norm(away, axis=-1).min(axis=-1)
+    best = np.unravel_index(np.argmax(np.where(room, apart_mm, -1.0)), room.shape)
+    x_mm, y_mm = points[best]
+    return float(x_mm), float(y_mm)
+
+
+def _pixels(
+    points_mm: Sequence[tuple[float, float]], table: ResamplingTable
+) -> list[tuple[float, float]]:
+    """Return where points of the top surface are seen; those that are not seen are left out."""
+    nodes = table.grid.to_index(np.array(points_mm, np.float64).reshape(-1, 2))
+    return [(float(u), float(v)) for u, v in seen_at(table, nodes)]
 
 
 def _refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:

@@ -10,6 +10,7 @@ from app.calibrate.balls.detector import (
     BallSetting,
     ball_in_capture,
     detect_ball,
+    next_press_mm,
     placed_ball,
 )
 from app.calibrate.balls.radius import RadiusRow
@@ -48,7 +49,8 @@ class BallsStep(ImageStep):
             (Stage.BALLS,),
             tr(
                 "Press a ball of known diameter into the membrane. Vary the position over the "
-                "whole field, and the depth. Enter the ball diameter for each press."
+                "whole field, as the ring in the image suggests, and the depth. Enter the ball "
+                "diameter for each press."
             ),
             "ball",
             frames=4,
@@ -64,7 +66,13 @@ class BallsStep(ImageStep):
         radius_mm = self.radius.radius_mm
         if not name:
             done = [press.pose.centre_mm for press in project.results.presses]
-            return partial(detect_ball, setting=setting, radius_mm=radius_mm, earlier_mm=done)
+            return partial(
+                detect_ball,
+                setting=setting,
+                radius_mm=radius_mm,
+                earlier_mm=done,
+                next_mm=next_press_mm(setting.table, radius_mm, done),
+            )
         placed = project.session.decisions.balls.get(name)
         if placed is not None:
             return lambda _rgb: placed_ball(placed, setting)

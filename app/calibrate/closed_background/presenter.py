@@ -10,6 +10,7 @@ from app.calibrate.image_step import ImageStep
 from app.calibrate.step_data import Step
 from app.live.image_checks import Rgb
 from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.translation import tr
 
 
@@ -39,6 +40,7 @@ class ClosedBackgroundStep(ImageStep):
 
 def _check(rgb: Rgb) -> Detection:
     found = detect_background(rgb)
-    if not found.ready or found.warns:
+    if not found.ready or QualityTable(found.figures).verdict is not Verdict.PASS:
         return found
-    return replace(found, sentence=tr("The membrane is well lit. Make sure nothing touches it."))
+    text = tr("The membrane is well lit. Make sure nothing touches it, then click Capture.")
+    return replace(found, sentence=text, warns=True)  # contact cannot be seen

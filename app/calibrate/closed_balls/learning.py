@@ -28,7 +28,7 @@ class Progress:
     error_deg : float
         Mean error of the normals of presses that were left out.
     gain : float or None
-        Share by which one more press lowers the error; None with too few presses to tell.
+        Share by which one more press lowers the error; None with too few presses to progress.
     curve : tuple of (int, float)
         Number of presses, and the typical error with so many, degrees.
     next_px : (u, v) or None

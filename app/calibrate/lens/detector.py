@@ -8,15 +8,17 @@ judges each captured image again.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from app.calibrate.detection import Detection, as_image, or_refusal
+from app.calibrate.lens.next_view import next_view, uncovered_ninth
 from app.calibrate.marks import board_corners, board_outline
 from app.live.image_checks import Rgb
-from app.live.overlay import Overlay
+from app.live.overlay import Line, Marker, Overlay
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.optics.board_exposure import (
@@ -63,6 +65,8 @@ def detect_board(
         Search as long as the stage itself, up to a second; for still images.
     """
     faint = Overlay(lines=tuple(board_outline(view, "info") for view in earlier))
+    wanted = Overlay() if patient else _suggested(rgb, board, earlier)
+    searching = Overlay(lines=(*faint.lines, *wanted.lines), markers=wanted.markers)
 
     def detect() -> Detection:
         image = as_image(rgb)
@@ -71,9 +75,23 @@ def detect_board(
             markers=board_corners(view), lines=(*faint.lines, board_outline(view, "good"))
         )
         text, ready = _next_view(view, earlier)
+        if not ready:  # shows where to move the board
+            marks = replace(
+                marks,
+                lines=(*marks.lines, *wanted.lines),
+                markers=(*marks.markers, *wanted.markers),
+            )
         return Detection(marks, text, ready, _view_figures(view, earlier), view)
 
-    return or_refusal(detect, marks=faint)
+    return or_refusal(detect, marks=searching)
+
+
+def _suggested(rgb: Rgb, board: BoardSpec, earlier: Sequence[BoardView]) -> Overlay:
+    """Return the outline of the suggested next view."""
+    quad = next_view(board, (rgb.shape[1], rgb.shape[0]), earlier)
+    u, v = quad.mean(axis=0)
+    text = Marker(float(u), float(v), "plus", "expected", text=tr("next view"))
+    return Overlay(lines=(Line(quad, "expected", closed=True),), markers=(text,))
 
 
 def glance(image: LinearImage, board: BoardSpec) -> Array:
@@ -138,11 +156,8 @@ def _uncovered_area(views: Sequence[BoardView]) -> str:
         (tr("left"), tr("middle"), tr("right")),
         (tr("bottom left"), tr("bottom"), tr("bottom right")),
     )
-    counts = coverage_counts(views, views[0].image_size)
-    rows = [part.sum(axis=0) for part in np.array_split(counts, 3, axis=0)]
-    ninths = np.array([[p.sum() for p in np.array_split(row, 3)] for row in rows])
-    order = ((0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0), (1, 1))
-    return next((names[i][j] for i, j in order if ninths[i, j] == 0), "")
+    ninth = uncovered_ninth(views)
+    return "" if ninth is None else names[ninth[0]][ninth[1]]
 
 
 def _view_figures(view: BoardView, earlier: Sequence[BoardView]) -> tuple[Figure, ...]:

@@ -89,7 +89,7 @@ class LensStep(ImageStep):
             self._find_boards()
 
     def _find_boards(self) -> None:
-        def work(_tell: Callable[[float], None]) -> None:
+        def work(_progress: Callable[[float], None]) -> None:
             session, known = self.model.project.session, self.views()
             for path in session.found(self.step.folder):
                 if path.name not in known:

@@ -58,7 +58,7 @@ class LightsStep(ImageStep):
         self.model.short_jobs.submit(
             Job(
                 tr("Analysing the image"),
-                lambda _tell: spot_near(session.image(path), (u, v)),
+                lambda _progress: spot_near(session.image(path), (u, v)),
                 lambda near: self.place_spot(led, near or (u, v)),
             )
         )

@@ -77,7 +77,7 @@ class Curves(QWidget):
         self._model.jobs.submit(
             Job(
                 tr("Collecting the pixels"),
-                lambda _tell: _gather(project),
+                lambda _progress: _gather(project),
                 self._show,
                 self._show_message,
                 stopped=self._on_stopped,

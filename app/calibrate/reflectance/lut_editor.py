@@ -11,6 +11,7 @@ from PySide6.QtGui import (
     QCloseEvent,
     QKeyEvent,
     QKeySequence,
+    QResizeEvent,
     QUndoCommand,
     QUndoStack,
 )
@@ -30,6 +31,8 @@ from gelpolight_core.channels import CHANNEL_KEYS, channel_name
 from gelpolight_core.errors import InputError
 from gelpolight_core.translation import tr
 
+# Below this width, neither the curve nor its effect can be read beside the other.
+NARROW = 560
 NUDGE = 0.002
 """Step of an arrow key, as a share of the curve's highest value and of the cosine's range."""
 NUDGES = {
@@ -142,6 +145,15 @@ class LutEditor(QWidget):
         """Stop the panel's thread."""
         self.stop()
         super().closeEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Where there is little room, put the effect of the edit below the curve, in words."""
+        super().resizeEvent(event)
+        narrow = self.width() < NARROW
+        orientation = Qt.Orientation.Vertical if narrow else Qt.Orientation.Horizontal
+        self._split.setOrientation(orientation)
+        if self.live is not None:
+            self.live.show_plots(not narrow)
 
     def changeEvent(self, event: QEvent) -> None:
         """Apply a changed theme."""
@@ -274,7 +286,7 @@ class LutEditor(QWidget):
             bar = named(QToolBar(), name, accessible)
             layout.addWidget(bar)
             self._fill_bar(bar, groups)
-        split = QSplitter(Qt.Orientation.Horizontal)
+        self._split = split = QSplitter(Qt.Orientation.Horizontal)
         split.addWidget(self.plot)
         split.setStretchFactor(0, 3)
         if self.live is not None:

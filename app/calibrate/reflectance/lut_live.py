@@ -76,11 +76,17 @@ class LivePanel(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         title = PlainLabel(tr("Effect of the edit on a press"))
         title.setBuddy(self.press)
+        title.setWordWrap(True)
         for widget in (title, self.press, self._words):
             layout.addWidget(widget)
         layout.addWidget(self._profile, 3)
         layout.addWidget(self._residual, 2)
         self.apply_theme()
+
+    def show_plots(self, on: bool) -> None:
+        """Show the profile and its residual, or only the words."""
+        self._profile.setVisible(on)
+        self._residual.setVisible(on)
 
     def show_state(self, edit: CurveEdit) -> None:
         """Request the effect of a state; an older request without an answer is dropped."""

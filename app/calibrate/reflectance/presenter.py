@@ -20,6 +20,7 @@ class ReflectanceStep(StepPresenter):
     """Shows the editor of the curves."""
 
     opens_slowly = True
+    only_shows = True
 
     @staticmethod
     def describe() -> Step:

@@ -20,6 +20,7 @@ class RefractionStep(StepPresenter):
     """Shows the most oblique press, or the selected one."""
 
     has_image_tab = False
+    only_shows = True
 
     @staticmethod
     def describe() -> Step:

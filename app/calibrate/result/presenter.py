@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.calibrate.result.saving import Saving
 from app.calibrate.result.view import ResultView
+from app.calibrate.states import is_done
 from app.calibrate.step import Parts, StepPresenter
 from app.calibrate.step_data import Step
 from gelpolight_core.calibration.inputs import Stage
@@ -40,6 +41,14 @@ class ResultStep(StepPresenter):
     def focus(self) -> QWidget:
         """Return the Save button."""
         return self.view.save
+
+    def is_finished(self, state: str) -> bool:
+        """Return whether the present captures are saved as a calibration."""
+        return is_done(state) and bool(self.model.saved)
+
+    def is_settled(self, state: str) -> bool:
+        """Return whether the calibration is saved: who saves it has read the figures."""
+        return self.is_finished(state)
 
     def refresh(self) -> None:
         """Show the present state of every stage."""

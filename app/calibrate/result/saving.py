@@ -41,7 +41,7 @@ class Saving(QObject):
         """Write the calibration into the library and use it from now on."""
         project, workspace = self._model.project, self._context.workspace
 
-        def work(_tell: object) -> Path:
+        def work(_progress: object) -> Path:
             calibration = project.finish().calibration
             name = f"{calibration.sensor.serial}-{datetime.now().astimezone():%Y-%m-%d-%H%M%S}"
             path = workspace.keep_calibration(calibration, name)
@@ -86,7 +86,7 @@ class Saving(QObject):
         """Write the report of the session in its present state."""
         project = self._model.project
 
-        def work(_tell: object) -> CalibrationRun:
+        def work(_progress: object) -> CalibrationRun:
             from gelpolight_core.report.build import run_report  # slow to import
             from gelpolight_core.report.file import write_report
 

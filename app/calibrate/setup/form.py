@@ -13,11 +13,13 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
+    QSizePolicy,
     QToolButton,
     QWidget,
 )
 
 from app.calibrate.setup.form_page import FormPage, length_box
+from app.widgets.folding_row import FoldingRow
 from app.widgets.inputs import DoubleSpinBox, SpinBox
 from app.widgets.label import PlainLabel, plain_tip
 from app.widgets.meaning import show_meaning
@@ -105,7 +107,7 @@ class SetupForm(FormPage):
         return box
 
     def _build_boards(self) -> QGroupBox:
-        box = QGroupBox(tr("Checkerboards (count inner corners, where four squares meet)"))
+        box = QGroupBox(tr("Checkerboards (count inner corners)"))
         form = QFormLayout(box)
         form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         self.lens_board = _BoardRow("setup.lens_board", tr("Lens views"))
@@ -183,13 +185,10 @@ class SetupForm(FormPage):
         show_meaning(self.problem, "")
 
 
-class _BoardRow(QWidget):
+class _BoardRow(FoldingRow):
     """Corner counts and square size of one board."""
 
     def __init__(self, name: str, accessible: str) -> None:
-        super().__init__()
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
         self.columns = named(
             SpinBox(),
             f"{name}.columns",
@@ -200,14 +199,10 @@ class _BoardRow(QWidget):
         )
         for box in (self.columns, self.rows):
             box.setRange(3, 100)
+            box.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.square = length_box(
             f"{name}.square", tr("{b}: square size").format(b=accessible), 0.05, 500.0
         )
-        row.addWidget(self.columns)
-        row.addWidget(PlainLabel("x"))
-        row.addWidget(self.rows)
-        row.addWidget(PlainLabel(tr("squares of")))
-        row.addWidget(self.square, 1)
         self.print = named(
             QToolButton(),
             f"{name}.print",
@@ -218,7 +213,10 @@ class _BoardRow(QWidget):
             ),
         )
         self.print.setText(tr("Print…"))
-        row.addWidget(self.print)
+        super().__init__(
+            _beside(self.columns, PlainLabel("x"), self.rows),
+            _beside(PlainLabel(tr("squares of")), self.square, self.print),
+        )
 
     def show_board(self, board: BoardSpec) -> None:
         self.columns.setValue(board.inner_corners[0])
@@ -227,6 +225,17 @@ class _BoardRow(QWidget):
 
     def board(self) -> BoardSpec:
         return BoardSpec((self.columns.value(), self.rows.value()), self.square.value())
+
+
+def _beside(*widgets: QWidget) -> QWidget:
+    """Return widgets in a row; number fields use the remaining width."""
+    part = QWidget()
+    row = QHBoxLayout(part)
+    row.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        row.addWidget(widget, int(isinstance(widget, QDoubleSpinBox)))
+    row.addStretch()
+    return part
 
 
 def _plain(name: str, accessible: str) -> QDoubleSpinBox:

@@ -22,7 +22,7 @@ from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
 from gelpolight_core.translation import tr
 
-FORM_WIDTH = 560
+FORM_WIDTH, LEAST_WIDTH = 640, 320
 
 
 class FormPage(QScrollArea):
@@ -56,7 +56,7 @@ class FormPage(QScrollArea):
         holder = QWidget()
         holder.setLayout(column)
         holder.setMaximumWidth(FORM_WIDTH)
-        holder.setMinimumWidth(FORM_WIDTH - 120)
+        holder.setMinimumWidth(LEAST_WIDTH)
         middle.addWidget(holder)
         middle.addStretch(1)
         self._title, self._task = PlainLabel(title), PlainLabel(task)

@@ -211,7 +211,10 @@ class ValidationPanel(QWidget):
 
     def show_trial(self, trial: Trial | None) -> None:
         """Show the result of a trial."""
-        self.keep.setEnabled(trial is not None)
+        sure = trial is not None and trial.measurement.verdict == "ok"
+        passed = trial is not None and all(c.passed for c in trial.comparisons)
+        # A failed trial may be recorded, too, but nothing doubtful validates a calibration.
+        self.keep.setEnabled(trial is not None and (sure or not passed))
         if trial is None:
             self.say("")
             return
@@ -231,12 +234,14 @@ class ValidationPanel(QWidget):
                     limit=c.limit_percent,
                 )
             )
-        if trial.measurement.verdict != "ok":
-            rows.append(
-                escaped(tr("Low confidence: {reason}").format(reason=trial.measurement.reason))
-            )
-        passed = all(c.passed for c in trial.comparisons)
-        self._show_result("<br>".join(rows), "pass" if passed else "fail")
+        if not sure:
+            text = tr("Low confidence: {reason}").format(reason=trial.measurement.reason)
+            rows.append(escaped(text))
+            if passed:
+                again = tr("It cannot be recorded. Correct this, then press again.")
+                rows.append(escaped(again))
+        meaning = "pass" if passed else "fail"
+        self._show_result("<br>".join(rows), meaning if sure else "warn")
 
     def say(self, sentence: str, meaning: str = "") -> None:
         """Show how a trial is progressing, or why it failed."""

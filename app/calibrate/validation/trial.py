@@ -68,7 +68,7 @@ def run_trial(
     *,
     size_limit_percent: float,
     height_limit_percent: float,
-    tell: Callable[[float], None],
+    progress: Callable[[float], None],
 ) -> Trial:
     """Measure the object in frames of one press.
 
@@ -82,7 +82,7 @@ def run_trial(
         The pressed object.
     size_limit_percent, height_limit_percent : float
         Largest errors with which the trial passes.
-    tell : callable
+    progress : callable
         Called with the share that is done.
 
     Raises
@@ -90,10 +90,10 @@ def run_trial(
     InputError
         If no object is found.
     """
-    tell(0.1)
+    progress(0.1)
     frame, name = average_frames(frames), tr("press")
     heightmap = measurable_depth(reconstructor, frame, name=name)
-    tell(0.7)
+    progress(0.7)
     measured = measure_heightmap(heightmap, shape=known.shape)
     quantity = tr("side") if known.shape == "cuboid" else tr("diameter")
     comparisons = [Comparison(quantity, measured.size_mm, known.size_mm, size_limit_percent)]

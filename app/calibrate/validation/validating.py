@@ -176,7 +176,7 @@ class Validating(QObject):
             return
         size_limit, height_limit = panel.size_limit.value(), panel.height_limit.value()
 
-        def work(tell: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
+        def work(progress: Callable[[float], None]) -> tuple[Reconstructor, Trial]:
             reconstructor = present or Reconstructor(read_calibration(path))
             trial = run_trial(
                 frames,
@@ -184,7 +184,7 @@ class Validating(QObject):
                 known,
                 size_limit_percent=size_limit,
                 height_limit_percent=height_limit,
-                tell=tell,
+                progress=progress,
             )
             return reconstructor, trial
 

@@ -116,23 +116,25 @@ def measure_scene(
     progress : callable, optional
         Told what is being done and the share done; what it raises stops the work.
     """
-    tell = progress or (lambda _what, _share: None)
+    progress = progress or (lambda _what, _share: None)
     runs = []
     for number, method in enumerate(methods):
-        tell(method.label, 0.2 * number / len(methods))
+        progress(method.label, 0.2 * number / len(methods))
         runs.append(_ready(method, scene))
     grid = scene.full.table.grid
     radius_mm = 0.5 * scene.full.sensor.working_diameter_mm - RIM_MM
     total = (1 + repeats) * len(presses)
     for turn in range(total):
         press, round_ = presses[turn % len(presses)], turn // len(presses)
-        tell(tr("{file}, round {n}").format(file=press.name, n=round_), 0.2 + 0.8 * turn / total)
+        progress(
+            tr("{file}, round {n}").format(file=press.name, n=round_), 0.2 + 0.8 * turn / total
+        )
         for run in runs:
             if round_ == 0:
                 _score(run, press, grid, radius_mm)
             elif round_ == 1 or sum(run.times_ms) < 1e3 * BUDGET_S:
                 _time(run, press)
-    tell("", 1.0)
+    progress("", 1.0)
     return tuple(_point(run, scene) for run in runs)
 
 

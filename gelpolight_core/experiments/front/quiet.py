@@ -71,12 +71,12 @@ class Watch:
     ----------
     most_s : float, optional
         Longest time to wait.
-    tell : callable, optional
+    progress : callable, optional
         Told that it waits, and for what share of the time; what it raises stops the waiting.
     """
 
     def __init__(
-        self, most_s: float = 0.0, tell: Callable[[str, float], None] | None = None
+        self, most_s: float = 0.0, progress: Callable[[str, float], None] | None = None
     ) -> None:
         began = time.monotonic()
         while True:
@@ -84,8 +84,8 @@ class Watch:
             waited = time.monotonic() - began
             if used is None or used <= QUIET_PERCENT or waited >= most_s:
                 break
-            if tell is not None:
-                tell(tr("waiting for a quiet machine"), min(waited / most_s, 1.0))
+            if progress is not None:
+                progress(tr("waiting for a quiet machine"), min(waited / most_s, 1.0))
         self._waited_s, self._busiest = waited, busiest
         self._start = time.monotonic(), _busy_s(), sum(os.times()[:4])
 

@@ -138,13 +138,13 @@ def measure_sensor(
     InputError
         If the session cannot be calibrated, or a press has no image or no truth.
     """
-    tell = progress or (lambda _what, _share: None)
-    session, scene = prepared(source, seed, partial(_part, tell, source.name, 0.0, PREPARING))
+    progress = progress or (lambda _what, _share: None)
+    session, scene = prepared(source, seed, partial(_part, progress, source.name, 0.0, PREPARING))
     points: list[Point] = []
     chosen = [width for width in widths if _scale(width, scene, source) is not None]
     for number, width in enumerate(chosen):
         begin = PREPARING + (1.0 - PREPARING) * number / len(chosen)
-        within = partial(_part, tell, source.name, begin, (1.0 - PREPARING) / len(chosen))
+        within = partial(_part, progress, source.name, begin, (1.0 - PREPARING) / len(chosen))
         scale = _scale(width, scene, source)
         assert scale is not None
         sized, shown = _at_size(source, session, scene, scale, presses, seed)
@@ -152,7 +152,7 @@ def measure_sensor(
     return tuple(points)
 
 
-def prepared(source: Source, seed: int, tell: Progress) -> tuple[Session, Scene]:
+def prepared(source: Source, seed: int, progress: Progress) -> tuple[Session, Scene]:
     """Return a sensor's session and calibration; what an earlier run has left is used.
 
     Parameters
@@ -161,16 +161,16 @@ def prepared(source: Source, seed: int, tell: Progress) -> tuple[Session, Scene]
         The sensor.
     seed : int
         Of a virtual sensor.
-    tell : callable
+    progress : callable
         Told what is being done and the share done.
     """
     folder = source.folder
     if source.design is not None and not (folder / "truth.json").is_file():
         simulate_session(
-            source.design, folder, seed=seed, progress=partial(_part, tell, "", 0, 0.6)
+            source.design, folder, seed=seed, progress=partial(_part, progress, "", 0, 0.6)
         )
     session = read_session(folder)
-    scene = calibrated_scene(session, source.kept, partial(_part, tell, "", 0.6, 0.4))
+    scene = calibrated_scene(session, source.kept, partial(_part, progress, "", 0.6, 0.4))
     return replace(session, response=scene.full.response), replace(scene, sensor=source.name)
 
 
@@ -195,8 +195,8 @@ def measure_leaving_out(
     InputError
         If the session cannot be calibrated, or a press has no image.
     """
-    tell = progress or (lambda _what, _share: None)
-    session, scene = prepared(source, seed, partial(_part, tell, source.name, 0.0, 0.2))
+    progress = progress or (lambda _what, _share: None)
+    session, scene = prepared(source, seed, partial(_part, progress, source.name, 0.0, 0.2))
     frames = [Frame(PRESSED, press.frame) for press in session_presses(session)[:MOST_FRAMES]]
     bare = session.averaged("background").rgb
     frames.append(Frame(EMPTY, np.rint(255.0 * bare).astype(np.uint8)))
@@ -204,7 +204,7 @@ def measure_leaving_out(
         surface = pressed_membrane(source.design, Cylinder(5.0, SHALLOW_MM), x_mm=1.0, y_mm=-1.0)
         seen = VirtualSensor(source.design, seed).frame(surface, stream="presses/shallow.png")
         frames.append(Frame(SHALLOW, seen))
-    within = partial(_part, tell, source.name, 0.2, 0.8)
+    within = partial(_part, progress, source.name, 0.2, 0.8)
     return measure_rules(source.name, scene.full, frames, repeats=repeats, progress=within)
 
 
@@ -253,5 +253,7 @@ def _at_size(
     ]
 
 
-def _part(tell: Progress, name: str, begin: float, width: float, what: str, share: float) -> None:
-    tell(f"{name}: {what}" if name and what else name or what, begin + width * share)
+def _part(
+    progress: Progress, name: str, begin: float, width: float, what: str, share: float
+) -> None:
+    progress(f"{name}: {what}" if name and what else name or what, begin + width * share)

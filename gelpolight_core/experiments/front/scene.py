@@ -104,7 +104,7 @@ class Press:
     height_mm: float
 
 
-def calibrated_scene(session: Session, kept: Path, tell: Progress) -> Scene:
+def calibrated_scene(session: Session, kept: Path, progress: Progress) -> Scene:
     """Calibrate a session, or read what an earlier run has kept.
 
     Parameters
@@ -113,7 +113,7 @@ def calibrated_scene(session: Session, kept: Path, tell: Progress) -> Scene:
         With all stages.
     kept : Path
         Folder of ``paper.gplcal``, ``full.gplcal`` and ``balls.npz``.
-    tell : callable
+    progress : callable
         Told what is being done and the share done.
 
     Raises
@@ -128,14 +128,14 @@ def calibrated_scene(session: Session, kept: Path, tell: Progress) -> Scene:
         make_folder(kept)
         results, stages = StageResults(), stages_of("paper")
         for number, stage in enumerate(stages):
-            tell(stage.value, number / (len(stages) + 2))
+            progress(stage.value, number / (len(stages) + 2))
             results = run_stage(stage, session, results)
-        tell(Stage.JOINT.value, len(stages) / (len(stages) + 2))
+        progress(Stage.JOINT.value, len(stages) / (len(stages) + 2))
         # What is written last says that all is there.
         write_calibration(assemble(session, results, model="paper").calibration, files[0])
         write_calibration(bare_calibration(session, refine_with(session.sensor, results)), files[1])
         write_samples(ball_samples(results), files[2])
-    tell("", 1.0)
+    progress("", 1.0)
     paper, full = (read_open_calibration(file) for file in files[:2])
     return Scene(name, paper, full, read_samples(files[2]), kept)
 

@@ -89,12 +89,12 @@ def measure_virtual(
         If the calibration is of another sensor.
     """
     _refuse_other(design.serial, calibration, tr("virtual sensor"))
-    tell = progress or (lambda _what, _share: None)
+    progress = progress or (lambda _what, _share: None)
     flat = tuple(p for p in design.presses if p.shape in FLAT_TOPPED)
     scale = calibration.camera.width / design.camera.width_px
 
     def measuring(what: str, share: float) -> None:
-        tell(what, RENDERING + (1.0 - RENDERING) * share)
+        progress(what, RENDERING + (1.0 - RENDERING) * share)
 
     with TemporaryDirectory(prefix="gelpolight-") as temporary:
         folder = Path(temporary) / design.serial
@@ -103,7 +103,7 @@ def measure_virtual(
             folder,
             scale=scale,
             presses_only=True,
-            progress=partial(_rendered, tell),
+            progress=partial(_rendered, progress),
         )
         return measure_calibration(calibration, folder, chosen, repeats=repeats, progress=measuring)
 
@@ -119,5 +119,5 @@ def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
         )
 
 
-def _rendered(tell: Progress, file: str, share: float) -> None:
-    tell(tr("rendering {file}").format(file=file), RENDERING * share)
+def _rendered(progress: Progress, file: str, share: float) -> None:
+    progress(tr("rendering {file}").format(file=file), RENDERING * share)

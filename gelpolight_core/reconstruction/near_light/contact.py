@@ -25,7 +25,7 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 BLOCK_MM = 0.2
 # A press changes the light from the surroundings too, far from itself and without any slope.
-CHANGE_BY_BOUNCE = 6e-3
+CHANGE_BY_INTERREFLECTION = 6e-3
 # Of the nine blocks about one, so that a hot pixel is no contact.
 NEIGHBOURS = 3
 AREAS_MM = (0.6, 1.4)
@@ -243,7 +243,7 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
     # The background was resampled on its way here: what another blur changes is not to be trusted.
     blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
     unsure = np.abs(blocks(np.asarray(blurred, np.float32)) - expected)
-    least = CONTACT_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
+    least = CONTACT_CHANGE + CHANGE_BY_INTERREFLECTION * full.membrane.interreflection
     core = cv2.erode(known.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=0)
     inside = blocks(seen(core)) > 0.999
     # Stated at the median brightness; it grows with the light, and the background has its own.
@@ -260,7 +260,7 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
         side = 2 * round(0.5 * (width_mm / side_mm - 1.0)) + 1
         # The darkest part of an area is its noisiest.
         variance = np.maximum(cv2.blur((noise * per_light) ** 2, (side, side)), 0.0)
-        change = AREA_CHANGE + CHANGE_BY_BOUNCE * full.membrane.bounce
+        change = AREA_CHANGE + CHANGE_BY_INTERREFLECTION * full.membrane.interreflection
         share = np.maximum(change, AREA_SIGMAS / (block * side) * np.sqrt(variance))
         share += 2.0 / side * unsure * per_light
         share[~inside] = np.inf

@@ -15,7 +15,13 @@ from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps
 from gelpolight_core.reconstruction.near_light.region import Region
 from gelpolight_core.reconstruction.near_light.structures import HIDDEN, JUDGED, RatioImage
 from gelpolight_core.reconstruction.threads import RowWorkers
-from gelpolight_core.reflectance.gathered_light import WIDE, Receivers, Surface, gathered
+from gelpolight_core.reflectance.gathered_light import (
+    WIDE,
+    Receivers,
+    Surface,
+    gathered,
+    ratio_thrown,
+)
 from gelpolight_core.reflectance.surroundings import view_directions
 
 Array = NDArray[np.float64]
@@ -28,6 +34,10 @@ CLEAR = 0.015
 PLACING = 6
 FIRST_STEP, STEP = 1.5, 0.75
 """Nodes along a ray to a light, between those at which the surface is compared with it."""
+
+GUIDE_NODES, GUIDE_SD, MOST_GUIDE = 1, 0.03, 4.0
+"""How far around a node the image shows how light from around jumps, the noise of the image, and
+the highest press over background."""
 
 _single = np.float32
 _HALF = _single(0.5)
@@ -115,7 +125,7 @@ class FromAround:
             flat = np.stack([*np.meshgrid(x, y), np.zeros(scale.kind.shape)], -1)
             up = np.zeros_like(flat)
             up[..., 2] = -1.0
-            light = -np.moveaxis(scale.flat, 0, -1) * (scale.kind == 2)[..., None]
+            light = -np.moveaxis(scale.flat, 0, -1) * self.maps.throwing[..., None]
             parts = (flat, up, view_directions(self._ray_slope.astype(np.float64)), light)
             self._flat = Surface(*(part.astype(np.float32) for part in parts))
         depth, nx, ny = surface
@@ -124,7 +134,9 @@ class FromAround:
         points[at][..., 2] = -depth
         down = -np.sqrt(np.maximum(1.0 - nx * nx - ny * ny, 0.0))
         normals[at] = np.stack([nx, ny, down], axis=-1)
-        seen[at] *= np.clip(np.moveaxis(image.ratio, 0, -1), 0.0, None)
+        known = (scale.kind[at] == 2)[..., None]
+        thrown = ratio_thrown(np.moveaxis(image.ratio, 0, -1), known, self.maps.throwing[at])
+        seen[at] = -np.moveaxis(scale.flat, 0, -1)[at] * thrown
         return Surface(points, normals, view, seen)
 
     def _clearance(self, whole: Surface, at: tuple[slice, slice]) -> Map:
@@ -156,13 +168,13 @@ def _within(
     return whole
 
 
-def with_surroundings(image: RatioImage, around: Map, clear: Map) -> RatioImage:
+def with_surroundings(image: RatioImage, coarse: RatioImage, around: Map, clear: Map) -> RatioImage:
     """Return an image with light from around and shadows, brought to its scale.
 
     Parameters
     ----------
-    image : RatioImage
-        Of the same region.
+    image, coarse : RatioImage
+        Of the same region; at its own and at the coarsest scale.
     around, clear : (3, rows, columns) float32
         From :meth:`FromAround.on`.
     """
@@ -171,9 +183,50 @@ def with_surroundings(image: RatioImage, around: Map, clear: Map) -> RatioImage:
     enlarged = np.empty_like(image.ratio)
     for k in range(3):
         cv2.resize(around[k], (columns, rows), enlarged[k])
+    if image.marks.shape != coarse.marks.shape:
+        enlarged += _detail(image.ratio, coarse.ratio, around)
+        np.maximum(enlarged, 0.0, out=enlarged)
+    for k in range(3):
         hidden = cv2.resize(clear[k], (columns, rows)) < CLEAR
         marks |= np.where(hidden, np.uint8(HIDDEN << k), np.uint8(0))
     return image._replace(around=enlarged, marks=marks)
+
+
+def _detail(fine: Map, coarse: Map, around: Map) -> Map:
+    """Return what light from around has at a finer scale, from what the image has there.
+
+    Light from around jumps where the slope jumps, as the image does: next to each node it is a
+    linear function of the three channels (He et al., guided image filtering, 2013).
+
+    Parameters
+    ----------
+    fine : (3, rows, columns) float32
+        Press over background at the finer scale.
+    coarse, around : (3, rows / n, columns / n) float32
+        Press over background, and light from around.
+    """
+    window = (2 * GUIDE_NODES + 1,) * 2
+
+    def mean(values: Map) -> Map:
+        return np.asarray(cv2.blur(values, window, borderType=cv2.BORDER_REPLICATE))
+
+    guide, wanted = (np.ascontiguousarray(np.moveaxis(m, 0, -1)) for m in (coarse, around))
+    guide = np.clip(guide, 0.0, MOST_GUIDE)
+    centre, level = mean(guide), mean(wanted)
+    shape = guide.shape[:2]
+    spread, shared = np.empty((*shape, 3, 3), np.float32), np.empty((*shape, 3, 3), np.float32)
+    for k in range(3):
+        spread[..., k] = mean(guide * guide[..., k, None]) - centre * centre[..., k, None]
+        shared[..., k] = mean(guide * wanted[..., k, None]) - centre * level[..., k, None]
+    spread += np.float32(GUIDE_SD**2) * np.eye(3, dtype=np.float32)
+    follows = np.linalg.solve(spread, shared)
+    size = fine.shape[2], fine.shape[1]
+    found = np.zeros_like(fine)
+    for j in range(3):
+        beyond = np.clip(fine[j], 0.0, MOST_GUIDE) - cv2.resize(guide[..., j], size)
+        for k in range(3):
+            found[k] += beyond * cv2.resize(np.ascontiguousarray(follows[..., j, k]), size)
+    return found
 
 
 def surface_normals(

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_fill_holes
 
 from gelpolight_core.image.response import CameraResponse
 from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.masks import DARK_COSINE, usable
+from gelpolight_core.masks import DARK_COSINE, throws_light, usable
 from gelpolight_core.reconstruction.height_map import Flag
 from gelpolight_core.reconstruction.near_light.boundary import rim_distance_mm
 from gelpolight_core.reconstruction.near_light.structures import MembraneNumbers, Scale
@@ -76,6 +76,12 @@ class SensorMaps:
         """Membrane and lights."""
         return membrane_numbers(self.full, self.calibration.reflectance.coverage)
 
+    @cached_property
+    def throwing(self) -> Map:
+        """Share of each node that throws light onto others, (rows, columns), coarsest scale."""
+        found = throws_light(self.calibration.table.valid, self.full.background)
+        return block_average(found.astype(np.float32), COARSE)
+
     @property
     def slab(self) -> Slab:
         """What is below the membrane."""
@@ -132,7 +138,8 @@ class SensorMaps:
             flat = np.stack([cv2.resize(m, (x.size, y.size)) for m in coarse.flat])
             return Scale(*position, flat, kind, coarse.rays, factor / COARSE)
         ray_slope = np.moveaxis(block_average(self.calibration.table.ray_slope, factor), -1, 0)
-        return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor, slab=self.slab)
+        returned = (self.slab, self.throwing)
+        return sensor_scale(self.full, (x, y), ray_slope, kind, factor=factor, returned=returned)
 
 
 def sensor_scale(
@@ -142,7 +149,7 @@ def sensor_scale(
     kind: Any,
     *,
     factor: int,
-    slab: Slab | None = None,
+    returned: tuple[Slab, Map] | None = None,
 ) -> Scale:
     """Return a scale with ray maps of its own.
 
@@ -158,8 +165,8 @@ def sensor_scale(
         As in :class:`Scale`.
     factor : int
         As in :class:`Scale`.
-    slab : Slab, optional
-        What is below the membrane and returns light.
+    returned : (Slab, (rows, columns)), optional
+        What is below the membrane and returns light, and the share of nodes that throw it.
     """
     x, y = axes_mm
     pitch = float(x[1] - x[0])
@@ -169,7 +176,7 @@ def sensor_scale(
     for position, axis in ((2, 1), (4, 0)):
         for k in range(2):
             rays[position + k] = np.gradient(whole[k], pitch, axis=axis)
-    flat = _flat_brightness(full, x, y, whole, slab, kind == 2)
+    flat = _flat_brightness(full, x, y, whole, returned)
     return Scale(factor, float(x[0]), float(y[0]), pitch, flat, kind, rays, 1.0)
 
 
@@ -204,7 +211,7 @@ def membrane_numbers(
         curves,
         None if error <= CURVE_ERROR else _table(membrane),
         (_single(membrane.gloss), _single(membrane.roughness**2)) if glossy else None,
-        _single(membrane.bounce) if membrane.bounce > LEAST_SHARE else None,
+        _single(membrane.interreflection) if membrane.interreflection > LEAST_SHARE else None,
         tuple((_single(low), _single(high)) for low, high in np.asarray(coverage)),
     )
 
@@ -271,10 +278,9 @@ def _flat_brightness(
     x: Array,
     y: Array,
     ray_slope: Array,
-    slab: Slab | None = None,
-    usable: Mask | None = None,
+    returned: tuple[Slab, Map] | None = None,
 ) -> Map:
-    """Return `Scale.flat`; only a slab, and the membrane where it is usable, return light."""
+    """Return `Scale.flat`, with the light that a slab returns of nodes that throw it."""
     shape, membrane = (y.size, x.size), full.membrane
     view = view_directions(np.moveaxis(ray_slope, 0, -1))
     up = np.tile([0.0, 0.0, -1.0], (y.size * x.size, 1))
@@ -283,11 +289,11 @@ def _flat_brightness(
     response = membrane.response(light, up, view.reshape(-1, 3))
     direct = (response * light[..., 2] / distance**2).reshape(*shape, 3)
     flat = direct
-    if slab is not None and usable is not None and membrane.bounce > LEAST_SHARE:
-        pitch = float(x[1] - x[0])
+    if returned is not None and membrane.interreflection > LEAST_SHARE:
+        (slab, throwing), pitch = returned, float(x[1] - x[0])
         for _ in range(2):
             more = returned_to_flat(
-                -flat * usable[..., None],
+                -flat * throwing[..., None],
                 points,
                 view,
                 full.led_positions_mm,
@@ -295,7 +301,7 @@ def _flat_brightness(
                 pitch,
                 slab,
             )
-            flat = direct - membrane.bounce * more
+            flat = direct - membrane.interreflection * more
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0), np.float32)
 
 

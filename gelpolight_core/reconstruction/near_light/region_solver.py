@@ -153,7 +153,7 @@ class RegionSolver:
         On a membrane that throws light onto itself, rounds follow that reckon with it.
         """
         at = (self.maps.scale(COARSE), region.corner)
-        thrown = self.maps.membrane.bounce is not None
+        thrown = self.maps.membrane.interreflection is not None
         normals: tuple[Map, Map] | None = None
         boundary = None if terms.free_rim and terms.weights else Boundary()
         tolerances = list(settings.round_tolerances)
@@ -222,7 +222,7 @@ class RegionSolver:
         """
         scale, (top, left), (rows, columns) = self.maps.scale(COARSE), *region.at(1)
         at = np.s_[top : top + rows, left : left + columns]
-        depth, own = surface[0], self.maps.full.membrane.bounce
+        depth, own = surface[0], self.maps.full.membrane.interreflection
         how = (settings.round_tolerances[-1], settings, terms)
         for number in range(settings.around_rounds):
             steep = number < STEEP_ROUNDS
@@ -230,7 +230,7 @@ class RegionSolver:
                 region, compared.coarse, surface, max(own, 1.0) if steep else own
             )
             begin = surface_normals(depth, at, scale.rays[:2], scale.pitch_mm)
-            image = with_surroundings(compared.coarse, *around)
+            image = with_surroundings(compared.coarse, compared.coarse, *around)
             slopes = self.slopes((scale, (top, left)), image, depth, settings, terms, begin)
             known = Boundary() if steep else boundary
             found, known = self._bounded(region, slopes, depth, known, how)
@@ -259,7 +259,8 @@ class RegionSolver:
         normals = None if known is None else tuple(_enlarged(n, shape) for n in known)
         at = (self.maps.scale(settings.factor), corner)
         if start.around is not None:
-            compared = compared._replace(fine=with_surroundings(compared.fine, *start.around))
+            lit = with_surroundings(compared.fine, compared.coarse, *start.around)
+            compared = compared._replace(fine=lit)
         slopes = self.slopes(at, compared.fine, depth, settings, terms, normals)
         return compared, depth, slopes
 

@@ -437,7 +437,7 @@ class NearLightSolver:
             record.left_out(LAST_ROUND[1], tr("this effort does without it"))
         elif not terms.denoising:
             record.left_out(tr("denoising"), tr("left out by hand"))
-        if self.maps.membrane.bounce is None:
+        if self.maps.membrane.interreflection is None:
             record.left_out(tr("interreflection"), tr("this membrane gives none"))
         if self.maps.membrane.gloss is None:
             record.left_out(tr("gloss"), tr("this membrane has none"))

@@ -80,7 +80,7 @@ class MembraneNumbers(NamedTuple):
         The same at even cosines, where no polynomial follows the curve.
     gloss : 2, or None
         Share and squared roughness of the glossy lobe.
-    bounce : float or None
+    interreflection : float or None
         Reflectance for light from other parts of the membrane; None: it gives none.
     coverage : 3 x 2
         Cosines of each light that the ball presses have shown.
@@ -91,7 +91,7 @@ class MembraneNumbers(NamedTuple):
     curves: tuple[tuple[float, ...], ...]
     table: Map | None
     gloss: tuple[float, float] | None
-    bounce: float | None
+    interreflection: float | None
     coverage: tuple[tuple[float, float], ...]
 
 

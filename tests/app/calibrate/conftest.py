@@ -26,7 +26,8 @@ def camera(context: AppContext) -> ScriptedCamera:
 
 @pytest.fixture
 def technician(context: AppContext, qtbot: QtBot) -> Iterator[Technician]:
-    """Return a technician with a window of a laptop's size."""
+    """Return a technician with a window of a laptop's size, who captures by hand."""
+    context.settings.captures_automatically = False
     page = CalibratePage(context=context)
     page.resize(*LAPTOP)
     page.show()

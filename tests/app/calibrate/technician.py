@@ -62,7 +62,7 @@ class ScriptedCamera:
                 return None
             self._number += 1
             made_s = time.monotonic()
-            noise = np.random.default_rng(self._number).integers(0, 3, self._rgb.shape)
+            noise = np.random.default_rng(self._number).integers(-1, 2, self._rgb.shape)
             top = np.iinfo(self._rgb.dtype).max
             shown = np.clip(self._rgb.astype(np.int64) + noise, 0, top)
             return Frame(shown.astype(self._rgb.dtype), self._number, made_s)

@@ -159,7 +159,7 @@ def test_earlier_views_stay_visible_without_a_board(tilted: np.ndarray) -> None:
     first = view_of(detect_board(tilted, BOARD))
     black = np.zeros_like(tilted)
     nothing = detect_board(black, BOARD, earlier=[first])
-    assert [line.role for line in nothing.overlay.lines] == ["info"]
+    assert [line.role for line in nothing.overlay.lines] == ["info", "expected"]
     assert nothing.sentence.startswith("The image is black.")
 
 

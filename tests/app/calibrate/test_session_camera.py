@@ -18,7 +18,7 @@ from app.context.source_button import SourceButton
 from gelpolight_core.calibration.inputs import Stage
 from gelpolight_core.calibration.project import CalibrationProject
 from gelpolight_core.calibration.provenance import provenance_of
-from gelpolight_core.session.camera_settings import settings_of_texts
+from gelpolight_core.session.camera_settings import CameraSettings, settings_of_texts
 from gelpolight_core.session.description import create_session
 from gelpolight_core.session.session import read_session
 
@@ -214,3 +214,29 @@ def test_the_camera_of_a_new_sensor_is_selected_in_the_form(
     context.source.choose_virtual_sensor()
     assert form.stated().sensor == virtual_session().sensor
     context.source.choose(None)
+
+
+@pytest.mark.parametrize("stored", ["046d:081b@SN2", "virtual:virtual-2", "virtual:virtual-1"])
+def test_the_virtual_sensor_is_a_camera_of_its_own(
+    technician: Technician, context: AppContext, computed_project: Made, stored: str
+) -> None:
+    """Images of another camera are not mixed with those of the virtual sensor, and vice versa."""
+    project = computed_project()
+    project.set_camera(CameraSettings("first", stored))
+    context.source.choose_virtual_sensor()
+    technician.begin(project, "background")
+    fault = technician.wizard.session_camera.fault()
+    assert (stored in fault) is (stored != "virtual:virtual-1")
+    technician.rest()
+
+
+def test_a_recording_of_another_sensor_is_rejected(
+    technician: Technician, context: AppContext, computed_project: Made,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    technician.begin(computed_project(), "background")
+    wizard = technician.wizard
+    for serial, refused in (("virtual-1", False), ("", False), ("A-002", True)):
+        monkeypatch.setattr(type(wizard.live), "serial", property(lambda _, s=serial: s))
+        assert ("A-002" in wizard.session_camera.fault()) is refused
+    technician.rest()

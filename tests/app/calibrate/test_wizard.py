@@ -82,7 +82,7 @@ def test_captures_do_not_wait_for_a_computation(
     release: list[bool] = []
     from app.services.jobs import Job
 
-    def work(_tell: object) -> None:
+    def work(_progress: object) -> None:
         technician_waits.wait(20.0)
 
     technician_waits = threading.Event()

@@ -28,7 +28,7 @@ def test_the_curves_appear_after_earlier_work_was_stopped(
 ) -> None:
     technician.begin(computed_project(), "balls")
     wizard = technician.wizard
-    wizard.model.jobs.submit(Job("Long work", lambda _tell: hold.wait(60.0)))
+    wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait(60.0)))
     wizard.go_to("reflectance")
     curves = wizard.at("reflectance").curves
     assert "Collecting" in curves._message.text()
@@ -43,7 +43,7 @@ def test_a_waiting_report_that_was_stopped_is_reported(
 ) -> None:
     technician.begin(computed_project(), "result")
     wizard = technician.wizard
-    wizard.model.jobs.submit(Job("Long work", lambda _tell: hold.wait(60.0)))
+    wizard.model.jobs.submit(Job("Long work", lambda _progress: hold.wait(60.0)))
     wizard.at("result").saving.write_report(tmp_path / "report.html")
     wizard.panel.cancel_wanted.emit()
     hold.set()

@@ -24,7 +24,7 @@ from gelpolight_core.session.decisions import PlacedCircle
 TICK_MS = 5
 
 
-def tell(**done: object) -> None:
+def progress(**done: object) -> None:
     """Write a line about finished work."""
     sys.stdout.write(json.dumps(done) + "\n")
     sys.stdout.flush()
@@ -48,7 +48,7 @@ class Work:
     def _on_captured(self, stage: str, name: str) -> None:
         session = self._wizard.project.session
         radius = session.ball_radii_mm.get(name) if stage == Stage.BALLS else None
-        tell(captured=f"{FOLDERS[Stage(stage)]}/{name}", radius_mm=radius)
+        progress(captured=f"{FOLDERS[Stage(stage)]}/{name}", radius_mm=radius)
 
     def go_on(self) -> None:
         """Start a random action."""
@@ -62,19 +62,19 @@ class Work:
         elif chance < 0.3 and (views := session.found("checkerboard")):
             name = self._random.choice(views).name
             controller.exclude(Stage.LENS, name, True)
-            tell(excluded=f"checkerboard/{name}")
+            progress(excluded=f"checkerboard/{name}")
         elif chance < 0.5 and (balls := session.found("balls")):
             name = self._random.choice(balls).name
             position = [float(self._random.randrange(20, 220)) for _ in range(3)]
-            tell(begun=name, value=position)
+            progress(begun=name, value=position)
             self._wizard.at("balls").place_ball(name, PlacedCircle(*position))
-            tell(decided=name, value=position)
+            progress(decided=name, value=position)
         elif chance < 0.6:
             nodes = [[0.0, 0.0], [0.5, 0.25 + 0.01 * self._random.randrange(20)], [1.0, 1.0]]
             project = self._wizard.project
-            tell(begun="curve", value=nodes)
+            progress(begun="curve", value=nodes)
             project.edit_curves({0: tuple((c, v) for c, v in nodes)})
-            tell(decided="curve", value=nodes)
+            progress(decided="curve", value=nodes)
         else:
             self._wizard.at("balls").radius.box.setValue(4.0 + 0.2 * self._random.randrange(10))
             self._wizard.panel.capture.click()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,8 @@ from app.workspace.workspace import Workspace
 from gelpolight_core.calibration.file import read_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 
-SMALL = SensorDesign().scaled(0.25)
+WHOLE = SensorDesign().scaled(0.25)
+SMALL = replace(WHOLE, balls=WHOLE.balls[:4], presses=WHOLE.presses[:1])
 
 
 class Stopped(Exception):
@@ -31,10 +33,10 @@ def test_session_and_calibration_are_saved_and_linked(tmp_path: Path) -> None:
 def test_nothing_is_saved_when_it_is_stopped(at: float, tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
 
-    def tell(share: float) -> None:
+    def progress(share: float) -> None:
         if share > at:
             raise Stopped
 
     with pytest.raises(Stopped):
-        calibrate_virtual_sensor(SMALL, workspace, tell)
+        calibrate_virtual_sensor(SMALL, workspace, progress)
     assert not list(workspace.sessions_folder(SMALL.serial).iterdir())

@@ -21,7 +21,7 @@ Tell = Callable[[float], None]
 def test_jobs_run_one_after_the_other(qtbot: QtBot) -> None:
     jobs, done = Jobs("jobs"), list[Any]()
     for number in range(3):
-        jobs.submit(Job("count", lambda _tell, n=number: n, done.append))
+        jobs.submit(Job("count", lambda _progress, n=number: n, done.append))
     qtbot.waitUntil(lambda: not jobs.busy)
     assert done == [0, 1, 2]
     assert jobs.close()
@@ -47,7 +47,7 @@ def test_only_the_caller_keeps_the_result_of_a_job(qtbot: QtBot) -> None:
         assert job.over
         found.append(weakref.ref(heavy))
 
-    job = Job("read", lambda _tell: Heavy(), done)  # it and `done` refer to each other
+    job = Job("read", lambda _progress: Heavy(), done)  # it and `done` refer to each other
     jobs.submit(job)
     qtbot.waitUntil(lambda: bool(found))
     qtbot.waitUntil(lambda: found[0]() is None)
@@ -58,7 +58,7 @@ def test_only_the_caller_keeps_the_result_of_a_job(qtbot: QtBot) -> None:
 def test_the_error_of_a_job_is_released_after_it_is_reported(qtbot: QtBot) -> None:
     jobs, found = Jobs("jobs"), list[weakref.ref[Heavy]]()
 
-    def fail(_tell: Tell) -> None:
+    def fail(_progress: Tell) -> None:
         heavy = Heavy()
         found.append(weakref.ref(heavy))
         raise InputError("the image is grey", where="a.png", advice="Take it in colour")
@@ -72,12 +72,12 @@ def test_the_error_of_a_job_is_released_after_it_is_reported(qtbot: QtBot) -> No
 def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:
     jobs, done = Jobs("jobs"), list[Any]()
 
-    def refuse(_tell: Tell) -> None:
+    def refuse(_progress: Tell) -> None:
         raise InputError("the image is grey", where="a.png", advice="Take it in colour")
 
     with qtbot.waitSignal(jobs.refused) as told:
         jobs.submit(Job("look", refuse))
-        jobs.submit(Job("count", lambda _tell: 1, done.append))
+        jobs.submit(Job("count", lambda _progress: 1, done.append))
     assert "the image is grey" in told.args[0]
     qtbot.waitUntil(lambda: done == [1])
     assert jobs.close()
@@ -85,9 +85,9 @@ def test_an_error_is_one_sentence_and_the_next_job_runs(qtbot: QtBot) -> None:
 
 def test_required_jobs_run_when_all_others_are_cancelled() -> None:
     jobs, go, written = Jobs("jobs"), threading.Event(), list[str]()
-    jobs.submit(Job("wait", lambda _tell: go.wait(10.0)))
-    jobs.submit(Job("compute", lambda _tell: written.append("computed")))
-    jobs.submit(Job("save", lambda _tell: written.append("saved"), must=True))
+    jobs.submit(Job("wait", lambda _progress: go.wait(10.0)))
+    jobs.submit(Job("compute", lambda _progress: written.append("computed")))
+    jobs.submit(Job("save", lambda _progress: written.append("saved"), must=True))
     jobs.cancel()
     go.set()
     assert jobs.close()
@@ -99,7 +99,7 @@ def test_a_hanging_job_does_not_block_closing(
 ) -> None:
     jobs, begun, go = Jobs("hanging"), threading.Event(), threading.Event()
 
-    def hang(_tell: Tell) -> bool:
+    def hang(_progress: Tell) -> bool:
         begun.set()
         return go.wait(30.0)
 
@@ -116,7 +116,7 @@ def test_a_failed_required_job_is_reported_after_its_page_closed() -> None:
     jobs.refused.connect(told.append)
     go = threading.Event()
 
-    def refuse(_tell: Tell) -> None:
+    def refuse(_progress: Tell) -> None:
         go.wait(10.0)
         raise InputError("the disk is full", where="a.png", advice="Free some space")
 
@@ -133,9 +133,9 @@ def test_a_hanging_required_job_is_reported_and_still_completed(
 ) -> None:
     jobs, told, written, go = Jobs("jobs"), list[str](), list[str](), threading.Event()
     jobs.refused.connect(told.append)
-    jobs.submit(Job("wait", lambda _tell: go.wait(30.0), must=True))
-    jobs.submit(Job("save", lambda _tell: written.append("saved"), must=True))
-    jobs.submit(Job("keep", lambda _tell: written.remove("nothing"), must=True))
+    jobs.submit(Job("wait", lambda _progress: go.wait(30.0), must=True))
+    jobs.submit(Job("save", lambda _progress: written.append("saved"), must=True))
+    jobs.submit(Job("keep", lambda _progress: written.remove("nothing"), must=True))
     assert not jobs.close(timeout_s=0.05)
     assert [sentence.partition(":")[0] for sentence in told] == ["wait", "save", "keep"]
     assert "save had not finished when the page closed" in caplog.text
@@ -149,16 +149,16 @@ def test_a_hanging_required_job_is_reported_and_still_completed(
 def test_the_caller_is_notified_however_a_job_ends(end: str, qtbot: QtBot) -> None:
     jobs, ended, go = Jobs("jobs"), list[str](), threading.Event()
 
-    def work(tell: Tell) -> None:
+    def work(progress: Tell) -> None:
         if end == "refused":
             raise InputError("the image is grey", where="a.png", advice="Take it in colour")
         if end == "faulty":
             raise ValueError("nobody thought of this")
         assert go.wait(10.0)
-        tell(0.5)
+        progress(0.5)
 
     if end == "dropped":
-        jobs.submit(Job("first", lambda _tell: go.wait(10.0)))
+        jobs.submit(Job("first", lambda _progress: go.wait(10.0)))
     jobs.submit(Job("export", work, ended=lambda: ended.append(end)))
     if end in ("stopped", "dropped"):
         jobs.cancel()
@@ -174,13 +174,13 @@ def test_the_caller_is_notified_that_a_job_was_stopped(runs: bool, qtbot: QtBot)
     begun, go = threading.Event(), threading.Event()
     jobs.refused.connect(refused.append)
 
-    def work(tell: Tell) -> None:
+    def work(progress: Tell) -> None:
         begun.set()
         assert go.wait(10.0)
-        tell(0.5)
+        progress(0.5)
 
     if not runs:
-        jobs.submit(Job("first", lambda _tell: go.wait(10.0)))
+        jobs.submit(Job("first", lambda _progress: go.wait(10.0)))
     jobs.submit(Job("export", work, stopped=told.append))
     if runs:
         assert begun.wait(10.0)

@@ -29,14 +29,16 @@ LEAKS = {
 }
 
 
-@pytest.mark.parametrize("kind", LEAKS)
 def test_what_is_left_behind_is_named(
-    kind: str, pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    above, inside, said = LEAKS[kind]
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     pytester.makeconftest(CONFTEST.read_text("utf-8") + "\nGRACE_S = 0.2\n")
-    pytester.makepyfile(f"{above}\ndef test_leaks():\n{inside}\ndef test_next():\n    pass\n")
+    for kind, (above, inside, _) in LEAKS.items():
+        tests = f"def test_{kind}():\n{inside}\ndef test_after_{kind}():\n    pass\n"
+        pytester.makepyfile(**{f"test_{kind}": f"{above}\n{tests}"})
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-p", "no:xvfb")
-    result.assert_outcomes(passed=2, errors=1)
-    result.stdout.fnmatch_lines([f"*left behind: *{said}*"])
+    result.assert_outcomes(passed=2 * len(LEAKS), errors=len(LEAKS))
+    for kind, (_, _, said) in LEAKS.items():
+        result.stdout.fnmatch_lines([f"*ERROR at teardown of test_{kind} *"])
+        result.stdout.fnmatch_lines([f"*left behind: *{said}*"])

@@ -11,7 +11,7 @@ import pytest
 
 from app.sources.bench import Bench
 from app.sources.folder import FolderSource
-from app.sources.listing import image_folders, list_sources, virtual_sensor
+from app.sources.listing import image_folders, virtual_sensor
 from app.sources.source import Frame, SourceLost
 from app.sources.stream import Stream
 from gelpolight_core.errors import InputError
@@ -118,7 +118,7 @@ def test_the_rate_is_kept_and_read_back(folder: Path) -> None:
 
 def test_the_list_contains_the_virtual_sensor_and_existing_folders(folder: Path) -> None:
     bench = Bench()
-    found = list_sources([virtual_sensor(bench), image_folders([folder, folder / "gone"])])
+    found = [*virtual_sensor(bench)(), *image_folders([folder, folder / "gone"])()]
     assert [(info.kind, info.name) for info in found] == [
         ("virtual", "Virtual sensor virtual-1"),
         ("folder", folder.name),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
@@ -69,14 +70,20 @@ def test_the_table_shows_what_the_filter_asks_for(stability: ReportDialog, qtbot
 
 
 def test_one_subject_can_be_chosen_and_the_report_saved(
-    stability: ReportDialog, tmp_path: Path, qtbot: QtBot
+    stability: ReportDialog,
+    context: AppContext,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    qtbot: QtBot,
 ) -> None:
     stability.choice.setCurrentIndex(stability.choice.findData("lights"))
     finish(stability, qtbot)
     assert shown(stability) == ["a bad light"]
-    stability.write(tmp_path)
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
+    stability.save.click()
     qtbot.waitUntil(lambda: not stability.jobs.busy, timeout=30_000)
     assert (tmp_path / "stability.html").is_file()
+    assert context.settings.folder("report") == tmp_path
 
 
 def test_stopping_ends_the_work_and_it_can_be_started_again(
@@ -110,7 +117,7 @@ def test_the_design_check_shows_figures_and_both_kinds_of_light(
     finish(dialog, qtbot)
     assert shown(dialog)[-1] == "point, LEDs at 13.8 mm"
     assert dialog.table.rowCount() > 5
-    dialog.write(tmp_path)
+    dialog.write_report(tmp_path)
     qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=30_000)
     assert "7.9 um" in (tmp_path / "design-check.html").read_text("utf-8")
 

@@ -98,12 +98,12 @@ def test_methods_have_names_of_their_own() -> None:
 
 
 @pytest.fixture(scope="module")
-def points(small_session: Path, small_calibration: Calibration) -> tuple[Point, ...]:
+def points(virtual_session: Path, virtual_calibration: Calibration) -> tuple[Point, ...]:
     """Return three methods on two presses; the table has no balls to learn from."""
-    scene = Scene("A", small_calibration, small_calibration)
+    scene = Scene("A", virtual_calibration, virtual_calibration)
     chosen = [m for m in methods() if m.name in ("table", "paper", "full_best")]
     names = ["cylinder_s5_d100.png", "cuboid_s4_d100.png"]
-    presses = session_presses(read_session(small_session), names)
+    presses = session_presses(read_session(virtual_session), names)
     return measure_scene(scene, presses, chosen, repeats=1)
 
 

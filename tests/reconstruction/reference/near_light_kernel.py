@@ -18,7 +18,7 @@ DARK_SHARE = 0.15
 STEEPEST_NZ = 0.15
 LEAST_ALONG_RAY = 0.1
 ONE_DARK_WEIGHT = 0.5
-UNSOLVED_WEIGHT = 0.01
+UNSOLVED_WEIGHT = 0.003
 # What the model does not explain of press over background; it, not noise, limits a good image.
 MODEL_ERROR = 0.03
 

@@ -28,9 +28,9 @@ MM_PER_PX = 0.0989
 
 
 def test_from_the_first_question_to_a_validated_calibration(
-    technician: Technician, small_session: Path, tmp_path: Path, qtbot: QtBot
+    technician: Technician, small_session_of_ten_balls: Path, tmp_path: Path, qtbot: QtBot
 ) -> None:
-    page, opened = technician.page, read_session(small_session)
+    page, opened = technician.page, read_session(small_session_of_ten_balls)
     page.begin()
     technician.click("question.closed")
     form = page.closed_form

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,26 @@ def test_a_trial_of_an_earlier_calibration_is_dropped(
     assert step._reconstructor is None
     assert not panel.keep.isEnabled()
     assert not panel.result.text()
+
+
+def test_a_doubtful_trial_cannot_be_recorded(
+    technician: Technician, computed_project: Made, small_session: Path, tmp_path: Path
+) -> None:
+    """A width within the limits says little where the program does not trust the measurement."""
+    save(technician, computed_project(), tmp_path / "workspace")
+    step, panel = (
+        technician.wizard.at("validation").validating,
+        technician.wizard.at("validation").form,
+    )
+    step.import_press(small_session / PRESS)
+    technician.until(panel.keep.isEnabled)
+    assert step._trial is not None
+    trial = step._trial[0]
+    unsure = replace(trial.measurement, verdict="doubtful", reason="cut by the border")
+    panel.show_trial(replace(trial, measurement=unsure))
+    assert not panel.keep.isEnabled()
+    assert panel.result.property("meaning") == "warn"
+    assert "cut by the border" in panel.result.text()
 
 
 def test_an_old_trial_cannot_be_recorded_during_the_next_measurement(

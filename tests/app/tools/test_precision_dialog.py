@@ -12,9 +12,9 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
-from app.inspect import precision_dialog
-from app.inspect.precision_dialog import PrecisionDialog
-from app.inspect.precision_plot import LIMITS, PrecisionPlot
+from app.tools import precision_dialog
+from app.tools.precision_dialog import PrecisionDialog
+from app.tools.precision_plot import LIMITS, PrecisionPlot
 from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.experiments.front.measure import Point
 from gelpolight_core.experiments.front.trial import USUAL, measure_calibration, usual_methods
@@ -74,7 +74,7 @@ def test_the_calibration_in_use_is_measured_on_rendered_presses(
 def test_its_report_equals_that_of_the_command_line(
     dialog: PrecisionDialog, tmp_path: Path, qtbot: QtBot
 ) -> None:
-    dialog.show_points(POINTS)
+    dialog._done(POINTS)
     dialog.write_report(tmp_path)
     qtbot.waitUntil(lambda: not dialog.jobs.busy, timeout=20_000)
     assert "full model, fast" in (tmp_path / "work-precision.html").read_text("utf-8")
@@ -151,11 +151,11 @@ def test_the_axes_have_round_values_at_any_zoom(dialog: PrecisionDialog) -> None
     for _ in range(200):
         view.scaleBy((4.0, 4.0))
     # The axis update must work for every zoom of a mouse wheel.
-    dialog.show_points(POINTS)
+    dialog._done(POINTS)
     (left, right), (bottom, top) = plot._plot.viewRange()
     assert LIMITS["xMin"] <= left < right <= LIMITS["xMax"]
     assert LIMITS["yMin"] <= bottom < top <= LIMITS["yMax"]
-    dialog.show_points(())
+    dialog._done(())
     for _ in range(200):
         view.scaleBy((4.0, 4.0))
     assert ticks(plot, "bottom") == [f"{10.0**power:g}" for power in range(-3, 9)]

@@ -9,25 +9,21 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QDialog,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QHeaderView,
-    QProgressBar,
     QPushButton,
-    QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
 
 from app.context.context import AppContext
-from app.inspect.precision_plot import PrecisionPlot, errors
-from app.services.jobs import Job, Jobs
+from app.tools.precision_plot import PrecisionPlot, errors
+from app.tools.work_dialog import WorkDialog
 from app.widgets.inputs import ComboBox, DoubleSpinBox
 from app.widgets.label import PlainLabel, plain_tip
-from app.widgets.meaning import show_meaning
 from app.widgets.naming import named
 from gelpolight_core.calibration.file import read_open_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
@@ -43,7 +39,7 @@ from gelpolight_core.translation import tr
 NUMBERS = ("median_ms", "p95_ms", "rms_um", "normal_deg", "height_percent", "size_percent")
 
 
-class PrecisionDialog(QDialog):
+class PrecisionDialog(WorkDialog):
     """Lets the user measure error against run time on this machine.
 
     Parameters
@@ -52,28 +48,22 @@ class PrecisionDialog(QDialog):
         Holds the library of calibrations.
     parent : QWidget, optional
         Owner.
-
-    Attributes
-    ----------
-    points : tuple of Point
-        The last results.
     """
 
     def __init__(self, *, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        named(self, "precision", tr("Error against run time"))
-        self.setWindowTitle(tr("Error against run time"))
+        title, start = tr("Error against run time"), (tr("&Measure"), tr("Measure"))
+        super().__init__("precision", title, start=start, context=context, parent=parent)
         self.resize(940, 660)
-        self.context = context
-        self.jobs = Jobs("precision", self)
-        self.points: tuple[Point, ...] = ()
         self._folder: Path | None = None
         self._virtual = False
         self._make_choice()
         self._make_result()
         self._lay_out()
-        self.jobs.progressed.connect(self._show_work)
-        self.jobs.refused.connect(lambda text: self._say(text, "warn"))
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The last results."""
+        return self.result_shown or ()
 
     def _make_choice(self) -> None:
         self.calibrations = named(ComboBox(), "precision.calibration", tr("Calibration"))
@@ -86,12 +76,6 @@ class PrecisionDialog(QDialog):
                 "each press"),
         )  # fmt: skip
         self.folder.clicked.connect(self.choose_folder)
-        self.start = named(QPushButton(tr("&Measure")), "precision.start", tr("Measure"))
-        self.start.setDefault(True)
-        self.start.clicked.connect(self.measure)
-        self.stop = named(QPushButton(tr("Stop")), "precision.stop", tr("Stop measuring"))
-        self.stop.clicked.connect(self.jobs.cancel)
-        self.progress = named(QProgressBar(), "precision.progress", tr("Progress"))
 
     def _make_result(self) -> None:
         self.error = named(ComboBox(), "precision.error", tr("Error shown in the diagram"))
@@ -104,10 +88,7 @@ class PrecisionDialog(QDialog):
             tr("Method"), "ms", tr("p95 ms"), tr("RMS um"), tr("normals deg"), tr("height %"),
             tr("size %"), tr("on front"),
         )  # fmt: skip
-        self.table = named(QTableWidget(0, len(heads)), "precision.table", tr("Results"))
-        self.table.setHorizontalHeaderLabels(heads)
-        self.table.verticalHeader().hide()
-        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table = self.result_table(heads)
         self.table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         mode = QHeaderView.ResizeMode
         self.table.horizontalHeader().setSectionResizeMode(mode.ResizeToContents)
@@ -116,15 +97,8 @@ class PrecisionDialog(QDialog):
         self.rate = self._wish("rate", tr("Frames per second that are needed"), tr(" frames/s"))
         self.limit = self._wish("limit", tr("Largest error of the depth"), tr(" um RMS"))
         self.advice = named(PlainLabel(), "precision.advice", tr("Recommended mode"))
-        self.words = named(PlainLabel(), "precision.words", tr("Notes"))
-        self.words.setWordWrap(True)
         self.words.setMinimumHeight(2 * self.words.fontMetrics().lineSpacing())
-        self.save = named(
-            QPushButton(tr("Save report…")), "precision.save", tr("Save the report"),
-            tr("HTML with the diagrams, CSV, JSON and PNG"),
-        )  # fmt: skip
-        self.save.clicked.connect(self.choose_report)
-        self.save.setEnabled(False)
+        self.save.setToolTip(plain_tip(tr("HTML with the diagrams, CSV, JSON and PNG")))
 
     def _wish(self, name: str, label: str, suffix: str) -> DoubleSpinBox:
         box = named(DoubleSpinBox(), f"precision.{name}", label, label)
@@ -139,28 +113,21 @@ class PrecisionDialog(QDialog):
         where = QHBoxLayout()
         where.addWidget(self.presses, 1)
         where.addWidget(self.folder)
-        begin = QHBoxLayout()
-        begin.addWidget(self.progress, 1)
-        begin.addWidget(self.start)
-        begin.addWidget(self.stop)
         form = QFormLayout()
         form.addRow(tr("Calibration"), self.calibrations)
         form.addRow(tr("Presses"), where)
-        form.addRow("", begin)
+        form.addRow("", self.button_row())
         wish = QHBoxLayout()
         wish.addWidget(self.rate)
         wish.addWidget(self.limit)
         wish.addWidget(self.advice, 1)
         form.addRow(tr("Diagram"), self.error)
         form.addRow(tr("I need"), wish)
-        foot = QHBoxLayout()
-        foot.addWidget(self.words, 1)
-        foot.addWidget(self.save)
         column = QVBoxLayout(self)
         column.addLayout(form)
         column.addWidget(self.plot, 1)
         column.addWidget(self.table)
-        column.addLayout(foot)
+        column.addLayout(self.foot_row())
 
     # Inputs
 
@@ -175,7 +142,7 @@ class PrecisionDialog(QDialog):
             entries = self.context.workspace.entries()
         except InputError as error:
             entries = ()
-            self._say(str(error), "fail")
+            self.say(str(error), "fail")
         for entry in entries:
             if entry.summary is not None:
                 self.calibrations.addItem(entry.name, entry)
@@ -192,14 +159,14 @@ class PrecisionDialog(QDialog):
         self._folder = None
         self._virtual = entry is not None and entry.serial == self._design().serial
         if entry is None:
-            self._say(tr("There is no calibration yet. Calibrate a sensor first."), "warn")
+            self.say(tr("There is no calibration yet. Calibrate a sensor first."), "warn")
         elif self._virtual:
             self.presses.setText(tr("simulated by the virtual sensor"))
-            self._say(tr("Measures the accuracy and run time of each method on this machine."))
+            self.say(tr("Measures the accuracy and run time of each method on this machine."))
         else:
             self.presses.setText(tr("none selected"))
-            self._say(tr("Choose a session folder of this sensor that contains the true depths."))
-        self._allow()
+            self.say(tr("Choose a session folder of this sensor that contains the true depths."))
+        self.allow()
 
     def choose_folder(self) -> None:
         """Let the user choose a session folder with true depths."""
@@ -216,9 +183,9 @@ class PrecisionDialog(QDialog):
         self._folder = folder
         self.presses.setText(str(folder))
         self.presses.setToolTip(plain_tip(str(folder)))
-        self._allow()
+        self.allow()
 
-    def measure(self) -> None:
+    def run(self) -> None:
         """Measure in the background."""
         entry = self.calibrations.currentData()
         if entry is None or self.jobs.busy:
@@ -226,33 +193,21 @@ class PrecisionDialog(QDialog):
         path, folder, design = entry.path, self._folder, self._design()
         chosen = usual_methods()
 
-        def work(tell: Callable[[float], None]) -> tuple[Point, ...]:
-            def progress(_what: str, share: float) -> None:
-                tell(share)
+        def work(progress: Callable[[float], None]) -> tuple[Point, ...]:
+            def step(_what: str, share: float) -> None:
+                progress(share)
 
             calibration = read_open_calibration(path)
             if folder is not None:
-                return measure_calibration(calibration, folder, chosen, progress=progress)
-            return measure_virtual(calibration, design, chosen, progress=progress)
+                return measure_calibration(calibration, folder, chosen, progress=step)
+            return measure_virtual(calibration, design, chosen, progress=step)
 
-        self._say("")
-        self.context.requests.rest.emit(True)
-        self.jobs.submit(
-            Job(
-                tr("Measuring"),
-                work,
-                self.show_points,
-                lambda text: self._say(text, "fail"),
-                ended=lambda: self.context.requests.rest.emit(False),
-            )
-        )
-        self._allow()
+        self.submit(tr("Measuring"), work)
 
     # Results
 
-    def show_points(self, points: tuple[Point, ...]) -> None:
+    def show_result(self, points: tuple[Point, ...]) -> None:
         """Show the results."""
-        self.points = points
         front = pareto_front(points)
         self.table.setRowCount(len(points))
         for row, point in enumerate(points):
@@ -268,10 +223,9 @@ class PrecisionDialog(QDialog):
                 self.table.setItem(row, column, item)
         gaps = [f"{point.label}: {point.gap}" for point in points if point.gap]
         text = tr("The dashed line is the front: no other method is both faster and more accurate.")
-        self._say(" ".join([text, *gaps]))
+        self.say(" ".join([text, *gaps]))
         self._draw()
         self._recommend()
-        self._allow()
 
     def _recommend(self) -> None:
         """Say which mode to use for the frame rate and the error that are wanted."""
@@ -291,59 +245,19 @@ class PrecisionDialog(QDialog):
         )
         self.advice.setText(text)
 
-    def choose_report(self) -> None:
-        """Let the user choose a folder, and write the report into it."""
-        chosen = QFileDialog.getExistingDirectory(
-            self, tr("Folder for the report"), str(self.context.settings.folder("report"))
-        )
-        if chosen:
-            self.context.settings.keep_folder("report", Path(chosen))
-            self.write_report(Path(chosen))
+    def files_of(self, points: tuple[Point, ...], folder: Path) -> list[Path]:
+        """Write the report into a folder; return the files."""
+        from gelpolight_core.experiments.front.report import write_work_precision
 
-    def write_report(self, folder: Path) -> None:
-        """Write the report in the background."""
-        points = self.points
-
-        def work(_tell: Callable[[float], None]) -> list[Path]:
-            from gelpolight_core.experiments.front.report import write_work_precision
-
-            return write_work_precision(points, (), folder)
-
-        def done(written: list[Path]) -> None:
-            self._say(tr("Report saved: {file}").format(file=written[0]), "pass")
-            self._allow()
-
-        def failed(sentence: str) -> None:
-            self._say(sentence, "fail")
-
-        self.jobs.submit(Job(tr("Writing the report"), work, done, failed))
+        return write_work_precision(points, (), folder)
 
     def _draw(self) -> None:
         self.plot.show_points(self.points, str(self.error.currentData()))
 
-    def _say(self, text: str, role: str = "muted") -> None:
-        self.words.setText(text)
-        show_meaning(self.words, role)
-
-    def _show_work(self, title: str, share: float) -> None:
-        self.progress.setFormat(f"{title}  %p %" if title else "")
-        self.progress.setValue(round(100.0 * share))
-        self._allow()
-
-    def _allow(self) -> None:
-        busy = self.jobs.busy
-        ready = self.calibrations.currentData() is not None
-        self.start.setEnabled(ready and not busy and (self._virtual or self._folder is not None))
-        self.stop.setEnabled(busy)
-        self.save.setEnabled(bool(self.points) and not busy)
-
-    def reject(self) -> None:
-        """Stop measuring. Qt calls this for Escape and for every other way of closing."""
-        working = self.jobs.busy
-        self.jobs.close()
-        if working:
-            self.context.requests.rest.emit(False)
-        super().reject()
+    def ready(self) -> bool:
+        """Whether presses with true depths are chosen."""
+        chosen = self.calibrations.currentData() is not None
+        return chosen and (self._virtual or self._folder is not None)
 
 
 def _digits(value: float) -> str:

@@ -1,0 +1,186 @@
+"""A dialog of the Tools menu that works in the background and writes a report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtWidgets import (
+    QDialog,
+    QFileDialog,
+    QHBoxLayout,
+    QProgressBar,
+    QPushButton,
+    QTableWidget,
+    QWidget,
+)
+
+from app.context.context import AppContext
+from app.services.jobs import Job, Jobs
+from app.widgets.label import PlainLabel
+from app.widgets.meaning import show_meaning
+from app.widgets.naming import named
+from gelpolight_core.translation import tr
+
+
+class WorkDialog(QDialog):
+    """Starts, stops and reports one piece of work. Live processing rests meanwhile.
+
+    A subclass places the widgets, and provides `run`, `show_result` and `files_of`.
+
+    Parameters
+    ----------
+    name, title : str
+        For object names, and for the user.
+    start : tuple of 2 str
+        Text of the start button, and its description.
+    context : AppContext
+        Settings, and the request to rest.
+    parent : QWidget, optional
+        Owner.
+
+    Attributes
+    ----------
+    result_shown : object
+        The last result; None before the first.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        title: str,
+        *,
+        start: tuple[str, str],
+        context: AppContext,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        named(self, name, title)
+        self.setWindowTitle(title)
+        self.context = context
+        self.jobs = Jobs(name, self)
+        self.result_shown: Any = None
+        self.start = named(QPushButton(start[0]), f"{name}.start", start[1])
+        self.start.setDefault(True)
+        self.start.clicked.connect(self.run)
+        self.stop = named(QPushButton(tr("Stop")), f"{name}.stop", tr("Stop"))
+        self.stop.clicked.connect(self.jobs.cancel)
+        self.save = named(QPushButton(tr("Save report…")), f"{name}.save", tr("Save the report"))
+        self.save.clicked.connect(self.choose_report)
+        self.progress = named(QProgressBar(), f"{name}.progress", tr("Progress"))
+        self.words = named(PlainLabel(), f"{name}.words", tr("Notes"))
+        self.words.setWordWrap(True)
+        self.jobs.progressed.connect(self._show_work)
+        self.jobs.refused.connect(lambda text: self.say(text, "warn"))
+
+    def run(self) -> None:
+        """Start the work."""
+        raise NotImplementedError
+
+    def show_result(self, result: Any) -> None:
+        """Show a result."""
+        raise NotImplementedError
+
+    def files_of(self, result: Any, folder: Path) -> Sequence[Path]:
+        """Write the report into a folder, in a background thread; return the files."""
+        raise NotImplementedError
+
+    def ready(self) -> bool:
+        """Whether everything that the work needs is chosen."""
+        return True
+
+    def button_row(self, *before: QWidget) -> QHBoxLayout:
+        """Return a row of widgets, the progress, Start and Stop."""
+        row = QHBoxLayout()
+        for widget in before:
+            row.addWidget(widget)
+        row.addWidget(self.progress, 1)
+        row.addWidget(self.start)
+        row.addWidget(self.stop)
+        return row
+
+    def foot_row(self) -> QHBoxLayout:
+        """Return a row of the notes and Save."""
+        row = QHBoxLayout()
+        row.addWidget(self.words, 1)
+        row.addWidget(self.save)
+        return row
+
+    def result_table(self, heads: Sequence[str]) -> QTableWidget:
+        """Return an empty table with these columns, which cannot be edited."""
+        table = named(QTableWidget(0, len(heads)), f"{self.objectName()}.table", tr("Results"))
+        table.setHorizontalHeaderLabels(list(heads))
+        table.verticalHeader().hide()
+        table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        return table
+
+    def submit(self, title: str, work: Callable[[Callable[[float], None]], Any]) -> None:
+        """Work in the background while live processing rests; then show the result."""
+        self.say("")
+        self.context.requests.rest.emit(True)
+        self.jobs.submit(
+            Job(
+                title,
+                work,
+                self._done,
+                lambda text: self.say(text, "fail"),
+                ended=lambda: self.context.requests.rest.emit(False),
+            )
+        )
+        self.allow()
+
+    def _done(self, result: Any) -> None:
+        self.result_shown = result
+        self.show_result(result)
+        self.allow()
+
+    def choose_report(self) -> None:
+        """Let the user choose a folder, and write the report into it."""
+        chosen = QFileDialog.getExistingDirectory(
+            self, tr("Folder for the report"), str(self.context.settings.folder("report"))
+        )
+        if chosen:
+            self.context.settings.keep_folder("report", Path(chosen))
+            self.write_report(Path(chosen))
+
+    def write_report(self, folder: Path) -> None:
+        """Write the report in the background."""
+        result = self.result_shown
+
+        def done(written: Sequence[Path]) -> None:
+            self.say(tr("Report saved: {file}").format(file=written[0]), "pass")
+
+        self.jobs.submit(
+            Job(
+                tr("Writing the report"),
+                lambda _progress: self.files_of(result, folder),
+                done,
+                lambda text: self.say(text, "fail"),
+            )
+        )
+
+    def say(self, text: str, role: str = "muted") -> None:
+        """Show a note; `role` is a meaning of :func:`show_meaning`."""
+        self.words.setText(text)
+        show_meaning(self.words, role)
+
+    def allow(self) -> None:
+        """Enable the buttons that can be used now."""
+        busy = self.jobs.busy
+        self.start.setEnabled(self.ready() and not busy)
+        self.stop.setEnabled(busy)
+        self.save.setEnabled(bool(self.result_shown) and not busy)
+
+    def _show_work(self, title: str, share: float) -> None:
+        self.progress.setFormat(f"{title}  %p %" if title else "")
+        self.progress.setValue(round(100.0 * share))
+        self.allow()
+
+    def reject(self) -> None:
+        """Stop the work. Qt calls this for Escape and for every other way of closing."""
+        working = self.jobs.busy
+        self.jobs.close()
+        if working:
+            self.context.requests.rest.emit(False)
+        super().reject()

@@ -1,0 +1,114 @@
+"""The membrane's reflectance, from its brightness beside that of the white board."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.masks import LEAST_LIGHT
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reflectance.membrane import Membrane
+from gelpolight_core.reflectance.surroundings import view_directions
+
+Array = NDArray[np.float64]
+THIN = 8
+"""Nodes between those at which membrane and white board are compared."""
+BOARD_REFLECTANCE, BOARD_SD = 0.92, 0.05
+"""Of matt white boards, papers and paints, which reflect 0.85 to 0.99 of the light."""
+BELIEVED_SDS = 3.0
+"""An expected reflectance that is so far from what the balls show is left out: board and membrane
+were taken at different exposures, or the board is not white."""
+
+
+class BesideBoard(NamedTuple):
+    """The untouched membrane beside the white board, at some nodes.
+
+    Attributes
+    ----------
+    points_mm, view : (N, 3)
+        Sensor frame; unit directions to the camera.
+    share : (N, 3)
+        Membrane over board.
+    """
+
+    points_mm: Array
+    view: Array
+    share: Array
+
+    @classmethod
+    def of(
+        cls,
+        table: ResamplingTable,
+        usable: NDArray[np.bool_],
+        background: NDArray[np.floating],
+        radiance: NDArray[np.floating],
+        crosstalk: Array,
+        leds_mm: Array,
+    ) -> BesideBoard:
+        """Return both as a sensor's calibration sees them.
+
+        Parameters
+        ----------
+        table : ResamplingTable
+            The grid and its rays.
+        usable : (rows, columns) bool
+            Nodes with light and membrane.
+        background, radiance : (rows, columns, 3)
+            Light of the membrane without crosstalk, and radiance of the lights with it (Eq. 5).
+        crosstalk : (3, 3)
+            Of the camera.
+        leds_mm : (3, 3)
+            Sensor frame.
+        """
+        thin = np.s_[::THIN, ::THIN]
+        x, y = np.meshgrid(table.grid.x_mm[::THIN], table.grid.y_mm[::THIN])
+        points = np.stack([x, y, np.zeros_like(x)], axis=-1)[usable[thin]]
+        cosine = -light_directions(leds_mm, points)[0][..., 2]
+        raw = np.asarray(radiance[thin][usable[thin]] * cosine, np.float32)
+        board = unmix(raw, crosstalk)
+        lit = (board > LEAST_LIGHT).all(axis=-1)
+        view = view_directions(table.ray_slope[thin][usable[thin]].astype(np.float64))
+        share = np.asarray(background[thin][usable[thin]] / board, np.float64)
+        return cls(points[lit], view[lit], share[lit])
+
+    def reflectance(self, leds_mm: Array, membrane: Membrane) -> float:
+        """Return the membrane's reflectance in units of the board's; NaN where nothing is lit.
+
+        The board is Lambertian (Eq. 5), the membrane is as given.
+
+        Parameters
+        ----------
+        leds_mm : (3, 3)
+            Sensor frame.
+        membrane : Membrane
+            Its lobe.
+        """
+        if not len(self.points_mm):
+            return float("nan")
+        light, _ = light_directions(leds_mm, self.points_mm)
+        up = np.broadcast_to([0.0, 0.0, -1.0], self.view.shape)
+        bright = np.pi * membrane.response(light, up, self.view)
+        return float(np.median(self.share * -light[..., 2] / bright))
+
+    def expected(
+        self, leds_mm: Array, membrane: Membrane, shown: tuple[float, float]
+    ) -> tuple[float, float] | None:
+        """Return the reflectance to expect with a common white board, and its standard deviation.
+
+        None where it does not agree with what balls have `shown`, given in the same way.
+
+        Parameters
+        ----------
+        leds_mm, membrane
+            As in :meth:`reflectance`.
+        shown : (float, float)
+            Reflectance and standard deviation by the light between parts of the membrane.
+        """
+        seen = self.reflectance(leds_mm, membrane)
+        expected, sd = BOARD_REFLECTANCE * seen, BOARD_SD * seen
+        agrees = abs(expected - shown[0]) <= BELIEVED_SDS * float(np.hypot(sd, shown[1]))
+        return (expected, sd) if agrees else None

@@ -1,0 +1,366 @@
+"""Find a ball's indentation in an image without any help.
+
+Four steps, none of which needs the lights, the camera or the scale; everything is in pixels of the
+image given, raw or resampled. (1) Markers printed on the membrane are found in the background and
+filled. (2) The noise-scaled difference to the background gives the region. (3) The shading of a
+ball, fitted to all of it, gives a circle that neither texture nor shadows move far. (4) The kink
+of the shading at the contact's edge makes the circle exact where it is sharp and agrees with the
+shading; where it is not, the circle of the shading stays, with its larger uncertainty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gelpolight_core.errors import InputError
+from gelpolight_core.image.noise import (
+    ScaledDifference,
+    change_where,
+    check_gain,
+    prepare_pair,
+    scale_difference,
+)
+from gelpolight_core.quality import Verdict
+from gelpolight_core.reflectance.ball_shading import BALL_EXPLAINED, ShadingFit, fit_shading
+from gelpolight_core.reflectance.contour import Circle, Contour, distance_in_radii, fit_edge
+from gelpolight_core.reflectance.indentation import Indentation, describe_indentation
+from gelpolight_core.reflectance.indentation_checks import (
+    DETECTION,
+    MOST_HIDDEN,
+    SMALLEST_RADIUS_PX,
+    BallRefusal,
+    Reason,
+    check_light_change,
+    check_order,
+    check_round,
+    check_shading,
+    check_visible,
+    check_whole,
+    looks_like_ball,
+    other_regions,
+    reaches_border,
+    refuse_several,
+    refuse_unfitted,
+    share_in_view,
+)
+from gelpolight_core.reflectance.markers import Markers, fill, find_markers, no_markers
+from gelpolight_core.translation import tr
+
+Array = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+
+_BLUR_PX = 0.8
+# A clean edge scatters by 1 to 3 % of its radius; texture, shadows and markers scatter it more,
+# and then the strongest kink need not be the edge.
+_CLEAN_EDGE = 0.04
+_AGREES = 0.12
+# What was filled is smooth, so its kink lies anywhere.
+_MOST_HIDDEN_EDGE = 0.1
+# Systematic errors of the two circles. How far they lie apart is the best measure of both: on
+# rendered sensors 0.01 of the radius and less, on textured gels 0.04, with shadows 0.15.
+_APART_OF_EDGE, _RESIDUAL_OF_EDGE = 0.7, 0.7
+_MODEL_OF_SHADING, _APART_OF_SHADING = 0.09, 0.35
+
+
+@dataclass(frozen=True, slots=True)
+class BallDetection:
+    """The answer to: is there a ball's indentation in this image, and where.
+
+    Attributes
+    ----------
+    indentation : Indentation or None
+        What was found; None where the image shows no ball that can be used.
+    reason : Reason
+        Why the image is refused, or what is wrong with it: ``OK`` for a whole ball; ``CUT`` comes
+        with an indentation, as the part in view is a ball's.
+    refusal : InputError or None
+        The reason as a sentence with its advice; None for a whole ball.
+    markers : Markers
+        The markers that were left out.
+    """
+
+    indentation: Indentation | None
+    reason: Reason
+    refusal: InputError | None
+    markers: Markers
+
+    @property
+    def verdict(self) -> Verdict:
+        """Fail without an indentation, warn where the border cuts it, else its own verdict."""
+        if self.indentation is None:
+            return Verdict.FAIL
+        if self.refusal is not None and self.indentation.quality.verdict is Verdict.PASS:
+            return Verdict.WARN
+        return self.indentation.quality.verdict
+
+    @property
+    def centre_px(self) -> tuple[float, float] | None:
+        """(x, y) of the contact's centre; None without an indentation."""
+        return None if self.indentation is None else self.indentation.centre
+
+    @property
+    def centre_sd_px(self) -> float | None:
+        """Standard deviation of the centre per axis; None without an indentation."""
+        return None if self.indentation is None else self.indentation.centre_sd_px
+
+    @property
+    def radius_px(self) -> float | None:
+        """Radius of the contact; None without an indentation."""
+        return None if self.indentation is None else self.indentation.contact_radius_px
+
+    @property
+    def radius_sd_px(self) -> float | None:
+        """Standard deviation of the contact's radius; None without an indentation."""
+        return None if self.indentation is None else self.indentation.radius_sd_px
+
+
+def detect_ball(
+    image: Array,
+    background: Array,
+    *,
+    markers: Markers | None = None,
+    ball_radius_px: float | None = None,
+    valid: Mask | None = None,
+    name: str = "press",
+    background_name: str = "background",
+) -> BallDetection:
+    """Find the one ball indentation in an image, or say why there is none.
+
+    The step "Contour -> centre o1 and radius r of the contact" before Eq. (8) of the paper. Never
+    raises for what an image shows.
+
+    Parameters
+    ----------
+    image, background : (rows, columns, 3) float
+        Image with the ball and image without contact, RGB, 0..1; pixels that are not finite
+        are left out.
+    markers : Markers, optional
+        The membrane's markers, if they are known; by default they are looked for in `background`.
+    ball_radius_px : float, optional
+        Radius of the ball over the pixel's size, if both are known; a contact cannot be larger.
+    valid : (rows, columns) bool, optional
+        The working area; without it, the lit part of `background`.
+    name, background_name : str, optional
+        What to call the images in messages, such as their files.
+    """
+    known = markers
+    try:
+        image, background, area = prepare_pair(
+            image, background, valid, name=name, background_name=background_name
+        )
+        known = find_markers(background, area) if markers is None else markers
+        found, cut = _detect(image, background, area, known, ball_radius_px, name, background_name)
+    except InputError as error:
+        reason = error.reason if isinstance(error, BallRefusal) else Reason.UNUSABLE_IMAGE
+        return BallDetection(None, reason, error, known or no_markers(image.shape[:2]))
+    return BallDetection(found, Reason.OK if cut is None else Reason.CUT, cut, known)
+
+
+def find_indentation(
+    press: Array,
+    background: Array,
+    *,
+    markers: Markers | None = None,
+    valid: Mask | None = None,
+    name: str = "press",
+    background_name: str = "background",
+) -> Indentation:
+    """Find the one whole ball indentation in an image, or refuse the image.
+
+    Parameters
+    ----------
+    press, background, markers, valid, name, background_name
+        As in :func:`detect_ball`.
+
+    Raises
+    ------
+    InputError
+        If the images differ in size, are black or saturated; if the light changed between them
+        or they are swapped; if there is no indentation, more than one, one that is cut by the
+        border, or one that is not a ball's.
+    """
+    detection = detect_ball(
+        press,
+        background,
+        markers=markers,
+        valid=valid,
+        name=name,
+        background_name=background_name,
+    )
+    if detection.refusal is not None:
+        raise detection.refusal
+    assert detection.indentation is not None
+    return detection.indentation
+
+
+def _detect(
+    image: Array,
+    background: Array,
+    area: Mask,
+    markers: Markers,
+    ball_radius_px: float | None,
+    name: str,
+    background_name: str,
+) -> tuple[Indentation, BallRefusal | None]:
+    covered = markers.covered(image) & area
+    image, background = fill(image, covered), fill(background, covered)
+    change = scale_difference(image, background, area)
+    check_gain(change.gain, name)
+    region, start = _locate(change, name)
+    shading = _fit_shading(change, covered, start, ball_radius_px)
+    hidden = _hidden_share(covered, start if shading is None else shading.circle)
+    if shading is None or hidden > MOST_HIDDEN:
+        refuse_unfitted(hidden, name)
+    sharp = _in_noise_units(change)
+    contour, found_by = _edge(sharp, area, shading, hidden)
+    circle = contour.circle
+    check_visible(circle, area, name)
+    far = area & (distance_in_radii(area.shape, circle) > 2.0)
+    light_change = change_where(change, background, far)
+    check_light_change(light_change, name)
+    _check_one(change, area, covered, shading, name)
+    if found_by == "edge":
+        check_round(contour, name)
+    check_shading(shading, circle, ball_radius_px, hidden, name)
+    check_order(image, background, area, circle, name, background_name)
+    reaches = reaches_border(region, change.valid_small)
+    found = describe_indentation(image, change, contour, region, reaches, light_change, found_by)
+    try:
+        check_whole(contour, area, reaches and found_by == "edge", name)
+    except BallRefusal as cut:
+        return found, cut
+    return found, None
+
+
+def _fit_shading(
+    change: ScaledDifference, covered: Mask, start: Circle, ball_radius_px: float | None
+) -> ShadingFit | None:
+    """Fit the ball's shading on the coarse grid, and return it in pixels of the image."""
+    f = change.factor
+    half = 0.5 * (f - 1)
+    rows, columns = change.valid_small.shape
+    usable = change.valid_small
+    if covered.any():
+        hidden = cv2.resize(
+            covered[: rows * f, : columns * f].astype(np.float32),
+            (columns, rows),
+            interpolation=cv2.INTER_AREA,
+        )
+        usable = usable & (hidden < 0.5)
+    small = Circle((start.x - half) / f, (start.y - half) / f, start.radius / f)
+    # The fit takes the drape's steep beginning into the contact, so it may end a little larger.
+    largest = np.inf if ball_radius_px is None else 1.2 * ball_radius_px / f
+    noise = change.relative_noise
+    fit = fit_shading(change.relative, usable, small, noise=noise, largest_px=largest)
+    if fit is None:
+        return None
+    circle = Circle(fit.circle.x * f + half, fit.circle.y * f + half, fit.circle.radius * f)
+    return replace(
+        fit,
+        circle=circle,
+        decay_px=fit.decay_px * f,
+        centre_sd_px=fit.centre_sd_px * f,
+    )
+
+
+def _hidden_share(covered: Mask, circle: Circle) -> float:
+    inside = distance_in_radii(covered.shape, circle) < 1.0
+    return float(covered[inside].mean()) if inside.any() else 0.0
+
+
+def _check_one(
+    change: ScaledDifference, area: Mask, covered: Mask, first: ShadingFit, name: str
+) -> None:
+    """Refuse an image in which another disturbance has the shading of the same kind of object."""
+    circle = first.circle
+    if first.explained < BALL_EXPLAINED:
+        return
+    f, half = change.factor, 0.5 * (change.factor - 1)
+    for region in other_regions(change, circle):
+        start = _core_circle(change, region)
+        rows, columns = np.indices(region.shape)
+        distance = np.hypot(columns * f + half - circle.x, rows * f + half - circle.y)
+        alone = replace(change, valid_small=change.valid_small & (distance > 1.5 * circle.radius))
+        second = _fit_shading(alone, covered, start, None)
+        if second is None or second.explained < BALL_EXPLAINED:
+            continue
+        apart = np.hypot(second.circle.x - circle.x, second.circle.y - circle.y)
+        separate = apart > circle.radius + 0.5 * second.circle.radius
+        alike = looks_like_ball(first) == looks_like_ball(second)
+        if separate and alike and share_in_view(second.circle, area) > 0.5:
+            refuse_several(name)
+
+
+def _edge(sharp: Array, area: Mask, shading: ShadingFit, hidden: float) -> tuple[Contour, str]:
+    """Return the kink's contour where it is clean and agrees with the shading, else the latter."""
+    rough, radius = shading.circle, shading.circle.radius
+    contour = fit_edge(sharp, area, rough)
+    apart = float(np.hypot(contour.circle.x - rough.x, contour.circle.y - rough.y))
+    clean = contour.residual_px < _CLEAN_EDGE * contour.circle.radius
+    clean &= hidden < _MOST_HIDDEN_EDGE
+    if clean and apart < _AGREES * radius and 0.75 < contour.circle.radius / radius < 1.33:
+        systematic = np.hypot(_APART_OF_EDGE * apart, _RESIDUAL_OF_EDGE * contour.residual_px)
+        sd = float(np.hypot(contour.centre_sd_px, systematic))
+        return replace(contour, centre_sd_px=sd), "edge"
+    model_sd = np.hypot(_MODEL_OF_SHADING * radius, _APART_OF_SHADING * min(apart, 0.5 * radius))
+    sd = float(np.hypot(shading.centre_sd_px, model_sd))
+    turns = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+    x = rough.x + radius * np.cos(turns)
+    y = rough.y + radius * np.sin(turns)
+    rows, columns = area.shape
+    inside = (x > -0.5) & (x < columns - 0.5) & (y > -0.5) & (y < rows - 0.5)
+    seen = inside.copy()
+    seen[inside] = area[np.rint(y[inside]).astype(int), np.rint(x[inside]).astype(int)]
+    points = np.stack([x, y], axis=1)[seen]
+    return Contour(rough, points, sd, shading.axis_ratio, float(seen.mean()), sd), "shading"
+
+
+def _in_noise_units(change: ScaledDifference) -> Array:
+    weights = np.diag(1.0 / np.array(change.noise, np.float32))
+    blurred = cv2.GaussianBlur(change.difference, (0, 0), _BLUR_PX)
+    return np.asarray(cv2.transform(blurred, weights), dtype=np.float32)
+
+
+def _locate(change: ScaledDifference, name: str) -> tuple[Mask, Circle]:
+    """Return the most disturbed region on the coarse grid, and a first circle about its core."""
+    hot = (change.scaled > DETECTION).astype(np.uint8)
+    opened = cv2.morphologyEx(hot, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    count, labels = cv2.connectedComponents(opened)
+    weight = np.bincount(labels.ravel(), change.scaled.ravel(), minlength=count)
+    weight[0] = 0.0
+    region = labels == int(weight.argmax())
+    smallest = np.pi * (SMALLEST_RADIUS_PX / change.factor) ** 2
+    if count < 2 or np.count_nonzero(region) < smallest:
+        raise BallRefusal(
+            Reason.NO_INDENTATION,
+            tr("there is no indentation; nothing differs from the background beyond its noise"),
+            where=name,
+            advice=tr("Press the ball deeper, or leave this image out"),
+        )
+    return region, _core_circle(change, region)
+
+
+def _core_circle(change: ScaledDifference, region: Mask) -> Circle:
+    """Return a circle about the strongest part of a region; drape and shadow are fainter.
+
+    A ball is seen as a ring, often a broken one: gaps are closed, and the hull taken.
+    """
+    top = float(np.quantile(change.scaled[region], 0.98))
+    core = (region & (change.scaled > max(DETECTION, 0.4 * top))).astype(np.uint8)
+    gap = round(0.25 * float(np.sqrt(np.count_nonzero(core) / np.pi)))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * gap + 1, 2 * gap + 1))
+    count, labels = cv2.connectedComponents(cv2.morphologyEx(core, cv2.MORPH_CLOSE, disc))
+    largest = 1 + int(np.bincount(labels.ravel(), minlength=count)[1:].argmax())
+    rows, columns = np.nonzero(labels == largest)
+    (x, y), reach = cv2.minEnclosingCircle(np.stack([columns, rows], axis=1).astype(np.int32))
+    hull = cv2.convexHull(np.stack([columns, rows], axis=1).astype(np.int32))
+    moments = cv2.moments(hull)
+    if moments["m00"] > 0.0:
+        x, y = moments["m10"] / moments["m00"], moments["m01"] / moments["m00"]
+        reach = float(np.sqrt(moments["m00"] / np.pi))
+    f, half = change.factor, 0.5 * (change.factor - 1)
+    return Circle(x * f + half, y * f + half, max(reach, 1.0) * f)

@@ -1,0 +1,151 @@
+"""The wizard captures, signals and continues by itself, and says why it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtGui import QColor
+from technician import ScriptedCamera, Technician, read_rgb
+
+from app.calibrate import moving_on
+from app.calibrate.steps import OPEN_ROUTE
+from app.context.context import AppContext
+from app.live.image_view import FLASH
+from app.services.settings import Settings
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.project import CalibrationProject
+from gelpolight_core.calibration.status import StageState
+
+Made = Callable[[], CalibrationProject]
+
+
+@pytest.fixture
+def automatic(context: AppContext, technician: Technician, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Switch automatic captures on, and go on without a pause."""
+    monkeypatch.setattr(moving_on, "LOOK_MS", 10)
+    context.settings.captures_automatically = True
+
+
+def test_it_is_on_for_a_new_user_and_remembers_a_change(
+    technician: Technician, context: AppContext, computed_project: Made, tmp_path: Path
+) -> None:
+    assert Settings(tmp_path / "new.ini").captures_automatically
+    technician.begin(computed_project(), "lights")
+    assert not technician.wizard.panel.automatic.isChecked()
+    technician.wizard.panel.automatic.click()
+    assert context.settings.captures_automatically
+
+
+def test_a_completed_step_leads_to_the_next_one_that_needs_the_user_and_back(
+    automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
+    small_session: Path,
+) -> None:  # fmt: skip
+    project = computed_project()
+    former = project.session.found("background")[0]
+    project.exclude(Stage.BACKGROUND, former.name)
+    image = read_rgb(small_session / "background" / "background.png")
+    camera.show(np.full_like(image, 3))
+    technician.begin(project, "background")
+    wizard = technician.wizard
+    technician.until(lambda: wizard.panel.live.text())
+    camera.show(image)
+    technician.until(lambda: wizard.open.step.key != "background")
+    assert wizard.open.step.key == "balls", "they must be compared with the new background"
+    assert len(project.session.found("background")) == 1
+    technician.rest()
+    wizard.go_to("background")
+    technician.rest()
+    assert not wizard.moving_on.isActive(), "who comes back is not sent on again"
+
+
+def test_what_needs_reading_or_nothing_new_does_not_lead_on(
+    automatic: None, technician: Technician, computed_project: Made, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    technician.begin(computed_project(), "background")
+    wizard, step = technician.wizard, technician.wizard.open
+    for state, leads_on in ((StageState.WARN.value, False), (StageState.PASS.value, True)):
+        wizard.moving_on._was_incomplete = True
+        wizard.model.states["background"] = (state, "")
+        assert step.is_settled(state) is leads_on
+        wizard.moving_on.check()
+        assert wizard.moving_on.isActive() is leads_on
+    wizard.panel.automatic.setChecked(False)
+    wizard.moving_on.timeout.emit()
+    assert wizard.open is step
+    wizard.moving_on.stop()
+    technician.rest()
+
+
+def test_next_is_refused_with_the_reason_while_a_step_is_incomplete(
+    technician: Technician, computed_project: Made
+) -> None:
+    project = computed_project()
+    for path in project.session.found("mirror"):
+        project.exclude(Stage.LIGHTS, path.name)
+    technician.begin(project, "lights")
+    technician.click("calibrate.next")
+    assert technician.wizard.open.step.key == "lights"
+    assert technician.wizard.panel.notice.text() == technician.wizard.open.obstacle() != ""
+    project.exclude(Stage.LIGHTS, project.session.captured("mirror")[0].name, False)
+    technician.wizard.model.changed.emit()
+    technician.click("calibrate.next")
+    assert technician.wizard.open.step.key == "radiance"
+    technician.rest()
+
+
+def test_only_what_shows_results_can_be_passed_over() -> None:
+    passed_over = {made.describe().key for made in OPEN_ROUTE if made.only_shows}
+    assert passed_over == {"refraction", "reflectance"}
+
+
+def test_a_good_image_that_was_there_before_asks_for_a_movement(
+    automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
+    small_session: Path,
+) -> None:  # fmt: skip
+    project = computed_project()
+    camera.show(read_rgb(small_session / "balls" / "ball_01.png"))
+    technician.begin(project, "balls")
+    technician.wizard.at("balls").radius.box.setValue(
+        2.0 * project.session.ball_radius_mm("ball_01.png")
+    )
+    panel, count = technician.wizard.panel, len(project.session.captured("balls"))
+    technician.until(lambda: panel.live.property("meaning") == "pass")
+    technician.until(lambda: "Move it" in panel.live.text())
+    assert len(project.session.captured("balls")) == count
+    technician.rest()
+
+
+def test_a_capture_flashes(
+    technician: Technician, camera: ScriptedCamera, computed_project: Made, small_session: Path
+) -> None:
+    technician.begin(computed_project(), "background")
+    camera.show(read_rgb(small_session / "background" / "background.png"))
+    view = technician.wizard.area.view._image
+    seen: list[QColor] = []
+    flash = view.setForegroundBrush
+    view.setForegroundBrush = lambda brush: (seen.append(brush), flash(brush))
+    technician.capture()
+    technician.until(lambda: len(seen) == 2)
+    assert seen[0] == FLASH
+    technician.rest()
+
+
+def test_it_goes_on_from_a_step_that_was_opened_in_the_list(
+    automatic: None, technician: Technician, camera: ScriptedCamera, computed_project: Made,
+    small_session: Path,
+) -> None:  # fmt: skip
+    project = computed_project()
+    project.exclude(Stage.RADIANCE, project.session.found("whiteboard")[0].name)
+    image = read_rgb(small_session / "whiteboard" / "whiteboard.png")
+    camera.show(np.full_like(image, 3))
+    technician.begin(project, "lights")
+    wizard = technician.wizard
+    row = [one.step.key for one in wizard.presenters].index("radiance")
+    wizard.step_list.setCurrentRow(row)
+    technician.until(lambda: wizard.panel.live.text())
+    camera.show(image)
+    technician.until(lambda: wizard.open.step.key == "background")
+    technician.rest()

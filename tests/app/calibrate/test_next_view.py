@@ -1,0 +1,58 @@
+"""Suggestions for the next lens view and the next ball press: who follows them gets enough."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from app.calibrate.balls.detector import next_press_mm
+from app.calibrate.lens.next_view import TILT_DEG, next_view, uncovered_ninth
+from gelpolight_core.optics.board_grid import foreshortening_tilt_deg
+from gelpolight_core.optics.checkerboard import BoardView
+from gelpolight_core.optics.lens_quality import coverage_counts
+from gelpolight_core.optics.resampling import MembraneGrid, ResamplingTable
+from gelpolight_core.session.board import BoardSpec
+
+BOARD, SIZE = BoardSpec((9, 6), 3.0), (1280, 960)
+OUTER_MM = np.float32([[0, 0], [24, 0], [24, 15], [0, 15]])
+
+
+def held(quad: np.ndarray) -> BoardView:
+    """Return the view of a board whose outermost corners are at these pixels."""
+    matrix = cv2.getPerspectiveTransform(OUTER_MM, quad.astype(np.float32))
+    flat = np.float32(BOARD.points_mm[:, :2]).reshape(-1, 1, 2)
+    flat -= flat.min(axis=0)
+    corners = cv2.perspectiveTransform(flat, matrix).reshape(-1, 2).astype(np.float64)
+    tilt_deg = foreshortening_tilt_deg(matrix, np.array([12.0, 7.5]))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    box = (*map(float, low), *map(float, high))
+    return BoardView("", BOARD, SIZE, corners, 0, 0, 0, 0, 40.0, 2.0, 0.5, 0.0, box, tilt_deg)
+
+
+def test_twelve_suggested_views_are_whole_tilted_and_cover_the_image() -> None:
+    views: list[BoardView] = []
+    for _ in range(12):
+        quad = next_view(BOARD, SIZE, views)
+        assert (quad >= 0.0).all()
+        assert (quad < SIZE).all()
+        views.append(held(quad))
+        assert abs(views[-1].tilt_deg - TILT_DEG) < 12.0
+    assert uncovered_ninth(views) is None
+    assert (coverage_counts(views, SIZE) > 0).mean() > 0.9
+
+
+def test_presses_are_suggested_from_the_middle_outwards_and_far_apart() -> None:
+    axis = np.arange(-200, 201) * 0.05
+    inside = np.hypot(*np.meshgrid(axis, axis)) <= 9.0
+    seen = np.where(inside, 100.0, -1.0).astype(np.float32)
+    slopes = np.zeros((*inside.shape, 2), np.float32)
+    table = ResamplingTable(MembraneGrid(axis, axis, 0.05), seen, seen, inside, slopes)
+    done: list[tuple[float, float]] = []
+    for _ in range(6):
+        place = next_press_mm(table, 3.0, done)
+        assert place is not None
+        assert np.hypot(*place) < 9.0 - 0.8 * 3.0
+        assert all(np.hypot(place[0] - x, place[1] - y) > 4.0 for x, y in done)
+        done.append(place)
+    assert np.hypot(*done[0]) < 1.0
+    assert next_press_mm(table, 20.0, ()) is None

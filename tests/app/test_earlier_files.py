@@ -1,0 +1,171 @@
+"""Files that earlier states of the program wrote (tests/data) are opened, with their values."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.services.settings import Limits, Settings
+from app.workspace.indenters import read_indenters
+from app.workspace.workspace import Workspace
+from gelpolight_core.calibration.closed_project import open_project
+from gelpolight_core.calibration.file import read_calibration
+from gelpolight_core.calibration.inputs import Stage
+from gelpolight_core.calibration.status import StageState
+from gelpolight_core.export.raster import read_npz
+from gelpolight_core.measurement.indenter_tools import measure_heightmap
+from gelpolight_core.reconstruction.reconstructor import Reconstructor
+from gelpolight_core.recording.reader import Recording
+from gelpolight_core.recording.recording import RecordedFrame
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+EARLIER, CLOSED, PRESENT = "2026-11-21", "2026-11-23-closed", "2026-11-23"
+SENSOR = "workspace/sensors/small-1"
+# six balls at this size leave a height error of 4 to 8 %, which the calibrations state themselves.
+# The true press: a cylinder of 5 mm, 1 mm deep. Pixels of 0.16 mm blur its edge by half of that,
+# and six balls at this size leave height errors of 4 to 8 %, which the calibrations state.
+DIAMETER_MM, HEIGHT_MM = 5.0, 1.0
+
+
+def frames(folder: str) -> list[RecordedFrame]:
+    with Recording.open(DATA / folder / SENSOR / "recordings/press.gplrec") as recording:
+        return [recording.frame(index) for index in range(len(recording))]
+
+
+@pytest.fixture
+def workspace(tmp_path: Path, request: pytest.FixtureRequest) -> Workspace:
+    """Return a writable copy of a workspace: opening the records may change their file."""
+    folder = tmp_path / "workspace"
+    shutil.copytree(DATA / request.param / "workspace", folder)
+    opened = Workspace(folder)
+    request.addfinalizer(opened.close)
+    return opened
+
+
+@pytest.mark.parametrize(
+    ("folder", "name", "size_error_mm", "height_error_mm"),
+    [
+        (EARLIER, "first", 0.08, 0.08),
+        (PRESENT, "first", 0.08, 0.08),
+        (CLOSED, "closed", 0.25, 0.03),
+        (PRESENT, "closed", 0.25, 0.03),
+    ],
+)
+def test_a_calibration_measures_the_recorded_press(
+    folder: str, name: str, size_error_mm: float, height_error_mm: float
+) -> None:
+    calibration = read_calibration(DATA / folder / SENSOR / f"{name}.gplcal")
+    image = frames(EARLIER)[1].rgb
+
+    found = measure_heightmap(Reconstructor(calibration).depth(image), shape="cylinder")
+
+    assert found.size_mm == pytest.approx(DIAMETER_MM, abs=size_error_mm)
+    assert found.height_mm == pytest.approx(HEIGHT_MM, abs=height_error_mm)
+
+
+def test_an_earlier_calibration_gives_the_depth_of_its_own_program() -> None:
+    calibration = read_calibration(DATA / EARLIER / SENSOR / "first.gplcal")
+    then = read_npz(DATA / EARLIER / "height_map/cylinder_s5_d100.npz")
+
+    now = Reconstructor(calibration).depth(frames(EARLIER)[1].rgb)
+
+    assert then.calibration_id == calibration.identity == now.calibration_id
+    assert then.pitch_mm == pytest.approx(now.pitch_mm, rel=1e-6)
+    difference_um = 1000.0 * np.abs(now.depth_mm - then.depth_mm)
+    # Images are sharpened now: walls are steeper.
+    assert np.percentile(difference_um, 99) < 20.0
+    assert then.depth_mm.max() == pytest.approx(0.94, abs=0.01)
+
+
+@pytest.mark.parametrize("folder", [EARLIER, PRESENT])
+def test_an_exported_height_map_keeps_its_metric_grid(folder: str) -> None:
+    header, _, values = (
+        (DATA / folder / "height_map/cylinder_s5_d100.gsf").read_bytes().partition(b"\0")
+    )
+    stated = dict(line.split("=") for line in header.decode().splitlines()[1:])
+    columns, rows = int(stated["XRes "]), int(stated["YRes "])
+
+    depth_m = np.frombuffer(values.lstrip(b"\0")[-4 * rows * columns :], "<f4")
+
+    assert (columns, rows) == (100, 100)
+    assert float(stated["XReal "]) == pytest.approx(0.0163, abs=2e-4)
+    assert np.nanmax(depth_m) == pytest.approx(0.94e-3, abs=0.01e-3)
+
+
+@pytest.mark.parametrize("folder", [EARLIER, PRESENT])
+def test_a_recording_keeps_frames_numbers_and_description(folder: str) -> None:
+    with Recording.open(DATA / folder / SENSOR / "recordings/press.gplrec") as recording:
+        header = recording.header
+    untouched, pressed = frames(folder)
+
+    assert (untouched.number, pressed.number) == (4, 6)
+    assert pressed.time_s - untouched.time_s == pytest.approx(2 / 30)
+    assert untouched.rgb.shape == pressed.rgb.shape == (144, 192, 3)
+    assert (header.serial, header.kind, header.settings) == (
+        "small-1",
+        "virtual",
+        {"exposure_us": 8000.0},
+    )
+    assert np.abs(pressed.rgb.astype(int) - untouched.rgb).max() > 50
+
+
+@pytest.mark.parametrize("workspace", [EARLIER, PRESENT], indirect=True)
+def test_a_workspace_knows_its_calibration_validation_and_records(workspace: Workspace) -> None:
+    entry = next(entry for entry in workspace.entries() if entry.in_use)
+    kept = workspace.records.measurements()
+    removed = workspace.records.measurements(removed=True)
+
+    assert entry.path.name == "first.gplcal"
+    assert entry.validation is not None
+    assert [c.quantity for c in entry.validation.comparisons] == ["diameter", "height"]
+    assert entry.validated
+    assert [record.note for record in kept] == ["first press"]
+    assert {record.note for record in removed} - {"first press"} == {"by mistake"}
+    values = {q.name: (q.value, q.truth) for q in kept[0].quantities}
+    assert values["diameter_mm"] == (pytest.approx(DIAMETER_MM, abs=0.08), DIAMETER_MM)
+    assert values["height_mm"] == (pytest.approx(HEIGHT_MM, abs=0.08), HEIGHT_MM)
+    assert workspace.uses(kept[0].calibration_id)[0] == 1
+
+
+@pytest.mark.parametrize("workspace", [EARLIER, PRESENT], indirect=True)
+def test_a_lab_keeps_its_indenters(workspace: Workspace) -> None:
+    pin, block = read_indenters(workspace.folder)
+
+    assert (pin.name, pin.shape, pin.size_mm, pin.height_mm) == ("Pin A", "cylinder", 5.0, 1.0)
+    assert (block.shape, block.mean_size_mm) == ("cuboid", 5.0)
+
+
+@pytest.mark.parametrize("workspace", [EARLIER], indirect=True)
+def test_an_unfinished_session_continues(workspace: Workspace) -> None:
+    (entry,) = workspace.sessions()
+    statuses = open_project(entry.folder).statuses()
+
+    assert statuses[Stage.BALLS].state is not StageState.EMPTY
+    assert statuses[Stage.TOP_POSE].state is StageState.EMPTY
+    assert entry.serial == "small-1"
+
+
+@pytest.mark.parametrize("workspace", [CLOSED], indirect=True)
+def test_a_closed_session_has_its_scale_and_balls(workspace: Workspace) -> None:
+    project = open_project(workspace.folder / "sensors/small-1/sessions/closed")
+
+    assert len(project.session.found("balls")) == 3
+    assert project.session.mm_per_px == pytest.approx(0.165, abs=0.001)
+    assert project.session.ball_radii_mm["ball_01.png"] == 4.0
+
+
+@pytest.mark.parametrize("folder", [EARLIER, PRESENT])
+def test_settings_of_the_window_are_kept(folder: str, tmp_path: Path) -> None:
+    file = Path(shutil.copy(DATA / folder / "desktop.ini", tmp_path))
+    settings = Settings(file)
+
+    assert settings.theme == "dark"
+    assert settings.last_page == "measure"
+    assert settings.limits == Limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
+    assert settings.reconstruction == ("paper", "fast")
+    assert settings.camera("usb-1") == {"gain": "2.5"}
+    assert settings.recent("sessions") == (Path("/lab/session"),)
+    assert bytes(settings.window_state()[0].data()) == b"geometry"

@@ -1,0 +1,193 @@
+"""Make one folder of files with the program of the current folder; README.md says how.
+
+It runs with this version of the program and with earlier ones: imports that were renamed since are
+looked up under both names.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import tempfile
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from app.command_line.main import main as gelpolight
+from gelpolight_core.measurement.result import Truth, compare
+
+DESIGN = Path(__file__).with_name("small_sensor.toml")
+PRESS = "cylinder_s5_d100"
+TRUTH = Truth("cylinder", 5.0, 1.0)
+
+
+def named(*places: str) -> Any:
+    """Return the first object, given as module:name, that this version of the program has."""
+    for place in places:
+        module, name = place.split(":")
+        try:
+            return getattr(import_module(module), name)
+        except (ImportError, AttributeError):
+            continue
+    raise SystemExit(f"this version has none of {places}")
+
+
+def run(*words: object) -> None:
+    """Run a command of the program."""
+    if status := gelpolight([str(word) for word in words]):
+        raise SystemExit(status)
+
+
+def rgb_of(path: Path) -> Any:
+    """Return a colour image as (rows, columns, 3)."""
+    return cv2.imread(str(path))[..., ::-1].copy()
+
+
+def make_session(folder: Path, *, closed: bool) -> None:
+    """Simulate a session whose calibration is small: a working circle of 16 mm."""
+    run("simulate", folder, "--design", DESIGN, *(["--closed"] if closed else []))
+    toml = folder / "session.toml"
+    toml.write_text(re.sub(r"working_diameter_mm = .*", "working_diameter_mm = 16.0",
+                           toml.read_text()))  # fmt: skip
+
+
+def keep_session(session: Path, target: Path, files: list[str]) -> None:
+    """Copy some files of a session; without --large only session.toml."""
+    for name in files if options.large else files[:1]:
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(session / name, target / name)
+
+
+def write_recording(session: Path, path: Path, calibration_id: str) -> None:
+    """Record the background and the press, with a lost frame between them."""
+    header = named("gelpolight_core.recording.recording:RecordingHeader")
+    writer = named("gelpolight_core.recording.writer:RecordingWriter")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    description = header(
+        serial="small-1", calibration_id=calibration_id, source="virtual sensor", kind="virtual",
+        settings={"exposure_us": 8000.0}, note="untouched, then pressed",
+    )  # fmt: skip
+    with writer(path, description) as recording:
+        images = ("background/background.png", f"presses/{PRESS}.png")
+        for number, name in zip((4, 6), images, strict=True):
+            recording.append(rgb_of(session / name), number, number / 30.0)
+
+
+def write_records(workspace: Path, calibration: Any, session: Path) -> Any:
+    """Measure the press, store it twice, remove the second; return the measurement."""
+    measure_heightmap = named("gelpolight_core.measurement.indenter_tools:measure_heightmap")
+    reconstructor = named("gelpolight_core.reconstruction.reconstructor:Reconstructor")
+    records = named("gelpolight_core.records.records:Records")
+    record_of = named("gelpolight_core.records.entry:indenter_record")
+    image = rgb_of(session / f"presses/{PRESS}.png")
+    measurement = measure_heightmap(reconstructor(calibration).depth(image), shape="cylinder")
+    record = record_of(
+        measurement, compare(measurement, TRUTH), serial="small-1",
+        calibration_id=calibration.identity, size_limit_percent=5.0, height_limit_percent=8.0,
+        settings={"model": calibration.model}, operator="A. Tester", picture=f"{PRESS}.png",
+        note="first press",
+    )  # fmt: skip
+    with records.open(workspace / "records.sqlite") as book:
+        book.add(record)
+        book.remove(book.add(replace(record, note="by mistake", time=datetime.now(UTC))))
+    return measurement
+
+
+def write_lab_files(workspace: Path, calibration: Any, measurement: Any, path: Path) -> None:
+    """Write the lab's indenters, the validation of the calibration and the one in use."""
+    import app.workspace.validation as validation
+    from app.workspace.indenters import Indenter, write_indenters
+    from app.workspace.workspace import Workspace
+
+    write_indenters([Indenter("Pin A", "cylinder", 5.0, height_mm=1.0),
+                     Indenter("Block", "cuboid", 4.0, 6.0)], workspace)  # fmt: skip
+    lengths = (
+        ("diameter", measurement.size_mm, 5.0, 5.0),
+        ("height", measurement.height_mm, 1.0, 8.0),
+    )
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    found = tuple(validation.Comparison(*length) for length in lengths)
+    validation.write_validation(
+        validation.Validation(calibration.identity, now, "A. Tester", "Pin A", found), path
+    )
+    Workspace(workspace).use(path)
+
+
+def write_settings(path: Path) -> None:
+    """Write the settings of the window."""
+    from PySide6.QtCore import QByteArray
+
+    settings = named("app.services.settings:Settings", "app.shell.settings:Settings")(path)
+    limits = named("app.services.settings:Limits", "app.shell.settings:Limits")
+    settings.theme = "dark"
+    settings.last_page = "measure"
+    settings.limits = limits(age_days=30.0, height_percent=6.0, size_percent=3.0)
+    settings.reconstruction = ("paper", "fast")
+    settings.keep_camera("usb-1", {"gain": "2.5"})
+    settings.keep_window_state(QByteArray(b"geometry"), QByteArray(b"state"))
+    for add in ("add_recent", "add_recent_session"):
+        if hasattr(settings, add):
+            kind = ["sessions"] if add == "add_recent" else []
+            getattr(settings, add)(*kind, Path("/lab/session"))
+    settings.save()
+
+
+def make_open(out: Path, scratch: Path) -> None:
+    """Make the files of an open sensor."""
+    from gelpolight_core.calibration.file import read_calibration
+
+    session, workspace = scratch / "session", out / "workspace"
+    path = workspace / "sensors/small-1/first.gplcal"
+    path.parent.mkdir(parents=True)
+    make_session(session, closed=False)
+    run("calibrate", session, "-o", path)
+    calibration = read_calibration(path)
+    unfinished = ["session.toml", "background/background.png", "mirror/mirror.png",
+                  "balls/ball_00.png", "checkerboard/view_00.png"]  # fmt: skip
+    keep_session(session, path.parent / "sessions/unfinished", unfinished)
+    write_recording(session, path.parent / "recordings/press.gplrec", calibration.identity)
+    measurement = write_records(workspace, calibration, session)
+    write_lab_files(workspace, calibration, measurement, path)
+    image = session / f"presses/{PRESS}.png"
+    run(
+        "reconstruct",
+        path,
+        image,
+        "-o",
+        out / "height_map",
+        "--format",
+        "npz,gsf" if options.large else "gsf",
+    )
+    write_settings(out / "desktop.ini")
+
+
+def make_closed(out: Path, scratch: Path) -> None:
+    """Make the files of a closed sensor."""
+    session = scratch / "closed"
+    make_session(session, closed=True)
+    sensor = out / "workspace/sensors/small-1"
+    kept = [
+        "session.toml",
+        "background/background.png",
+        *(f"balls/ball_{n:02d}.png" for n in range(3)),
+    ]
+    keep_session(session, sensor / "sessions/closed", kept)
+    run("calibrate", session, "-o", sensor / "closed.gplcal")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("kinds", nargs="+", choices=["open", "closed"])
+    parser.add_argument(
+        "--large", action="store_true", help="also keep images of the sessions and an npz file"
+    )
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        for kind in options.kinds:
+            {"open": make_open, "closed": make_closed}[kind](options.out, Path(scratch))
