@@ -14,6 +14,7 @@ from gelpolight_core.experiments.leave_out import (
     rule_table,
     worthless,
 )
+from gelpolight_core.reconstruction.trace import EFFORTS
 from gelpolight_core.simulation.indenters import Cylinder
 
 
@@ -38,9 +39,19 @@ def test_every_rule_keeps_the_bound_that_the_documentation_states(
         assert figure.change_rms_um <= figure.change_um
 
 
-def test_an_empty_frame_is_much_cheaper(figures: tuple[RuleFigure, ...]) -> None:
-    assert all(f.saved_percent > 20.0 for f in figures if f.rule == "empty")
+def test_the_rules_for_empty_frames_are_really_switched_off_and_on(
+    figures: tuple[RuleFigure, ...],
+) -> None:
+    empty = [figure for figure in figures if figure.rule == "empty"]
+    assert {figure.effort for figure in empty} == set(EFFORTS)
+    # Solved everywhere, an empty frame is not exactly flat.
+    assert all(figure.change_um > 0.0 for figure in empty)
     assert "nothing pressed" in rule_table(figures)
+
+
+def test_a_rule_saves_the_share_of_the_time_without_it(figures: tuple[RuleFigure, ...]) -> None:
+    figure = replace(figures[0], with_ms=6.0, without_ms=8.0)
+    assert figure.saved_percent == pytest.approx(25.0)
 
 
 def test_a_rule_that_saves_nothing_anywhere_is_named(figures: tuple[RuleFigure, ...]) -> None:
