@@ -184,6 +184,9 @@ class Calibration:
     bad : BadPixels or None
         Dead and hot pixels of the camera, which every solve leaves out; None where there are none,
         and in calibrations by programs that did not look for them.
+    lens_blur_px : float or None
+        Standard deviation of the blur of lens and pixel on the top surface, in raw pixels; None in
+        calibrations by programs that did not measure it.
 
     Examples
     --------
@@ -209,6 +212,7 @@ class Calibration:
     full: FullModel | None = None
     response: CameraResponse | None = None
     bad: BadPixels | None = None
+    lens_blur_px: float | None = None
 
     @cached_property
     def bad_pixels(self) -> BadPixels:
@@ -256,6 +260,8 @@ class Calibration:
             arrays.append(self.response.curves)
         if self.bad is not None:
             arrays.append(self.bad.pixels)
+        if self.lens_blur_px is not None:
+            digest.update(repr(self.lens_blur_px).encode())
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
         return f"{self.sensor.serial}-{digest.hexdigest()[:12]}"

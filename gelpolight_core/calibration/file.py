@@ -61,6 +61,7 @@ NODES_LIMIT = 10_000
 BAD_PIXELS = "bad_pixels"
 LEAST_BACKGROUND = -0.2
 MOST_CROSSTALK = 100.0
+MOST_BLUR_PX = 100.0
 # A fixed time stamp: the same calibration gives the same bytes.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 
@@ -214,6 +215,8 @@ def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
     }
     if c.full is not None:
         manifest["full"] = full_entry(c.full)
+    if c.lens_blur_px is not None:
+        manifest["lens_blur_px"] = c.lens_blur_px
     return manifest
 
 
@@ -269,6 +272,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> AnyCali
         full=read_full(manifest["full"], arrays) if "full" in manifest else None,
         response=_read_response(arrays.get("camera_response")),
         bad=_read_bad_pixels(arrays.get(BAD_PIXELS), camera["height"], camera["width"]),
+        lens_blur_px=_read_blur(manifest.get("lens_blur_px")),
     )
     _check(calibration)
     _check_grid(calibration, manifest["grid"])
@@ -320,6 +324,16 @@ def _read_reflectance(arrays: dict[str, NDArray[Any]]) -> ReflectanceTable:
 
 def _read_response(curves: NDArray[Any] | None) -> CameraResponse | None:
     return None if curves is None else CameraResponse(curves.astype(np.float64))
+
+
+def _read_blur(stated: Any) -> float | None:
+    """Return the blur of lens and pixel; None in files without, which older programs wrote."""
+    if stated is None:
+        return None
+    blur_px = float(stated)
+    if not 0.0 < blur_px < MOST_BLUR_PX:
+        raise ValueError(f"the blur of the lens is {brief(stated)} pixels")
+    return blur_px
 
 
 def _read_bad_pixels(pixels: NDArray[Any] | None, height: int, width: int) -> BadPixels | None:

@@ -171,6 +171,7 @@ def bare_calibration(session: Session, results: StageResults) -> Calibration:
         full=results.full,
         response=need(results.response, where).response,
         bad=results.bad if results.bad is not None and results.bad.pixels.size else None,
+        lens_blur_px=pose.blur_px,
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
+from gelpolight_core.optics.board_exposure import EDGE_OF_SIGMA
 from gelpolight_core.optics.camera import Camera
 from gelpolight_core.optics.checkerboard import BoardView, find_board
 from gelpolight_core.optics.frame import TopPlane
@@ -25,6 +26,9 @@ from gelpolight_core.optics.plane_pose import PlanePose, angle_between_deg, as_p
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
+
+MOST_LENS_BLUR_PX = 1.0
+"""A solve undoes this much blur; what is left of more makes walls flatter than they are."""
 
 
 class Decision(StrEnum):
@@ -75,6 +79,9 @@ class TopPoseResult:
         Angle of the normal to the optical axis.
     rms_px : float
         Reprojection error over all corners of the used views.
+    blur_px : float
+        Standard deviation of the blur of lens and pixel on the top surface, from the edges of the
+        squares; median over the used views.
     mirrored : PlanePose or None
         The rejected mirrored pose of the first used view.
     decision : Decision
@@ -93,6 +100,7 @@ class TopPoseResult:
     distance_sd_mm: float
     tilt_deg: float
     rms_px: float
+    blur_px: float
     mirrored: PlanePose | None
     decision: Decision
     margin_sd: float
@@ -273,6 +281,8 @@ def _assemble(
     distance_sd_mm = math.hypot(distance_sd_mm, by_focal)
     tilt_deg = math.degrees(math.acos(min(1.0, plane.normal_camera[2])))
     rms = float(np.sqrt(np.mean([pose.rms_px**2 for pose in poses])))
+    edges_px = [view.board.edge_width_px for view in used if view.board is not None]
+    blur_px = float(np.median(edges_px)) / EDGE_OF_SIGMA
     decision = Decision.EVIDENCE if margin >= SURE_MARGIN else Decision.TILT
     if not math.isfinite(margin):
         decision = Decision.SINGLE
@@ -280,6 +290,7 @@ def _assemble(
     figures = (
         *_plane_figures(plane, normal_sd_deg, distance_sd_mm, tilt_deg),
         *_view_figures(views, rms, spread_deg, decision, margin),
+        _blur_figure(blur_px),
     )
     return TopPoseResult(
         plane=plane,
@@ -287,12 +298,22 @@ def _assemble(
         distance_sd_mm=distance_sd_mm,
         tilt_deg=tilt_deg,
         rms_px=rms,
+        blur_px=blur_px,
         mirrored=used[0].mirrored,
         decision=decision,
         margin_sd=math.sqrt(max(margin, 0.0)),
         views=tuple(views),
         quality=QualityTable(figures),
     )
+
+
+def _blur_figure(blur_px: float) -> Figure:
+    advice = tr(
+        "Focus the lens on the top surface and keep the board still; blur rounds off walls and "
+        "edges"
+    )
+    name = tr("Blur on the top surface")
+    return judge("blur", name, blur_px, "px", warn=MOST_LENS_BLUR_PX, advice=advice)
 
 
 def _plane_figures(

@@ -95,8 +95,11 @@ def place_rows(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
 
 
 @_whole
-def show_depth(first, last, placed, placed_flags, factor, corner, outside, depth, flags):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Bring depth and flags from a coarser region to rows of the whole grid, bilinear."""
+def show_depth(first, last, placed, placed_flags, factor, corner, outside, kind, depth, flags):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Bring depth and flags from a coarser region to rows of the whole grid, bilinear.
+
+    Depth is 0 outside the field. In holes of the field it is what the solve filled in from around.
+    """
     rows, columns = placed.shape
     line = np.empty(columns, np.float32)
     share = _1 / _single(factor)
@@ -109,7 +112,7 @@ def show_depth(first, last, placed, placed_flags, factor, corner, outside, depth
         for j in range(columns):
             line[j] = a[j] + f * (b[j] - a[j])
         marks, source = flags[corner[0] + i], placed_flags[i // factor]
-        out = depth[corner[0] + i]
+        out, seen = depth[corner[0] + i], kind[corner[0] + i]
         for n in range(columns):
             left, right = line[max(n - 1, 0)], line[min(n + 1, columns - 1)]
             here = line[n]
@@ -118,8 +121,7 @@ def show_depth(first, last, placed, placed_flags, factor, corner, outside, depth
                 at = corner[1] + n * factor + k
                 t = (_single(k) + _HALF) * share - _HALF
                 value = here + t * (right - here) if t > 0.0 else here + t * (here - left)
-                blind = marks[at] & outside
-                out[at] = value if blind == 0 else _0
+                out[at] = value if seen[at] > 0 else _0
                 marks[at] = marks[at] | mark
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gelpolight_core.masks import SATURATED
+from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
 from gelpolight_core.reconstruction.buffers import Buffers
 from gelpolight_core.reconstruction.near_light.denoise import quieted
 from gelpolight_core.reconstruction.near_light.maps import COARSE, SensorMaps, light_levels
@@ -22,11 +23,10 @@ Map = NDArray[np.float32]
 Gain = NDArray[np.float64]
 Rows = tuple[tuple[np.float32, ...], ...]
 _BEYOND_FINITE = np.float32(1.5)
-BLUR_PX = 0.62
-"""Blur that every image has when it arrives on the grid, whose nodes are a pixel apart: a sharp
-lens (0.37), a pixel's own width (0.29) and bilinear sampling (0.41). Where a wall meets a face it
-makes the wall flatter, as brightness is not a linear function of slope; balls have no such edges,
-and do not show it."""
+LENS_BLUR_PX = 0.47
+"""Blur of a sharp lens (0.37) and a pixel's own width (0.29), where a calibration does not say."""
+SAMPLING = 1.0 / 6.0
+"""What bilinear sampling on the grid, whose nodes are a pixel apart, adds to its square."""
 HALVING = 0.25
 """What the average over two nodes along each axis adds to the square of a blur, in these nodes."""
 
@@ -66,6 +66,8 @@ class PressSampler:
         self._take = buffers.take
         self._inverse = np.linalg.inv(maps.calibration.crosstalk)
         self._unmix = _as_rows(self._inverse)
+        lens_px = min(maps.calibration.lens_blur_px or LENS_BLUR_PX, MOST_LENS_BLUR_PX)
+        self._blur2 = lens_px**2 + SAMPLING
         self._light: dict[tuple[np.dtype[Any], bool], Map] = {}
 
     def compare(
@@ -103,7 +105,7 @@ class PressSampler:
         if factor == 1 and terms.denoising:
             edge = quieted(sampled, self._noise(1), self._workers, self._take)
         if terms.sharpening:
-            blur2 = BLUR_PX**2 if at == 1 else BLUR_PX**2 + HALVING
+            blur2 = self._blur2 if at == 1 else self._blur2 + HALVING
             self._sharpen(sampled, region, blur2 / at**2, edge)
         coarse = sampled
         while at < COARSE:
@@ -122,6 +124,8 @@ class PressSampler:
     ) -> None:
         """Undo the blur of an image, whose square in nodes is given, to first order.
 
+        Where a wall meets a face, blur makes the wall flatter, as brightness is not a linear
+        function of slope; balls have no such edges, and do not show it.
         Noise grows with it, where `edge` says that it was not averaged.
         """
         share = np.float32(0.5 * blur2)

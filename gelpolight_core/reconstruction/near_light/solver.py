@@ -469,7 +469,9 @@ class NearLightSolver:
         )
         at, whole = solved.region.at(COARSE)
         outside, factor = int(Flag.OUTSIDE), scale.factor
-        self.workers.run(whole[0], show_depth, placed, marks, factor, at, outside, depth, flags)
+        kind = self.maps.scale(1).kind
+        rows = (placed, marks, factor, at, outside, kind, depth, flags)
+        self.workers.run(whole[0], show_depth, *rows)
         if normals is not None:
             x, y = slopes.normal_x, slopes.normal_y
             self.workers.run(whole[0], show_normals, x, y, position, factor, at, normals)
