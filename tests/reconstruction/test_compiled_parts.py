@@ -304,3 +304,46 @@ def test_block_means_are_the_means(workers: int) -> None:
     RowWorkers(workers).run(10, block_means, flat, np.float32(1 / 255), 5, means)
     plain = raw[:50, :65].reshape(10, 5, 13, 5, 3).mean(axis=(1, 3)) / 255
     np.testing.assert_allclose(means, plain, rtol=1e-5)
+
+
+def test_a_strong_lobe_does_not_lead_a_solve_astray() -> None:
+    """Brightness under a lobe is the same at two slopes; only one of them fits all three lights."""
+    membrane = Membrane(1.0, 0.53, 0.35)
+    leds = np.array([[-5.35, 11.29, -9.74], [-10.84, -4.1, -9.86], [5.18, -1.04, -9.83]])
+    middle, radius, deep = np.array([0.5, 0.4]), 4.0, 0.6
+    off = POINTS - middle
+    cap = np.sqrt(np.maximum(radius**2 - (off**2).sum(-1), 0.01))
+    depth = np.maximum(deep - radius + cap, 0.0)
+    pressed = depth > 0.0
+    slopes = np.where(pressed[..., None], -off / cap[..., None], 0.0)
+    normals = np.concatenate([-slopes, -np.ones((ROWS, COLUMNS, 1))], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    ratio = _shaded(membrane, leds, depth, normals) / _shaded(
+        membrane, leds, np.zeros_like(depth), np.zeros_like(normals) - [0.0, 0.0, 1.0]
+    )
+    field = ShadedField(
+        ratio.astype(np.float32),
+        np.full(ratio.shape, 0.004, np.float32),
+        np.zeros_like(ratio, np.float32),
+        np.zeros(ratio.shape, np.bool_),
+        np.ones((ROWS, COLUMNS), np.bool_),
+        np.ones((ROWS, COLUMNS), np.bool_),
+        np.zeros_like(DRIFT, np.float32),
+        X,
+        Y,
+    )
+    for steps in (compiled.BEST, compiled.QUICK):
+        found = compiled.solve(field, depth.astype(np.float32), leds, membrane, steps=steps)
+        astray = np.linalg.norm(found.normals - normals, axis=-1)[pressed] > 0.05
+        assert astray.mean() < 0.03
+
+
+def _shaded(membrane: Membrane, leds: Array, depth: Array, normals: Array) -> Array:
+    """Return the brightness of a surface seen from straight below, near-light included."""
+    place = np.concatenate([POINTS, -depth[..., None]], axis=-1).reshape(-1, 1, 3)
+    away = leds - place
+    distance = np.linalg.norm(away, axis=-1)
+    light = away / distance[..., None]
+    view = np.tile([0.0, 0.0, -1.0], (len(place), 1))  # the camera is far away
+    bright = membrane.response(light, normals.reshape(-1, 3), view)
+    return np.asarray((bright * -light[..., 2] / distance**2).reshape(*depth.shape, 3))

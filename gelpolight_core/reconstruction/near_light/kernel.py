@@ -13,7 +13,7 @@ cannot know that they do not overlap.
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import cos, pi, radians, sin, sqrt
 
 import numba
 import numpy as np
@@ -30,13 +30,20 @@ UNSOLVED_WEIGHT = 0.003
 """Of nodes without two lights, which are taken as flat; 0.01 lost 0.2 % of height on walls."""
 MODEL_ERROR = 0.03
 """What the model does not explain of press over background; it limits a good image, not noise."""
+SEARCHED_DEG = 8.0
+"""A search leaves out normals that are nearer than this to the one that fits badly."""
+BAD_FIT = 25.0
+"""From this misfit on, in squared standard deviations, a normal is searched for anew."""
 
 
 _B = 64
 # Planes of a block's array: what is read, what is worked with, and what is written.
 _RATIO, _SCALE, _NOISE, _AROUND, _DEPTH, _MARKS, _HIDDEN, _KIND = 0, 3, 6, 9, 12, 13, 17, 21
 _SCALED, _NORMAL, _LIGHT, _VIEW, _SLOPE = 22, 25, 28, 37, 40
-_TRUST, _FLAG, _MOVED, _PLANES = 42, 43, 44, 45
+_TRUST, _FLAG, _MOVED = 42, 43, 44
+# Of a glossy membrane: the best normal so far, its misfit, the step from it, and where the steps
+# from another start ended.
+_BEST, _MISFIT, _STEP, _OTHER, _OTHER_MISFIT, _PLANES = 45, 48, 49, 52, 55, 56
 _single = np.float32
 _0, _1, _HALF = _single(0.0), _single(1.0), _single(0.5)
 _PI = _single(pi)
@@ -44,15 +51,32 @@ _LEAST_COSINE, _LEAST_VIEW = _single(1e-3), _single(1e-2)
 _STEEPEST = _single(STEEPEST_NZ)
 _LEVEL = _single(sqrt(1.0 - STEEPEST_NZ**2))
 _LEAST_ALONG = _single(LEAST_ALONG_RAY)
+_ELSEWHERE = _single(cos(radians(SEARCHED_DEG)))
 _LEAST_DISTANCE = _single(0.1)
 _ONE_DARK, _UNSOLVED = _single(ONE_DARK_WEIGHT), _single(UNSOLVED_WEIGHT)
 _MODEL2 = _single(MODEL_ERROR**2)
 _SIGMAS, _SHARE = _single(DARK_SIGMAS), _single(DARK_SHARE)
-_LONGEST = _single(0.3)
+_LONGEST, _SHORTER, _WORST, _BAD = _single(0.3), _single(0.5), _single(1e30), _single(BAD_FIT)
 _DAMP, _TINY = _single(1e-6), _single(1e-12)
 _F_OUTSIDE, _F_SATURATED = _single(Flag.OUTSIDE), _single(Flag.SATURATED)
 _F_DARK, _F_HIDDEN = _single(Flag.DARK), _single(Flag.NOT_OBSERVABLE)
 _F_FAR, _F_INVALID = _single(Flag.EXTRAPOLATED), _single(Flag.INVALID)
+
+START_RINGS = ((8.0, 5), (20.0, 8), (33.0, 10), (47.0, 12), (60.0, 12))
+"""Tilt in degrees, and how many normals that much tilted a search tries."""
+
+
+def _starts() -> tuple[tuple[float, float, float], ...]:
+    """Return normals all around: the flat one, and rings of tilted ones."""
+    found = [(_0, _0, -_1)]
+    for tilt_deg, count in START_RINGS:
+        for k in range(count):
+            turn, tilt = 2.0 * pi * k / count, radians(tilt_deg)
+            found.append((sin(tilt) * cos(turn), sin(tilt) * sin(turn), -cos(tilt)))
+    return tuple((_single(x), _single(y), _single(z)) for x, y, z in found)
+
+
+STARTS = np.array(_starts(), np.float32)
 
 _part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
 _whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
@@ -235,7 +259,7 @@ def _start(l0, l1, l2, e0, e1, e2, w0, w1, w2, lit0, lit1, lit2):  # type: ignor
 
 @_part
 def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return a channel's part of the Gauss-Newton equations along two tangents of n.
+    """Return a channel's part of the Gauss-Newton equations along two tangents of n; its misfit.
 
     The tangents are (-nz, 0, nx) and (0, -nz, ny).
     """
@@ -243,7 +267,7 @@ def _pull(f, gx, gy, gz, n, direct, scale, sigma, weight):  # type: ignore[no-un
     d2 = n[1] * gz - n[2] * gy
     w = weight / ((sigma * sigma + _MODEL2) * scale * scale)
     e = w * (direct - f)
-    return w * d1 * d1, w * d1 * d2, w * d2 * d2, d1 * e, d2 * e
+    return w * d1 * d1, w * d1 * d2, w * d2 * d2, d1 * e, d2 * e, e * (direct - f)
 
 
 @_part
@@ -314,19 +338,80 @@ def _begin_block(w, rays, position, leds, dark, curves, table, gloss, thrown, sh
 
 
 @_part
+def _misfit(w, n, j, channels, curves, table, gloss):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return how far a normal is from a node's light, in squared standard deviations."""
+    v = _triple(w, _VIEW, j)
+    f0 = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)[0]
+    f1 = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)[0]
+    f2 = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)[0]
+    s0, s1, s2 = _triple(w, _SCALED, j)
+    g0, g1, g2 = _triple(w, _NOISE, j)
+    (t0, _, k0), (t1, _, k1), (t2, _, k2) = channels
+    e0, e1, e2 = t0 - f0, t1 - f1, t2 - f2
+    w0 = k0 / ((g0 * g0 + _MODEL2) * s0 * s0)
+    w1 = k1 / ((g1 * g1 + _MODEL2) * s1 * s1)
+    w2 = k2 / ((g2 * g2 + _MODEL2) * s2 * s2)
+    return w0 * e0 * e0 + w1 * e1 * e1 + w2 * e2 * e2
+
+
+@_part
+def _search_block(w, dark, curves, table, gloss, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Where three lights fit badly, start again from the best of many normals farther away.
+
+    Under a glossy lobe, brightness rises and falls with slope: steps from a bad start end at a
+    normal that fits worse than the true one. Returns whether any node starts again.
+    """
+    worst = _0
+    for j in range(_B):
+        (_, _, k0), (_, _, k1), (_, _, k2) = _channels(w, j, dark, interreflection, shadows)
+        judged = (k0 + k1 + k2 > _single(2.5)) & (w[_KIND * _B + j] > _single(1.5))
+        misfit = w[_MISFIT * _B + j] if judged else _0
+        w[_OTHER_MISFIT * _B + j] = misfit
+        _put(w, _OTHER, j, _triple(w, _NORMAL, j))
+        w[_MISFIT * _B + j] = _WORST
+        worst = _most(worst, misfit)
+    if worst < _BAD:
+        return False
+    for j in range(_B):
+        if w[_OTHER_MISFIT * _B + j] > _BAD:
+            channels = _channels(w, j, dark, interreflection, shadows)
+            least, found = _WORST, _triple(w, _OTHER, j)
+            for k in range(STARTS.shape[0]):
+                n = (STARTS[k, 0], STARTS[k, 1], STARTS[k, 2])
+                misfit = _misfit(w, n, j, channels, curves, table, gloss)
+                if _inner(n, found) < _ELSEWHERE and misfit < least:
+                    least = misfit
+                    _put(w, _NORMAL, j, n)
+    return True
+
+
+@_part
+def _compare_block(w):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Of both ends of a search, take the one that fits better."""
+    for j in range(_B):
+        n, other = _triple(w, _NORMAL, j), _triple(w, _OTHER, j)
+        better = w[_MISFIT * _B + j] < w[_OTHER_MISFIT * _B + j]
+        _put(w, _NORMAL, j, _chosen(better, better, n, n, other))
+
+
+@_part
 def _step_block(w, dark, curves, table, gloss, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Do one Gauss-Newton step at a block's nodes; return the square of the longest."""
+    """Do one Gauss-Newton step at a block's nodes; return the square of the longest.
+
+    Under a glossy lobe, a step that fits worse than the best normal so far is taken back, and a
+    shorter one is tried.
+    """
     for j in range(_B):
         n, v = _triple(w, _NORMAL, j), _triple(w, _VIEW, j)
         (t0, _, k0), (t1, _, k1), (t2, _, k2) = _channels(w, j, dark, interreflection, shadows)
         s0, s1, s2 = _triple(w, _SCALED, j)
         g0, g1, g2 = _triple(w, _NOISE, j)
         f, gx, gy, gz = _response(_triple(w, _LIGHT, j), n, v, curves[0], table, gloss, 0)
-        a11, a12, a22, ag1, ag2 = _pull(f, gx, gy, gz, n, t0, s0, g0, k0)
+        a11, a12, a22, ag1, ag2, am = _pull(f, gx, gy, gz, n, t0, s0, g0, k0)
         f, gx, gy, gz = _response(_triple(w, _LIGHT + 3, j), n, v, curves[1], table, gloss, 1)
-        b11, b12, b22, bg1, bg2 = _pull(f, gx, gy, gz, n, t1, s1, g1, k1)
+        b11, b12, b22, bg1, bg2, bm = _pull(f, gx, gy, gz, n, t1, s1, g1, k1)
         f, gx, gy, gz = _response(_triple(w, _LIGHT + 6, j), n, v, curves[2], table, gloss, 2)
-        c11, c12, c22, cg1, cg2 = _pull(f, gx, gy, gz, n, t2, s2, g2, k2)
+        c11, c12, c22, cg1, cg2, cm = _pull(f, gx, gy, gz, n, t2, s2, g2, k2)
         m11, m12, m22 = a11 + b11 + c11, a12 + b12 + c12, a22 + b22 + c22
         h1, h2 = ag1 + bg1 + cg1, ag2 + bg2 + cg2
         damp = _DAMP * (m11 + m22) + _TINY
@@ -336,7 +421,10 @@ def _step_block(w, dark, curves, table, gloss, interreflection, shadows):  # typ
         dx, dy, dz = -n[2] * m1, -n[2] * m2, n[0] * m1 + n[1] * m2
         move = dx * dx + dy * dy + dz * dz + _TINY
         held = _least(_LONGEST / sqrt(move), _1)
-        nx, ny, nz = _limited(n[0] + held * dx, n[1] + held * dy, n[2] + held * dz)
+        step, base = (held * dx, held * dy, held * dz), n
+        if gloss is not None:
+            step, base = _kept(w, j, n, step, am + bm + cm)
+        nx, ny, nz = _limited(base[0] + step[0], base[1] + step[1], base[2] + step[2])
         # What moved in earnest: a normal at the steepest that can be seen is pulled for ever.
         move = (nx - n[0]) * (nx - n[0]) + (ny - n[1]) * (ny - n[1])
         solved = (w[_KIND * _B + j] > _single(1.5)) & (k0 + k1 + k2 > _single(1.5))
@@ -346,6 +434,34 @@ def _step_block(w, dark, curves, table, gloss, interreflection, shadows):  # typ
     for j in range(_B):
         longest = _most(longest, w[_MOVED * _B + j])
     return longest
+
+
+@_part
+def _kept(w, j, n, step, misfit):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Return the step to take, and from where: from n, or a shorter one from the best before it.
+
+    Where n fits badly and the normal before it did better, the step between them was too long.
+    """
+    better = misfit <= _most(w[_MISFIT * _B + j], _BAD)
+    old, best = _triple(w, _STEP, j), _triple(w, _BEST, j)
+    shorter = (_SHORTER * old[0], _SHORTER * old[1], _SHORTER * old[2])
+    step, base = _chosen(better, better, step, step, shorter), _chosen(better, better, n, n, best)
+    w[_MISFIT * _B + j] = misfit if better else w[_MISFIT * _B + j]
+    _put(w, _BEST, j, base)
+    _put(w, _STEP, j, step)
+    return step, base
+
+
+@_part
+def _best_block(w, dark, curves, table, gloss, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Go back to the best normal where the last step fits worse."""
+    for j in range(_B):
+        n, best = _triple(w, _NORMAL, j), _triple(w, _BEST, j)
+        channels = _channels(w, j, dark, interreflection, shadows)
+        misfit = _misfit(w, n, j, channels, curves, table, gloss)
+        better = misfit <= _most(w[_MISFIT * _B + j], _BAD)
+        w[_MISFIT * _B + j] = misfit if better else w[_MISFIT * _B + j]
+        _put(w, _NORMAL, j, _chosen(better, better, n, n, best))
 
 
 @_part
@@ -522,9 +638,18 @@ def solve_rows(first, last, image, depth, scale, corner, membrane, steps, slopes
             _begin_block(
                 w, rays, at, leds, dark, curves, table, gloss, interreflection, shadows, begun
             )
+            if gloss is not None:
+                w[_MISFIT * _B : (_MISFIT + 1) * _B] = _WORST
             for _ in range(most):
                 if _step_block(w, dark, curves, table, gloss, interreflection, shadows) < settled:
                     break
+            if gloss is not None:
+                _best_block(w, dark, curves, table, gloss, interreflection, shadows)
+                if _search_block(w, dark, curves, table, gloss, interreflection, shadows):
+                    for _ in range(most):
+                        _step_block(w, dark, curves, table, gloss, interreflection, shadows)
+                    _best_block(w, dark, curves, table, gloss, interreflection, shadows)
+                    _compare_block(w)
             _end_block(w, rays, dark, interreflection, coverage, shadows)
             _store(w, _SLOPE, slopes.slope_x, i, begin, count)
             _store(w, _SLOPE + 1, slopes.slope_y, i, begin, count)
