@@ -16,6 +16,7 @@ from gelpolight_core.calibration.depth_scale import (
 )
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
 from gelpolight_core.calibration.results import StageResults, need
+from gelpolight_core.calibration.saturated_background import beyond_saturation
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import LightResult
@@ -105,7 +106,14 @@ def refine_with(
         joint.membrane_held_out,
         joint.membrane_kept,
     )
-    return replace(results, crosstalk=found, joint=joint, full=full)
+    lit, known = beyond_saturation(full, bare, factors.factors, crosstalk, table)
+    return replace(
+        results,
+        crosstalk=found,
+        factors=replace(factors, factors=known),
+        joint=joint,
+        full=replace(full, background=lit),
+    )
 
 
 def _scale_sd(

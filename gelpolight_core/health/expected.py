@@ -22,7 +22,7 @@ def raw_background(calibration: Calibration) -> Map:
     """
     valid = calibration.table.valid[..., None]
     if calibration.full is not None:
-        mixed = calibration.full.background @ calibration.crosstalk.T
+        mixed = np.minimum(calibration.full.background @ calibration.crosstalk.T, 1.0)
         return np.asarray(np.where(valid, mixed, 0.0), np.float32)
     return np.asarray(calibration.factors * even_membrane(calibration), np.float32)
 

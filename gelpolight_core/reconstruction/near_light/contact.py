@@ -232,7 +232,7 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
         )
 
     light = seen(full.background) @ calibration.crosstalk.T.astype(np.float32)
-    image = _encoded(light, calibration.response)
+    image = _encoded(np.minimum(light, np.float32(1.0)), calibration.response)
     rows, columns = camera.height // block, camera.width // block
 
     def blocks(values: Map) -> Map:

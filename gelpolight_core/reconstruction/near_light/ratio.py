@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import convolve2d
 
 from gelpolight_core.masks import SATURATED
 from gelpolight_core.optics.pose import MOST_LENS_BLUR_PX
@@ -122,27 +123,25 @@ class PressSampler:
     def _sharpen(
         self, image: RatioImage, region: Region, blur2: float, edge: Map | None = None
     ) -> None:
-        """Undo the blur of an image, whose square in nodes is given, to first order.
+        """Undo the blur of an image, whose square in nodes is given, to second order.
 
         Where a wall meets a face, blur makes the wall flatter, as brightness is not a linear
-        function of slope; balls have no such edges, and do not show it.
-        Noise grows with it, where `edge` says that it was not averaged.
+        function of slope; balls have no such edges, and do not show it. Noise grows with it, where
+        `edge` says that it was not averaged.
         """
-        share = np.float32(0.5 * blur2)
+        kernel = inverse_of_blur(blur2)
         factor = COARSE * region.shape[0] // len(image.marks)
         (top, left), (rows, columns) = region.at(COARSE // factor)
         kind = self.maps.scale(factor).kind[top : top + rows, left : left + columns]
         # A missing or saturated pixel says nothing of its neighbours' curvature.
         usable = ((kind == 2) & (image.marks == 0)).astype(np.uint8)
-        inner = cv2.erode(usable, np.ones((3, 3), np.uint8), borderValue=0).astype(np.float32)
-        curved = np.empty(inner.shape, np.float32)
+        inner = cv2.erode(usable, np.ones(kernel.shape, np.uint8), borderValue=0)
+        sharp, mask = np.empty(inner.shape, np.float32), inner.astype(np.bool_)
         for ratio in image.ratio:
-            cv2.Laplacian(ratio, cv2.CV_32F, curved, ksize=1, borderType=cv2.BORDER_REPLICATE)
-            curved *= inner
-            curved *= share
-            ratio -= curved
-            np.maximum(ratio, 0.0, out=ratio)
-        more = np.float32(np.sqrt((1.0 + 4.0 * share) ** 2 + 4.0 * share**2) - 1.0)
+            cv2.filter2D(ratio, cv2.CV_32F, kernel, sharp, borderType=cv2.BORDER_REPLICATE)
+            np.maximum(sharp, 0.0, out=sharp)
+            np.copyto(ratio, sharp, where=mask)
+        more = np.linalg.norm(kernel) - np.float32(1.0)
         noise = image.noise
         noise *= 1.0 + more * (inner if edge is None else inner * edge)
 
@@ -204,6 +203,20 @@ class PressSampler:
             response = None if linear else self.maps.calibration.response
             self._light[kind] = light_levels(response, dtype, coded=linear)
         return self._light[kind]
+
+
+def inverse_of_blur(blur2: float) -> Map:
+    """Return the kernel (5, 5) that undoes a blur of given square, to second order.
+
+    A Gaussian blur is the exponential of half its square times the Laplacian; this is the
+    exponential of the opposite.
+    """
+    across = np.array([[0.0, 1.0, 0.0], [1.0, -4.0, 1.0], [0.0, 1.0, 0.0]])
+    first, share = np.pad(across, 1), 0.5 * blur2
+    second = convolve2d(across, across)
+    kernel = -share * first + 0.5 * share**2 * second
+    kernel[2, 2] += 1.0
+    return np.asarray(kernel, np.float32)
 
 
 def _as_rows(matrix: NDArray[np.floating]) -> Rows:

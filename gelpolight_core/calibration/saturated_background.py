@@ -1,0 +1,117 @@
+"""The light of the untouched membrane where the background image is saturated.
+
+Under a near LED a background is often saturated. A press may be darker there, and can be solved if
+the background's own light is known. It is the flat membrane's by the model, times what the coating
+adds or takes, which changes slowly and is taken from the surroundings.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import find_objects, label
+
+from gelpolight_core.calibration.depth_scale import direct_flat
+from gelpolight_core.lights.crosstalk import unmix
+from gelpolight_core.lights.positions import light_directions
+from gelpolight_core.masks import saturated
+from gelpolight_core.optics.resampling import ResamplingTable
+from gelpolight_core.reflectance.surroundings import view_directions
+from gelpolight_core.sensor_calibration import FullModel
+
+Array = NDArray[np.float64]
+Map = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+REACH_MM = 2.0
+"""Farther than this from a pixel that is not saturated, the coating is not known."""
+EVENED_MM = 0.5
+"""Blur of the coating's share of the light: it leaves out specks and noise."""
+
+
+def beyond_saturation(
+    full: FullModel, bare: Map, factors: Map, crosstalk: Array, table: ResamplingTable
+) -> tuple[Map, Map]:
+    """Return background and reflectance factors with saturated places filled in.
+
+    Parameters
+    ----------
+    full : FullModel
+        With the background as it was measured, (rows, columns, 3), crosstalk removed.
+    bare : (rows, columns, 3) float32
+        The background as the camera saw it; NaN or 0 outside the field.
+    factors : (rows, columns, 3) float32
+        Reflectance factors (Eq. 9); 0 where unknown.
+    crosstalk : (3, 3)
+        Of the camera.
+    table : ResamplingTable
+        The grid and its rays.
+    """
+    lost = saturated(bare) & table.valid[..., None]
+    background, factors = full.background.copy(), factors.copy()
+    reach = round(REACH_MM / table.grid.pitch_mm)
+    # Places whose surroundings meet are filled together.
+    size = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+    places, _ = label(cv2.dilate(lost.any(axis=-1).astype(np.uint8), size))
+    for box in find_objects(places):
+        light = _filled_light(full, bare[box], background[box], lost[box], crosstalk, table, box)
+        near = _near(lost[box].any(axis=-1), reach) & lost[box].any(axis=-1)
+        background[box][near] = light[near]
+        known = (factors[box] > 0.0).all(axis=-1)
+        for k in range(3):
+            found = _evened(factors[box][..., k], known, table.grid.pitch_mm)
+            factors[box][..., k][near & ~known] = found[near & ~known]
+    return background, factors
+
+
+def _filled_light(
+    full: FullModel,
+    bare: Map,
+    background: Map,
+    lost: Mask,
+    crosstalk: Array,
+    table: ResamplingTable,
+    box: tuple[slice, slice],
+) -> Map:
+    """Return the light (rows, columns, 3) of a part of the membrane, saturated channels filled."""
+    grid = table.grid
+    flat = _flat(full, grid.x_mm[box[1]], grid.y_mm[box[0]], table.ray_slope[box])
+    light = background.copy()
+    for k in range(3):
+        share = _evened(background[..., k] / flat[..., k], ~lost.any(axis=-1), grid.pitch_mm)
+        light[..., k][lost[..., k]] = (share * flat[..., k])[lost[..., k]]
+    # What the camera would have shown; from it the other channels follow.
+    shown = np.where(lost, light @ crosstalk.T.astype(np.float32), bare)
+    return unmix(np.asarray(shown, np.float32), crosstalk)
+
+
+def _flat(full: FullModel, x_mm: Array, y_mm: Array, ray_slope: NDArray[np.floating]) -> Map:
+    """Return the flat membrane's brightness (rows, columns, 3) by the model."""
+    x, y = np.meshgrid(x_mm, y_mm)
+    points = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    view = view_directions(np.nan_to_num(ray_slope).astype(np.float64)).reshape(-1, 3)
+    directions, distance = light_directions(full.led_positions_mm, points)
+    return np.asarray(direct_flat(full, directions, distance, view), np.float32).reshape(
+        *x.shape, 3
+    )
+
+
+def _evened(values: Map, known: Mask, pitch_mm: float) -> Map:
+    """Return values, and what is around where they are not known."""
+    weight = known.astype(np.float32)
+    total = np.where(known, values, 0.0).astype(np.float32)
+    size = EVENED_MM / pitch_mm
+    found = np.zeros_like(total)
+    # Wider and wider, until all of a hole is reached.
+    while (found == 0.0).any() and size < max(values.shape):
+        share = cv2.GaussianBlur(weight, (0, 0), size)
+        mean = cv2.GaussianBlur(total, (0, 0), size) / np.maximum(share, 1e-9)
+        found = np.where((found == 0.0) & (share > 1e-3), mean, found).astype(np.float32)
+        size *= 1.5
+    return found
+
+
+def _near(lost: Mask, reach: int) -> Mask:
+    """Return the nodes that have a node that is not lost within `reach`."""
+    distance = cv2.distanceTransform(lost.astype(np.uint8), cv2.DIST_L2, 5)
+    return np.asarray(distance <= reach)
