@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,7 +24,9 @@ from gelpolight_core.optics.lens import LensResult
 from gelpolight_core.optics.pose import TopPoseResult
 from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
+from gelpolight_core.reflectance.agreement import LEAST_PRESSES
 from gelpolight_core.reflectance.membrane import MEMBRANES
+from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.response.stage import ResponseResult
 from gelpolight_core.sensor_calibration import MODELS, Calibration, FullModel
@@ -180,7 +182,7 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
             "balls": judge_balls(results),
             "reflectance": reflectance.quality,
             "factors": factors.quality,
-            **({} if results.full is None else {"joint": judge_joint(results.full)}),
+            **({} if results.full is None else {"joint": judge_joint(results, results.full)}),
         },
         provenance=provenance_of(
             session.folder,
@@ -204,8 +206,8 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
     )
 
 
-def judge_joint(full: FullModel) -> QualityTable:
-    """Judge the joint refinement."""
+def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
+    """Judge the joint refinement of these results, and its model."""
     return QualityTable(
         (
             judge(
@@ -226,6 +228,7 @@ def judge_joint(full: FullModel) -> QualityTable:
                 fail=1.0,
                 advice=tr("Press more balls at more positions"),
             ),
+            *(() if results.joint is None else judge_presses(results.joint, results.presses)),
             *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
@@ -237,6 +240,34 @@ def judge_joint(full: FullModel) -> QualityTable:
             ),
             judge("decay_mm", tr("Decay length of the drape"), full.decay_mm, "mm"),
         )
+    )
+
+
+def judge_presses(joint: JointResult, presses: Sequence[BallPress]) -> tuple[Figure, ...]:
+    """Judge the ball press that the model explains worst, beside the others.
+
+    Parameters
+    ----------
+    joint : JointResult
+        Of these presses.
+    presses : sequence of BallPress
+        In the order of the refinement; fewer than four say nothing of each other.
+    """
+    if len(presses) < LEAST_PRESSES:
+        return ()
+    misfits = joint.ball_misfits
+    worst = presses[int(np.argmax(misfits))].name
+    return (
+        judge(
+            "worst_press_ratio",
+            tr("Unexplained signal of the worst press over the usual ({name})").format(name=worst),
+            float(misfits.max() / np.median(misfits)),
+            warn=1.5,
+            fail=2.0,
+            advice=tr(
+                "Check the stated diameter of {name}; clean the membrane and repeat the press"
+            ).format(name=worst),
+        ),
     )
 
 

@@ -15,7 +15,7 @@ from scipy.ndimage import find_objects, label
 from gelpolight_core.calibration.depth_scale import direct_flat
 from gelpolight_core.lights.crosstalk import unmix
 from gelpolight_core.lights.positions import light_directions
-from gelpolight_core.masks import saturated
+from gelpolight_core.masks import lit, saturated
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.surroundings import view_directions
 from gelpolight_core.sensor_calibration import FullModel
@@ -25,6 +25,8 @@ Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 REACH_MM = 2.0
 """Farther than this from a pixel that is not saturated, the coating is not known."""
+RIM_MM = 0.2
+"""The coating at the very rim of the field may be cut or in shadow, and is no example."""
 EVENED_MM = 0.5
 """Blur of the coating's share of the light: it leaves out specks and noise."""
 
@@ -52,7 +54,8 @@ def beyond_saturation(
     reach = round(REACH_MM / table.grid.pitch_mm)
     # Places whose surroundings meet are filled together.
     size = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
-    places, _ = label(cv2.dilate(lost.any(axis=-1).astype(np.uint8), size))
+    anywhere = np.asarray(lost.any(axis=-1), np.uint8)
+    places, _ = label(cv2.dilate(anywhere, size))
     for box in find_objects(places):
         light = _filled_light(full, bare[box], background[box], lost[box], crosstalk, table, box)
         near = _near(lost[box].any(axis=-1), reach) & lost[box].any(axis=-1)
@@ -77,8 +80,13 @@ def _filled_light(
     grid = table.grid
     flat = _flat(full, grid.x_mm[box[1]], grid.y_mm[box[0]], table.ray_slope[box])
     light = background.copy()
+    rim = round(RIM_MM / grid.pitch_mm)
+    field = cv2.erode(
+        table.valid[box].astype(np.uint8), np.ones((2 * rim + 1, 2 * rim + 1), np.uint8)
+    )
+    known = np.asarray(~lost.any(axis=-1) & (field > 0) & lit(background))
     for k in range(3):
-        share = _evened(background[..., k] / flat[..., k], ~lost.any(axis=-1), grid.pitch_mm)
+        share = _evened(background[..., k] / flat[..., k], known, grid.pitch_mm)
         light[..., k][lost[..., k]] = (share * flat[..., k])[lost[..., k]]
     # What the camera would have shown; from it the other channels follow.
     shown = np.where(lost, light @ crosstalk.T.astype(np.float32), bare)

@@ -103,7 +103,7 @@ def quality_of(stage: Stage, results: StageResults) -> QualityTable:
     if stage is Stage.BACKGROUND and results.bare_membrane is not None:
         figures += results.bare_membrane.figures
     if stage is Stage.JOINT and results.full is not None:
-        figures += judge_joint(results.full).figures
+        figures += judge_joint(results, results.full).figures
     if stage is Stage.BALLS:
         figures += judge_balls(results).figures
         figures += worst_figures([press.quality for press in results.presses])

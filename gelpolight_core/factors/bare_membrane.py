@@ -158,12 +158,18 @@ def saturated_percent(image: Raw, area: Mask) -> float:
 
 
 def local_change(values: Float, area: Mask, sigma_px: float) -> Float:
-    """Return |value / local mean - 1|, the largest of the channels; the mean is within the area."""
-    weight = area.astype(np.float32)
-    around = cv2.GaussianBlur(weight, (0, 0), sigma_px)
-    mean = cv2.GaussianBlur(values * weight[..., None], (0, 0), sigma_px)
-    mean = np.asarray(mean) / np.maximum(np.asarray(around), 1e-3)[..., None]
-    change = np.abs(values / np.maximum(mean, 1e-3) - 1.0)
+    """Return |value / smooth value - 1|, the largest of the channels.
+
+    The smooth value is a mean within the area, corrected once by the mean of what is left: the
+    bright spots of a glossy membrane, and the area's boundary, are smooth.
+    """
+    weight = area.astype(np.float32)[..., None]
+    around = np.maximum(np.asarray(cv2.GaussianBlur(weight, (0, 0), sigma_px)), 1e-3)[..., None]
+    smooth = np.zeros_like(values)
+    for _ in range(2):
+        left = cv2.GaussianBlur((values - smooth) * weight, (0, 0), sigma_px)
+        smooth += np.asarray(left, np.float32) / around
+    change = np.abs(values / np.maximum(smooth, 1e-3) - 1.0)
     return np.asarray(change.max(axis=2), np.float32)
 
 

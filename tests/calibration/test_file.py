@@ -154,3 +154,12 @@ def test_a_response_that_no_camera_has_is_refused(tmp_path: Path, curves: np.nda
     write_calibration(replace(scene.calibration(), response=Forged()), path)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="camera response"):
         read_calibration(path)
+
+
+def test_the_blur_of_the_lens_comes_back_and_may_be_missing(tmp_path: Path) -> None:
+    for blur_px in (None, 0.55):
+        before = replace(scene.calibration(), lens_blur_px=blur_px)
+        write_calibration(before, tmp_path / "c.gplcal")
+        after = read_calibration(tmp_path / "c.gplcal")
+        assert after.lens_blur_px == blur_px
+        assert after.identity == before.identity

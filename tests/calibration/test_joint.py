@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from gelpolight_core.calibration.ball_pixels import BallPixels, CoarseView, view_directions
 from gelpolight_core.calibration.joint import JointResult, refine_jointly
+from gelpolight_core.calibration.pipeline import judge_presses
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
-from gelpolight_core.quality import QualityTable
+from gelpolight_core.quality import QualityTable, Verdict
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.press import BallPress
@@ -419,3 +420,18 @@ def test_light_from_around_and_curves_are_left_out_alone() -> None:
     assert whole.membrane_kept == "one-dimensional"
     assert dark.misfit > 1.1 * whole.misfit
     assert lobes.misfit > 1.1 * whole.misfit
+
+
+def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> None:
+    known, odd = truth(gloss=0.5, roughness=0.35, decay_mm=0.6), 3
+    random = np.random.default_rng(0)
+    presses = [found_press(pose, random) for pose in BALLS[:6]]
+    pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:6]]
+    wrong = 0.75 * presses[odd].pose.radius_mm
+    presses[odd] = replace(presses[odd], pose=replace(presses[odd].pose, radius_mm=wrong))
+    pixels[odd] = replace(pixels[odd], radius_mm=wrong)
+    joint = refine_jointly(presses, pixels, MIRROR, SLAB)
+    named = tuple(replace(press, name=f"ball_{k}.png") for k, press in enumerate(presses))
+    figure = judge_presses(joint, named)[0]
+    assert figure.verdict is Verdict.FAIL
+    assert named[odd].name in figure.advice

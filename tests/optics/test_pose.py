@@ -206,3 +206,12 @@ def test_rendered_sessions_give_the_surface_with_our_own_lens(
     assert result.plane.distance_mm == pytest.approx(plane.distance_mm, rel=1e-3)
     assert angle_deg(result.plane, plane) < normal_deg
     assert result.quality.verdict is Verdict.PASS
+
+
+@pytest.mark.parametrize("blur_px", [0.6, 0.8, 1.05])
+def test_the_blur_on_the_surface_is_measured(blur_px: float) -> None:
+    """With the width of a pixel, which a square aperture of one pixel has."""
+    image, _ = lying_board(blur_px=blur_px)
+    result = estimate_top_pose([image], BOARD, CAMERA)
+    assert result.blur_px == pytest.approx(np.hypot(blur_px, 1.0 / np.sqrt(12.0)), abs=0.06)
+    assert result.quality["blur"].verdict is (Verdict.PASS if blur_px < 1.0 else Verdict.WARN)

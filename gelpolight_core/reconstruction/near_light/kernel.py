@@ -17,6 +17,7 @@ from math import cos, pi, radians, sin, sqrt
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
 from gelpolight_core.reconstruction.height_map import Flag
@@ -66,17 +67,17 @@ START_RINGS = ((8.0, 5), (20.0, 8), (33.0, 10), (47.0, 12), (60.0, 12))
 """Tilt in degrees, and how many normals that much tilted a search tries."""
 
 
-def _starts() -> tuple[tuple[float, float, float], ...]:
+def _starts() -> NDArray[np.float32]:
     """Return normals all around: the flat one, and rings of tilted ones."""
-    found = [(_0, _0, -_1)]
+    found = [(0.0, 0.0, -1.0)]
     for tilt_deg, count in START_RINGS:
         for k in range(count):
             turn, tilt = 2.0 * pi * k / count, radians(tilt_deg)
             found.append((sin(tilt) * cos(turn), sin(tilt) * sin(turn), -cos(tilt)))
-    return tuple((_single(x), _single(y), _single(z)) for x, y, z in found)
+    return np.array(found, np.float32)
 
 
-STARTS = np.array(_starts(), np.float32)
+STARTS = _starts()
 
 _part = numba.njit(nogil=True, fastmath=True, error_model="numpy", forceinline=True, cache=True)
 _whole = numba.njit(nogil=True, fastmath=True, error_model="numpy", cache=True)

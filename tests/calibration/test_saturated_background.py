@@ -1,0 +1,59 @@
+"""The background's own light under a near LED, where the image of it is saturated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gelpolight_core.calibration.saturated_background import beyond_saturation
+from gelpolight_core.experiments.known_sensor import known_sensor, matt_design
+from gelpolight_core.masks import SATURATED
+from gelpolight_core.sensor_calibration import Calibration
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    return known_sensor(matt_design(0.25)).calibration
+
+
+def clipped(calibration: Calibration, *, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the true background, brighter so that a part exceeds 1, and what a camera shows."""
+    assert calibration.full is not None
+    true = calibration.full.background * np.float32(top / calibration.full.background.max())
+    raw = true @ calibration.crosstalk.T.astype(np.float32)
+    shown = np.minimum(raw, np.float32(1.0))
+    return true, shown
+
+
+def test_light_beyond_saturation_is_found_from_what_is_around(calibration: Calibration) -> None:
+    true, shown = clipped(calibration, top=1.1)
+    lost = (shown >= SATURATED).any(axis=-1) & calibration.table.valid
+    assert lost.sum() > 20
+    assert calibration.full is not None
+    unmixed = shown @ np.linalg.inv(calibration.crosstalk).T.astype(np.float32)
+    full = replace(calibration.full, background=unmixed)
+    unknown = np.where(lost[..., None], np.float32(0.0), calibration.factors)
+    light, factors = beyond_saturation(
+        full, shown, unknown, calibration.crosstalk, calibration.table
+    )
+    assert np.percentile(np.abs(light[lost] / true[lost] - 1.0), 95.0) < 0.02
+    assert np.abs(unmixed[lost] / true[lost] - 1.0).max() > 0.05
+    np.testing.assert_array_equal(light[~lost], unmixed[~lost])
+    known = lost & (calibration.factors > 0.0).all(axis=-1)
+    off = np.abs(factors[known] / calibration.factors[known] - 1.0)
+    assert np.percentile(off, 95.0) < 0.05
+    np.testing.assert_array_equal(factors[~lost], unknown[~lost])
+
+
+def test_far_from_any_known_light_nothing_is_made_up(calibration: Calibration) -> None:
+    true, shown = clipped(calibration, top=1.1)
+    assert calibration.full is not None
+    everywhere = np.ones_like(shown)
+    full = replace(calibration.full, background=shown)
+    light, _ = beyond_saturation(
+        full, everywhere, calibration.factors, calibration.crosstalk, calibration.table
+    )
+    middle = tuple(n // 2 for n in true.shape[:2])
+    np.testing.assert_array_equal(light[middle], shown[middle])
