@@ -6,6 +6,11 @@ the membrane's response, and the normal is found by Gauss-Newton steps on the un
 saturated channel is missing information: it is left out, and the two that remain decide together
 with |n| = 1. Of their two solutions the one that keeps the dark light dark is started from.
 
+Under a glossy lobe, several normals may be where the steps end, of which one fits. A step that fits
+badly and worse is taken back, and a normal that fits badly in the end is searched for anew.
+
+The parts stay in one file: the compiler's cache does not see changes of functions in others.
+
 The loops have no branches and run in single precision, so that the processor solves eight or
 sixteen nodes at once. Each block is copied into one small array: given many arrays, the compiler
 cannot know that they do not overlap.
