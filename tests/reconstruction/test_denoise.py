@@ -8,6 +8,7 @@ import pytest
 from compiled import quiet
 from reference.denoise import quiet_even_parts
 
+from gelpolight_core.reconstruction.near_light.ratio import inverse_of_blur
 from gelpolight_core.reconstruction.near_light.uncertainty import noise_left
 
 
@@ -58,6 +59,24 @@ def test_the_noise_that_is_left_is_known(shift: float) -> None:
     left = (quieted(seen) - 0.5)[10:-10, 10:-10].std() / 0.01
     # Stated is the average over where nodes fall between the pixels, not each place's own.
     assert np.median(stated) == pytest.approx(left, rel=0.15)
+
+
+@pytest.mark.parametrize("resampled", [1, 2])
+def test_the_noise_that_sharpening_makes_is_known(resampled: int) -> None:
+    """Averaged over where nodes fall between the pixels."""
+    random, kernel = np.random.default_rng(3), inverse_of_blur(0.5)
+    found = []
+    for _ in range(60):
+        seen = random.normal(0.0, 0.01, (120, 120)).astype(np.float32)
+        for step in range(resampled):
+            move = np.float32([[1, 0, random.random()], [0, 1, random.random()]])
+            seen = cv2.warpAffine(seen, move, (120, 120))
+            if step == 0:
+                seen = cv2.filter2D(seen, cv2.CV_32F, kernel)
+        found.append(seen[10:-10, 10:-10].var() / 0.01**2)
+    one = np.ones((2, 2), np.float32)
+    stated = noise_left(None, one, resampled=resampled, kernel=kernel)
+    assert np.sqrt(np.mean(found)) == pytest.approx(float(stated[0, 0]), rel=0.1)
 
 
 def test_little_light_is_averaged_wider_and_the_light_it_has_is_known() -> None:

@@ -41,11 +41,14 @@ class Compared(NamedTuple):
         At the scale of the solve, and at the coarsest scale.
     edge : (rows, columns) float32 or None
         How far denoising left the fine image as it is, 0..1; None where it was not denoised.
+    kernel : (5, 5) float32 or None
+        What undid the blur of the fine image; None where it was left.
     """
 
     fine: RatioImage
     coarse: RatioImage
     edge: Map | None
+    kernel: Map | None = None
 
 
 class PressSampler:
@@ -105,31 +108,32 @@ class PressSampler:
         edge = None
         if factor == 1 and terms.denoising:
             edge = quieted(sampled, self._noise(1), self._workers, self._take)
+        kernel = None
         if terms.sharpening:
             blur2 = self._blur2 if at == 1 else self._blur2 + HALVING
-            self._sharpen(sampled, region, blur2 / at**2, edge)
+            kernel = inverse_of_blur(blur2 / at**2)
+            self._sharpen(sampled, region, kernel, edge)
         coarse = sampled
         while at < COARSE:
             at *= 2
             coarse = self._halved(coarse, f"at {at}")
             if terms.sharpening:
-                self._sharpen(coarse, region, HALVING / 4.0)
+                self._sharpen(coarse, region, inverse_of_blur(HALVING / 4.0))
         fine = coarse if factor == COARSE else sampled
         if self.maps.membrane.interreflection is not None:
             coarse = self._as_if_flat(coarse, region, "coarse")
             fine = self._as_if_flat(fine, region, "fine")
-        return Compared(fine, coarse, edge)
+        return Compared(fine, coarse, edge, kernel)
 
     def _sharpen(
-        self, image: RatioImage, region: Region, blur2: float, edge: Map | None = None
+        self, image: RatioImage, region: Region, kernel: Map, edge: Map | None = None
     ) -> None:
-        """Undo the blur of an image, whose square in nodes is given, to second order.
+        """Undo the blur of an image by a kernel of :func:`inverse_of_blur`.
 
         Where a wall meets a face, blur makes the wall flatter, as brightness is not a linear
         function of slope; balls have no such edges, and do not show it. Noise grows with it, where
         `edge` says that it was not averaged.
         """
-        kernel = inverse_of_blur(blur2)
         factor = COARSE * region.shape[0] // len(image.marks)
         (top, left), (rows, columns) = region.at(COARSE // factor)
         kind = self.maps.scale(factor).kind[top : top + rows, left : left + columns]

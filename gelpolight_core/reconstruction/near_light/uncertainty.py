@@ -22,6 +22,7 @@ import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import correlate2d
 
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reconstruction.integration.weighted import integrate_weighted
@@ -129,7 +130,8 @@ def depth_noise(
     (top, left), (rows, columns) = answer.region.at(COARSE)
     here = np.s_[top : top + rows, left : left + columns]
     count = pixels_per_node(maps.calibration.table, here)
-    share, share_placed = (noise_left(answer.compared.edge, count, resampled=n) for n in (1, 2))
+    edge, kernel = answer.compared.edge, answer.compared.kernel
+    share, share_placed = (noise_left(edge, count, resampled=n, kernel=kernel) for n in (1, 2))
     sd = _ratio_sd(answer.compared.fine.ratio, maps, noise, share, here, workers)
     moves = slope_noise(answer.compared.fine.ratio, sd, answer.slopes, solve)
     # A block's average has the noise of all raw pixels in it; no filter reduces that.
@@ -418,7 +420,24 @@ def _root_mean_square(examples_mm: Map, shape: tuple[int, int]) -> Map:
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)), np.float32)
 
 
-def noise_left(edge: Map | None, pixels_per_node: Map, *, resampled: int) -> Map:
+def _variance_gain(kernel: Map, resampled: int) -> float:
+    """Return what a kernel makes of the variance of bilinearly resampled noise.
+
+    Averaged over where nodes fall between the pixels, neighbours share a sixth of a pixel's
+    variance along each axis, and a node has two thirds.
+    """
+    tent = np.array([1.0, 4.0, 1.0]) / 6.0
+    line = tent if resampled == 1 else np.convolve(tent, tent)
+    shared = np.outer(line, line)
+    own = correlate2d(kernel, kernel)
+    middle, reach = len(own) // 2, len(line) // 2
+    near = own[middle - reach : middle + reach + 1, middle - reach : middle + reach + 1]
+    return float((near * shared).sum() / shared[reach, reach])
+
+
+def noise_left(
+    edge: Map | None, pixels_per_node: Map, *, resampled: int, kernel: Map | None = None
+) -> Map:
     """Return the share (rows, columns) of a raw pixel's noise that a denoised node still has.
 
     Bilinear resampling (a tent of variance 1/6 pixel^2 per axis) and the average over `QUIET_PX`
@@ -434,10 +453,14 @@ def noise_left(edge: Map | None, pixels_per_node: Map, *, resampled: int) -> Map
         Raw pixels in the area of one node.
     resampled : int
         How many times, 1 or 2.
+    kernel : (size, size) float32, optional
+        What was applied to the image where it was left as it is, after resampling it once.
     """
     kept = np.ones_like(pixels_per_node) if edge is None else edge
     tent = resampled / (3.0 * pixels_per_node)
     bare = {1: 2.0 / 3.0, 2: 151.0 / 315.0}[resampled] ** 2
+    if kernel is not None:
+        bare *= _variance_gain(kernel, resampled)
 
     def shared(average_px2: float) -> Map:
         return np.asarray(1.0 / (2.0 * np.pi * pixels_per_node * (average_px2 + tent)))
