@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     runners.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help=tr("address of a Dask cluster that does the work instead"),
+        help=tr("address of a Dask cluster to use instead"),
     )
     add_effort(parser)
     add_model(parser)

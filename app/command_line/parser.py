@@ -107,7 +107,7 @@ def _commands() -> tuple[tuple[str, str, str], ...]:
         ("ablation", "ablation", tr("show the benefit and cost of each term of the full model")),
         ("explain", "explain", tr("show where the errors of presses with true depth come from")),
         ("work-precision", "work_precision", tr("show error against run time")),
-        ("stability", "stability", tr("run stiff and extreme cases")),
+        ("stability", "stability", tr("run extreme cases")),
         ("design", "design", tr("check a sensor design before it is built")),
         ("board", "board", tr("create a checkerboard to print, A4 at true size")),
         ("cameras", "cameras", tr("list the connected cameras, their formats and settings")),

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--explain",
         action="store_true",
-        help=tr("show the steps of each image, and why others were left out"),
+        help=tr("show the steps of each image, and why steps were skipped"),
     )
     add_despite_faults(parser)
     add_effort(parser)

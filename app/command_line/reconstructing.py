@@ -24,9 +24,10 @@ def add_model(parser: argparse.ArgumentParser, *, default: str | None = None) ->
         choices=(*MODELS, IN_PLACE),
         default=default,
         help=tr(
-            "paper: lights fixed at the flat membrane, direct integration; full: near "
-            "light, gloss, interreflection, shadows, along the rays; in-place: a closed sensor, "
-            "from background and balls alone (default: the calibration's model)"
+            "paper: light of the flat membrane, direct integration; full: near "
+            "light, gloss, interreflection, shadows, refracted rays; in-place: a "
+            "closed sensor, from background and balls alone (default: the "
+            "calibration's model)"
         ),
     )
 

@@ -118,7 +118,7 @@ class ProcessingPanel(QWidget):
         self._subtract.toggled.connect(self._on_changed)
         self._hold = named(
             QPushButton(tr("Hold")), "inspect.processing.hold", tr("Hold as the reference"),
-            tr("Use the height map of now as the reference, as reconstructed"),
+            tr("Use the current height map, as reconstructed, as the reference"),
         )  # fmt: skip
         self._hold.clicked.connect(self.hold_wanted)
         row = QHBoxLayout()

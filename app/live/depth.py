@@ -183,7 +183,7 @@ class LiveDepth(QObject):
             texts.append(steps.format(effort=heightmap.trace.effort, n=len(heightmap.trace.done)))
         if heightmap.visible_depth_mm is not None:
             um = 1e3 * heightmap.visible_depth_mm
-            texts.append(tr("visible from {um:.0f} um").format(um=um))
+            texts.append(tr("visible depth {um:.0f} um").format(um=um))
         return ", ".join(texts)
 
     def trace_text(self) -> str:

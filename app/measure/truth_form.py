@@ -61,8 +61,8 @@ class TruthForm(QGroupBox):
         self.again = named(
             QPushButton(tr("Same object as before")),
             "measure.truth.again",
-            tr("Use the true values of the press before"),
-            tr("The true values of a press are not used for the next one by themselves"),
+            tr("Use the true values of the previous press"),
+            tr("True values are not copied to the next press automatically"),
         )
         self.again.setAutoDefault(False)
         self.again.clicked.connect(self._use_again)

@@ -18,8 +18,8 @@ class StabilityReport:
     name = "stability"
     title = tr("Numerical stability")
     intro = tr(
-        "Runs extreme cases on the virtual sensor. Each must be right within its bound, or say "
-        "that it cannot be trusted."
+        "Runs extreme cases on the virtual sensor. Each result must be correct "
+        "within its bound, or be reported as unreliable."
     )
     heads = (tr("Case"), tr("Subject"), tr("Result"), tr("Error um"), tr("What happened"))
 

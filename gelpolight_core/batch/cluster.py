@@ -155,7 +155,7 @@ def _connect(address: str) -> Any:
         return Client(address, timeout=ANSWER_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
-            tr("There is no answer from a Dask scheduler"),
+            tr("The Dask scheduler does not respond"),
             where=address,
             advice=tr("Check that it is running and that the address is like tcp://10.0.0.1:8786"),
         ) from error

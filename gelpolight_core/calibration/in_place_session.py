@@ -247,7 +247,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
                     fail=60.0,
                     advice=tr("Check the background and the images that are named"),
                 ),
-                judge("steepest_slope_deg", tr("Steepest slope that the balls have shown"),
+                judge("steepest_slope_deg", tr("Steepest slope of the balls"),
                       float(np.degrees(np.arctan(result.model.steepest))), "deg"),
             )
         ),

@@ -75,40 +75,36 @@ class Variant:
 
 EVERYTHING = Variant("all", marked("all terms on"))
 VARIANTS = (
-    Variant(
-        "near_light_0", marked("light frozen at the flat membrane"), Terms(near_light_rounds=0)
-    ),
+    Variant("near_light_0", marked("light computed for depth 0 only"), Terms(near_light_rounds=0)),
     Variant("near_light_1", marked("near light: 1 coarse round"), Terms(near_light_rounds=1)),
     Variant("near_light_3", marked("near light: 3 coarse rounds"), Terms(near_light_rounds=3)),
     Variant(
-        "ray_true_slopes", marked("slopes as if rays ran straight"), Terms(ray_true_slopes=False)
+        "ray_true_slopes", marked("slopes without ray correction"), Terms(ray_true_slopes=False)
     ),
-    Variant(
-        "true_positions", marked("depth left at the flat position"), Terms(true_positions=False)
-    ),
-    Variant("shadows", marked("dark channels believed"), Terms(shadows=False)),
-    Variant("saturation", marked("saturated channels believed"), Terms(saturation=False)),
+    Variant("true_positions", marked("positions at depth 0"), Terms(true_positions=False)),
+    Variant("shadows", marked("dark channels used"), Terms(shadows=False)),
+    Variant("saturation", marked("saturated channels used"), Terms(saturation=False)),
     Variant("weights", marked("plain sine transform, no weights"), Terms(weights=False)),
-    Variant("free_rim", marked("rim always held at depth 0"), Terms(free_rim=False)),
-    Variant("denoising", marked("even parts not averaged"), Terms(denoising=False)),
-    Variant("sharpening", marked("images as blurred as they are"), Terms(sharpening=False)),
+    Variant("free_rim", marked("boundary fixed at depth 0"), Terms(free_rim=False)),
+    Variant("denoising", marked("uniform areas not averaged"), Terms(denoising=False)),
+    Variant("sharpening", marked("images not sharpened"), Terms(sharpening=False)),
     Variant(
         "interreflection",
-        marked("no light from around"),
+        marked("no interreflection"),
         calibration=CalibrationTerms(interreflection=False),
     ),
     Variant("gloss", marked("no glossy lobe"), calibration=CalibrationTerms(gloss=False)),
     Variant(
         "curves",
-        marked("never a one-dimensional curve"),
+        marked("no reflectance curves"),
         calibration=CalibrationTerms(curves=False),
     ),
     Variant(
-        "crosstalk", marked("crosstalk left in"), calibration=CalibrationTerms(crosstalk=False)
+        "crosstalk", marked("crosstalk not removed"), calibration=CalibrationTerms(crosstalk=False)
     ),
     Variant(
         "led_refinement",
-        marked("LEDs as the mirror shows them"),
+        marked("LED positions from mirror spots"),
         calibration=CalibrationTerms(led_refinement=False),
     ),
     Variant("paper", marked("the paper's model"), model="paper"),
@@ -284,11 +280,11 @@ def _score(press: TruePress, found: TrueDepth | HeightMap, radius_mm: float) -> 
         )
     except ValueError as error:
         raise InputError(
-            tr("its truth has no plateau of {h:g} mm in view, {r:g} mm about the centre").format(
+            tr("its true depth has no plateau of {h:g} mm within {r:g} mm of the centre").format(
                 h=height_mm, r=radius_mm
             ),
             where=press.row.file,
-            advice=tr("Mend the height in truth.csv, or take the row out"),
+            advice=tr("Correct the height in truth.csv, or remove the row"),
         ) from error
 
 

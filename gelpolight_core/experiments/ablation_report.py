@@ -76,8 +76,8 @@ def ablation_markdown(ablations: Sequence[Ablation]) -> str:
     for ablation in ablations:
         first = ablation.results[0]
         summary = tr(
-            "{n} presses; with all terms on, a frame takes {ms:.0f} ms of the processor, "
-            "the joint refinement {s:.1f} s."
+            "{n} presses; with all terms, a frame takes {ms:.0f} ms of processor "
+            "time, the joint refinement {s:.1f} s."
         )
         parts += [
             f"### {ablation.sensor}",

@@ -40,8 +40,8 @@ def explanation_text(explanation: Explanation) -> str:
     lines += [
         "",
         tr(
-            "Reflectance that explains what is left: {needed:.2f}; seen: {seen:.2f} of the white "
-            "board's"
+            "Reflectance that explains the difference: {needed:.2f}; measured: "
+            "{seen:.2f} of the white board's"
         ).format(needed=explanation.reflectance_needed, seen=explanation.reflectance_seen),
     ]
     return "\n".join(lines)

@@ -67,7 +67,7 @@ class Rule:
 
 
 RULES = (
-    Rule("empty", tr("all after the first look, nothing pressed"), EMPTY, everywhere=True),
+    Rule("empty", tr("all after contact detection, nothing pressed"), EMPTY, everywhere=True),
     Rule("beside", tr("the field beside the contact"), PRESSED, everywhere=True),
     Rule(
         "second_round",

@@ -36,7 +36,7 @@ def number_cases() -> tuple[Case, ...]:
                 f"runs_{model}",
                 SUBJECT,
                 tr("{n} runs of the {model} model").format(n=RUNS, model=model),
-                tr("bit for bit the same"),
+                tr("identical, bit by bit"),
                 partial(_runs, model),
             ),
             Case(
@@ -45,7 +45,7 @@ def number_cases() -> tuple[Case, ...]:
                 tr("the {model} model on {n} threads").format(
                     model=model, n=", ".join(map(str, THREADS))
                 ),
-                tr("bit for bit the same"),
+                tr("identical, bit by bit"),
                 partial(_threads, model),
             ),
         ]
@@ -56,7 +56,7 @@ def number_cases() -> tuple[Case, ...]:
             Case(
                 f"single_precision_{name}",
                 SUBJECT,
-                tr("integration in single beside double precision, {r} x {c}").format(
+                tr("integration in single compared with double precision, {r} x {c}").format(
                     r=size[0], c=size[1]
                 ),
                 tr("less than {x:g} um apart").format(x=SINGLE_UM),
@@ -69,7 +69,7 @@ def number_cases() -> tuple[Case, ...]:
         Case(
             "single_precision_frame",
             SUBJECT,
-            tr("the paper's model, fused in single beside plain in double precision"),
+            tr("the paper's model, fused in single compared with plain in double precision"),
             tr("less than 1 um apart"),
             _paper_precision,
         ),
@@ -87,7 +87,7 @@ def _same(maps: list[HeightMap]) -> bool:
 def _compared(same: bool, maps: list[HeightMap]) -> Seen:
     away = max(float(np.abs(m.depth_mm - maps[0].depth_mm).max()) for m in maps)
     if same:
-        return Seen(True, tr("bit for bit the same"))
+        return Seen(True, tr("identical, bit by bit"))
     return Seen(False, tr("up to {d:.2g} um apart").format(d=1e3 * away))
 
 

@@ -33,23 +33,33 @@ HOLED_UM = 8.0
 
 def calibration_cases() -> tuple[Case, ...]:
     """Return the cases on calibrations."""
-    refused = tr("refused as the file is read")
-    masked = tr("masked; the map finite, and right elsewhere")
+    refused = tr("refused when the file is read")
+    masked = tr("masked; the map is finite, and correct elsewhere")
     entries: list[tuple[str, str, str, Callable[[], Seen]]] = [
         ("factor_zero", tr("factors 0 over 1 mm"), masked, partial(_hole, "factors")),
         ("light_zero", tr("light 0 over 1 mm"), masked, partial(_hole, "radiance")),
         ("everywhere_dark", tr("light 0 everywhere"), tr("refused"), _all_dark),
-        ("table_not_monotone", tr("a table that falls"), refused, partial(_read, _falling)),
-        ("table_of_nan", tr("a table with a gap"), refused, partial(_read, _gap)),
+        (
+            "table_not_monotone",
+            tr("a reflectance curve that decreases"),
+            refused,
+            partial(_read, _falling),
+        ),
+        ("table_of_nan", tr("a reflectance curve with a gap"), refused, partial(_read, _gap)),
         ("light_nan", tr("light that is not a number"), refused, partial(_read, _light_nan)),
         ("light_negative", tr("light below zero"), refused, partial(_read, _light_negative)),
         ("leds_above", tr("LEDs above the membrane"), tr("refused"), _leds_above),
-        ("leds_nan", tr("an LED nowhere"), refused, partial(_read, _led_nan)),
+        ("leds_nan", tr("an LED position that is not a number"), refused, partial(_read, _led_nan)),
         ("plane_backwards", tr("a plane behind the camera"), refused, partial(_read, _backwards)),
-        ("crosstalk_singular", tr("crosstalk that mixes all"), refused, partial(_read, _mixed)),
+        (
+            "crosstalk_singular",
+            tr("a crosstalk matrix that cannot be inverted"),
+            refused,
+            partial(_read, _mixed),
+        ),
         (
             "brighter_than_the_table",
-            tr("light beyond the table's end"),
+            tr("light beyond the end of the reflectance curve"),
             tr("clipped, finite and flagged"),
             _beyond,
         ),
@@ -99,7 +109,7 @@ def _read(change: Callable[[Calibration], Calibration]) -> Seen:
             read_calibration(path)
         except InputError as error:  # without the place of a folder that is gone
             raise InputError(error.found, where=path.name, advice=error.advice) from error
-    return Seen(False, tr("it was read without a word"))
+    return Seen(False, tr("it was read without an error"))
 
 
 def _with_table(calibration: Calibration, values: NDArray[np.float64]) -> Calibration:

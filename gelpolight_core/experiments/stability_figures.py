@@ -45,8 +45,8 @@ def draw_outcomes(results: Sequence[CaseResult]) -> Drawing:
         axes.set_xlabel(tr("error of the depth, RMS (um)"))
 
     caption = tr(
-        "Error of the depth; the bar is the most that counts as right. Circle: right, diamond: "
-        "wrong and said so by the map itself, cross: failed"
+        "Error of the depth; the bar is the largest error that passes. Circle: "
+        "passed, diamond: wrong, but reported by the map, cross: failed"
     )
     return draw(caption, max(ROW_MM * len(shown) + 12.0, FEWEST_MM), paint)
 
@@ -77,7 +77,8 @@ def draw_tornado(found: Sequence[Sensitivity]) -> Drawing:
         axes.legend(loc="lower right")
 
     caption = tr(
-        "What one standard uncertainty of each calibration parameter, by itself, does to the "
-        "height of a cylinder of 1 mm; linear up to 0.1 %, logarithmic beyond"
+        "Effect of one standard uncertainty of each calibration parameter alone "
+        "on the height of a cylinder of 1 mm; linear up to 0.1 %, logarithmic "
+        "above"
     )
     return draw(caption, ROW_MM * len(found) + 16.0, paint)

@@ -38,7 +38,7 @@ TOLERANCES = (1e-2, 1e-3, 3e-4, 1e-6)
 
 def grid_cases() -> tuple[Case, ...]:
     """Return the cases on grids of nodes."""
-    right = tr("the bump that the slopes are of, or refused")
+    right = tr("the bump from which the slopes were computed, or refused")
     sizes = [
         Case(
             f"grid_{rows}x{columns}",
@@ -95,7 +95,7 @@ def grid_cases() -> tuple[Case, ...]:
             "solver_tolerance",
             SUBJECT,
             tr("the weighted integration at tolerances 0.01 to 0.000001"),
-            tr("the answer does not depend on it"),
+            tr("the result does not depend on it"),
             _tolerances,
         ),
         Case(

@@ -70,7 +70,7 @@ def _bad_pixels() -> list[Case]:
         "saturated": 1.0,
     }
     label = tr("{n} single pixels of value {value:g}")
-    required = tr("the map finite, and the rest of it unchanged")
+    required = tr("the map is finite, and its other points are unchanged")
     return [
         _case(
             f"pixels_{name}",
@@ -92,7 +92,7 @@ def _with_bad_pixels(value: float) -> Seen:
 
 
 def _missing_channels() -> list[Case]:
-    required = tr("taken as missing and flagged; the rest of the map unchanged")
+    required = tr("treated as missing and flagged; the rest of the map is unchanged")
     cases = [
         ("patch_saturated", tr("one channel saturated over 2 mm"), 1.0, (0,), Flag.SATURATED),
         ("patch_dark", tr("one channel dark over 2 mm"), 0.0, (1,), Flag.DARK),
@@ -126,13 +126,13 @@ def _whole_images() -> list[Case]:
     def like(make: Callable[[Map], NDArray[Any]]) -> Callable[[], Seen]:
         return lambda: _not_of_this_sensor(make(standard_press().frame))
 
-    required = tr("finite, and the map says that it is not to be trusted")
+    required = tr("finite, and the map reports that it is not reliable")
     cases: list[tuple[str, str, Callable[[Map], NDArray[Any]]]] = [
         ("all_black", tr("an all black image"), np.zeros_like),
         ("all_white", tr("an all white image"), np.ones_like),
         ("all_grey", tr("every pixel 0.5"), lambda f: np.full_like(f, 0.5)),
         ("all_dim", tr("every pixel 0.1"), lambda f: np.full_like(f, 0.1)),
-        ("all_nan", tr("no pixel a number"), lambda f: np.full_like(f, np.nan)),
+        ("all_nan", tr("all pixels not a number"), lambda f: np.full_like(f, np.nan)),
         ("all_inf", tr("every pixel infinite"), lambda f: np.full_like(f, np.inf)),
         ("denormals", tr("every pixel times 1e-40"), lambda f: f * np.float32(1e-40)),
         ("negated", tr("every pixel negated"), np.negative),
@@ -140,8 +140,8 @@ def _whole_images() -> list[Case]:
         ("halved", tr("half the exposure"), lambda f: f * np.float32(0.5)),
         ("blue_first", tr("blue and red exchanged"), lambda f: f[..., ::-1]),
         ("upside_down", tr("the image upside down"), lambda f: f[::-1]),
-        ("noise", tr("nothing but noise"), _noise),
-        ("scale_255", tr("floats of 0..255 in place of 0..1"), lambda f: f * np.float32(255.0)),
+        ("noise", tr("only noise"), _noise),
+        ("scale_255", tr("floats of 0..255 instead of 0..1"), lambda f: f * np.float32(255.0)),
         ("twelve_bit", tr("12 bits in a 16 bit file"), lambda f: (f * 4095.0).astype(np.uint16)),
         ("light_10_percent", tr("light 10 % weaker"), lambda f: f * np.float32(0.9)),
     ]
@@ -149,7 +149,7 @@ def _whole_images() -> list[Case]:
 
 
 def _other_light() -> list[Case]:
-    required = tr("measured, undone and right")
+    required = tr("measured, corrected and accurate")
     cases: list[tuple[str, str, Callable[[Map], Map]]] = [
         ("light_2_percent", tr("light 2 % stronger"), lambda f: f * np.float32(1.02)),
         ("red_2_percent", tr("red light 2 % stronger"), _redder),
@@ -193,7 +193,7 @@ def _not_of_this_sensor(frame: NDArray[Any]) -> Seen:
 
 
 def _kinds() -> list[Case]:
-    required = tr("the same depth, or a refusal that names the kind")
+    required = tr("the same depth, or an error that names the type")
     makers: dict[str, Callable[[Map], NDArray[Any]]] = {
         "uint8": lambda f: np.rint(f * 255).astype(np.uint8),
         "uint16": lambda f: np.rint(f * 65535).astype(np.uint16),
@@ -215,7 +215,7 @@ def _kinds() -> list[Case]:
         "turned_in_memory": lambda f: np.asfortranarray(f),
         "read_only": _read_only,
     }
-    label = tr("an image as {kind}")
+    label = tr("an image of type {kind}")
     return [
         _case(
             f"kind_{kind}", label.format(kind=kind.replace("_", " ")), required, partial(_as, make)
@@ -237,7 +237,7 @@ def _as(make: Callable[[Map], NDArray[Any]]) -> Seen:
     seen = judged(known, press, BESIDE_UM, frame=frame)
     depths = [Reconstructor(known.calibration).depth(f).depth_mm for f in (frame, press.frame)]
     apart = rms_um((depths[0] - depths[1]).astype(np.float64))
-    text = tr("{summary}; {d:.2f} um from the usual numbers")
+    text = tr("{summary}; {d:.2f} um from the usual number type")
     summary = text.format(summary=seen.summary, d=apart)
     return replace(seen, summary=summary, right=seen.right and apart < SAME_UM)
 
@@ -248,18 +248,18 @@ def _contacts() -> list[Case]:
         _case(
             "contact_of_a_pixel",
             tr("a ball of 0.15 mm, 0.03 mm deep: a contact one pixel wide"),
-            tr("finite, and no deeper anywhere than it is"),
+            tr("finite, and nowhere deeper than the true depth"),
             lambda: _small(Ball(0.15, 0.03)),
         ),
         _case(
             "one_bright_pixel",
             tr("one pixel 30 % brighter"),
-            tr("no dent deeper than a pixel's own slope can make"),
+            tr("no dent deeper than the slope of one pixel can cause"),
             _one_bright_pixel,
         ),
         _case(
             "no_contact",
-            tr("the bare membrane"),
+            tr("the untouched membrane"),
             tr("flat"),
             lambda: judged(
                 standard_sensor(),

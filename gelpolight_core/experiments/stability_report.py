@@ -159,7 +159,7 @@ def sensitivity_table(found: Sequence[Sensitivity]) -> str:
 def summary_line(results: Sequence[CaseResult]) -> str:
     """Return how many cases ended how."""
     count = {o: sum(r.outcome is o for r in results) for o in Outcome}
-    return tr("{p} right, {r} refused with the reason, {f} failed, of {n}").format(
+    return tr("{p} passed, {r} refused with the reason, {f} failed, of {n}").format(
         p=count[Outcome.PASSED], r=count[Outcome.REFUSED], f=count[Outcome.FAILED], n=len(results)
     )
 
@@ -224,14 +224,14 @@ def stability_page(
     sections = [_section(s, [r for r in results if r.case.subject == s]) for s in subjects]
     if found:
         drawing, listing = draw_tornado(found), _sensitivity_listing(found)
-        text = tr("What one standard uncertainty of each calibration parameter does to the depth")
+        text = tr("Effect of one standard uncertainty of each calibration parameter on the depth")
         sections.append(
             Section(
                 "sensitivity", tr("Sensitivity"), text, QualityTable(), (), (drawing,), (listing,)
             )
         )
     if costs:
-        text = tr("What 1 % in each length of session.toml does to a measured cylinder")
+        text = tr("Effect of 1 % in each length of session.toml on a measured cylinder")
         listing = _length_listing(costs)
         sections.append(
             Section("lengths", tr("Stated lengths"), text, QualityTable(), (), (), (listing,))
@@ -251,7 +251,7 @@ def _length_listing(costs: Sequence[LengthCost]) -> Listing:
 def _section(subject: str, results: Sequence[CaseResult]) -> Section:
     failed = sum(r.outcome is Outcome.FAILED for r in results)
     quality = QualityTable(
-        (judge("failed", tr("Cases neither right nor refused"), float(failed), fail=0.0),)
+        (judge("failed", tr("Cases neither passed nor refused"), float(failed), fail=0.0),)
     )
     drawings: tuple[Drawing, ...] = ()
     if any(r.seen is not None and r.seen.error_um is not None for r in results):
@@ -265,7 +265,7 @@ def _section(subject: str, results: Sequence[CaseResult]) -> Section:
             tr("Condition"),
             tr("Rounds"),
             tr("s"),
-            tr("What was seen"),
+            tr("Result"),
         ),
         tuple(_cells(result) for result in results),
         (3.0, 1.0, 1.6, 1.0, 0.8, 0.6, 4.0),

@@ -62,7 +62,7 @@ def _pressed(
 
 def _led_cases() -> list[Case]:
     matt = matt_design(SCALE)
-    right_or_refused = tr("right, or refused with the condition number")
+    right_or_refused = tr("correct, or refused with the condition number")
     cases = []
     for apart_mm in (0.5, 1.0, 2.0, 4.0, 8.0):
         radius = apart_mm / math.sqrt(3.0)
@@ -98,7 +98,7 @@ def _led_cases() -> list[Case]:
                 f"leds_{height_mm:g}_mm_below",
                 LEDS,
                 tr("LEDs {x:g} mm below the membrane plane, 0.2 mm pressed").format(x=height_mm),
-                tr("right, or refused for want of light"),
+                tr("correct, or refused because of too little light"),
                 partial(_pressed, replace(small, leds=_ring(7.0, height_mm)), shallow, (0.3, 0.2)),
             )
         )
@@ -111,7 +111,7 @@ def _row() -> tuple[LedDesign, ...]:
 
 def _layer_cases() -> list[Case]:
     matt = matt_design(SCALE)
-    required = tr("right")
+    required = tr("correct")
     cases = []
     for index in (1.0, 1.2, 1.41, 2.0, 2.5):
         layers = replace(matt.layers, elastomer_refractive_index=index)
@@ -134,7 +134,7 @@ def _layer_cases() -> list[Case]:
         label = tr("a slab of {x:g} mm").format(x=slab_mm)
         cases.append(_layer_case(f"slab_{slab_mm:g}_mm", label, matt, layers, required))
     thick = replace(matt.layers, elastomer_thickness_mm=40.0)
-    label = tr("a slab thicker than the room before the camera")
+    label = tr("a slab thicker than the space in front of the camera")
     cases.append(_layer_case("slab_too_thick", label, matt, thick, tr("refused")))
     window = replace(matt.layers, elastomer_thickness_mm=5.0, window_thickness_mm=25.0)
     cases.append(_layer_case("window_25_mm", tr("a window of 25 mm"), matt, window, required))
@@ -164,7 +164,7 @@ def _lens_cases() -> list[Case]:
                 f"lens_{edge:.0f}_deg",
                 LENSES,
                 tr("rays up to {x:.0f} degrees").format(x=edge),
-                tr("right, and the way back from the membrane the same"),
+                tr("correct, and the inverse projection agrees"),
                 partial(_lens, replace(matt, camera=camera, membrane=wide)),
             )
         )
@@ -176,7 +176,7 @@ def _lens_cases() -> list[Case]:
                 f"distortion_{k1:g}",
                 LENSES,
                 tr("lens distortion k1 = {x:g}").format(x=k1),
-                tr("right where the lens is one to one, and outside elsewhere"),
+                tr("correct where the lens model is one to one, and outside elsewhere"),
                 partial(_lens, replace(matt, camera=camera, membrane=wide)),
             )
         )
@@ -198,14 +198,14 @@ def _lens(design: SensorDesign) -> Seen:
     bound_um = max(RIGHT_UM, 30.0 * table.grid.pitch_mm)
     seen = judged(known, press, bound_um, radius_mm=7.0)
     worst = float(away_mm.max())
-    text = tr("{summary}; there and back within {d:.2g} mm")
+    text = tr("{summary}; forward and back within {d:.2g} mm")
     summary = text.format(summary=seen.summary, d=worst)
     # Pixels are kept in single precision: some thousandths of a pixel.
     return replace(seen, summary=summary, right=seen.right and worst < 0.02 * table.grid.pitch_mm)
 
 
 def _wall_cases() -> list[Case]:
-    required = tr("right, or the map says that features on the walls may be too low")
+    required = tr("correct, or the map reports that features on walls may be too low")
     cases = []
     matt = matt_design(FINE)
     for degrees, decay_mm in ((57, 0.7), (71, 0.35), (76, 0.25), (80, 0.18), (84, 0.1)):
@@ -250,7 +250,7 @@ def _cone(degrees: float) -> Seen:
 
 def _deep_cases() -> list[Case]:
     low = replace(matt_design(SCALE), leds=_ring(3.0, 3.0))
-    summary = tr("right, or damped, stopped, and said so")
+    summary = tr("correct, or damped and stopped with a note")
     entries: list[tuple[str, str, Indenter, tuple[float, float], float]] = [
         ("depth_4_mm", tr("4 mm deep, LEDs at 13.7 mm"), Ball(6.0, 4.0), (1.2, -0.8), 40.0),
         ("depth_8_mm", tr("8 mm deep, LEDs at 13.7 mm"), Ball(8.0, 8.0), (1.2, -0.8), 80.0),
@@ -258,12 +258,12 @@ def _deep_cases() -> list[Case]:
         ("ball_of_the_field", tr("a ball as wide as the field"), Ball(60.0, 1.4), (0, 0), 15.0),
         (
             "beyond_the_field",
-            tr("a plate beyond the whole field"),
+            tr("a plate larger than the field"),
             Cylinder(30.0, 1.0),
             (0, 0),
             15.0,
         ),
-        ("across_the_rim", tr("a ball across the rim"), BALL, (11.0, 0.0), RIGHT_UM),
+        ("across_the_rim", tr("a ball across the boundary"), BALL, (11.0, 0.0), RIGHT_UM),
     ]
     cases = [
         Case(name, WALLS, label, summary, partial(_in_standard, indenter, at_mm, bound))

@@ -103,7 +103,7 @@ LENGTHS = (
 
 def session_cases() -> tuple[Case, ...]:
     """Return the cases on calibration sessions."""
-    required = tr("right within three stated sd in every mode, or flagged, or refused")
+    required = tr("correct within three stated sd in every mode, or flagged, or refused")
     spoilt = [*_counts(), *_spoilt_images(), *_spoilt_light()]
     cases = [
         Case(f"session_{name}", SUBJECT, label, required, partial(_measured, change), quick=False)
@@ -134,7 +134,7 @@ def _counts() -> list[Named]:
         for n in (2, 4, 8)
     ]
     side: Named = ("balls_one_side", tr("balls on one half only"), _balls_on_one_side)
-    plain: Named = ("plain", tr("nothing is changed"), lambda _: None)
+    plain: Named = ("plain", tr("unchanged session"), lambda _: None)
     return [plain, *balls, side, *views]
 
 

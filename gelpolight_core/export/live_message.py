@@ -97,7 +97,7 @@ def _health(heightmap: HeightMap) -> dict[str, Any]:
 
 def _no_message() -> InputError:
     return InputError(
-        tr("it is not a message of a height map that this program knows"),
+        tr("it is not a height map message that this program can read"),
         where=tr("stream"),
         advice=tr("Subscribe to a stream of the same version of the program"),
     )

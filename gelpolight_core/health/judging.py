@@ -55,7 +55,7 @@ SATURATED_SHARE, MOSTLY_SATURATED = 0.01, 0.3
 DIRT_CHANGE, DIRT_SPREAD, DIRT_RUNS = -0.06, 0.12, 2
 """Dirt darkens the channels alike; a slope does not."""
 BAD_SHARE, LEAST_BAD = 1e-4, 3
-BACKGROUND = tr("set to zero or take the background again")
+BACKGROUND = tr("set to zero or capture the background again")
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,7 +310,7 @@ def bad_pixel_findings(
     share: float, count: int, columns: Sequence[int], rows: Sequence[int]
 ) -> list[Finding]:
     """Return lines and single pixels that do not follow the light."""
-    remedy = tr("Calibrate again, which leaves them out, or replace the camera")
+    remedy = tr("Calibrate again, so that they are left out, or replace the camera")
     found = []
     for kind, places in ((tr("column"), columns), (tr("row"), rows)):
         if places:
@@ -355,8 +355,9 @@ def stranger_finding() -> Finding:
         "other_sensor",
         tr("the image does not look like this sensor's membrane"),
         tr(
-            "Use the calibration of the sensor that the image is from; if it is the right one, "
-            "lift off what covers the field and seat camera and elastomer"
+            "Use the calibration of the sensor that captured the image; if it is the "
+"right one, remove all objects from the field and seat camera and "
+"elastomer"
         ),
         Verdict.FAIL, True,
     )  # fmt: skip

@@ -120,7 +120,7 @@ def not_recovered(left: float) -> Finding:
     """Return that a share of the last press is still seen."""
     return Finding(
         "not_recovered",
-        tr("the gel has not recovered: {p:.1f} % of the last press is left").format(p=100.0 * left),
+        tr("the gel has not recovered: {p:.1f} % of the last press remains").format(p=100.0 * left),
         tr("Wait before the next press, and press for less time"),
         Verdict.WARN, False, 100.0 * left, "%",
     )  # fmt: skip

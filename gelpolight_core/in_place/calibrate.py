@@ -335,8 +335,8 @@ def _explained(
         if not stays:
             work.refused[name] = InputError(
                 tr(
-                    "its shading is not that of a ball of the stated radius, by the other presses "
-                    "(slopes off by {e:.2f}, the others by {m:.2f})"
+                    "its shading does not fit a ball of the stated radius, compared with the "
+                    "other presses (slope error {e:.2f}, other presses {m:.2f})"
                 ).format(e=error, m=float(np.median(errors))),
                 where=name,
                 advice=tr("Check the ball's radius and that one clean ball is pressed straight"),

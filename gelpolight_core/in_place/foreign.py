@@ -213,13 +213,13 @@ def _label(path: Path) -> PlacedCircle:
             radius = float(np.asarray(label["radius"], np.float64).reshape(()))
     except (ValueError, KeyError, TypeError, OSError, zipfile.BadZipFile) as error:
         raise InputError(
-            tr("The label does not hold a circle (center, radius)"),
+            tr("The label contains no circle (center, radius)"),
             where=str(path),
             advice=tr("Label the image again, or remove this file"),
         ) from error
     if not all(map(math.isfinite, (x, y, radius))) or radius <= 0.0:
         raise InputError(
-            tr("The label's circle is not possible"),
+            tr("The circle of the label is not valid"),
             where=str(path),
             advice=tr("Label the image again, or remove this file"),
         )
@@ -231,7 +231,7 @@ def _inside(folder: Path, name: str, where: str) -> Path:
     path = folder / PureWindowsPath(name).as_posix()
     if not path.resolve().is_relative_to(folder.resolve()):
         raise InputError(
-            tr("The line names a place outside the folder: {name}").format(name=brief(name)),
+            tr("The line names a path outside the folder: {name}").format(name=brief(name)),
             where=where,
             advice=tr("Put the images into the folder and correct the table"),
         )

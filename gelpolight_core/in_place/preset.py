@@ -64,8 +64,8 @@ class Preset:
         if self.light_colours >= COLOURED:
             return ""
         return tr(
-            "The lights of this sensor have one colour, which does not show the direction of a "
-            "slope: expect a calibration that fails"
+            "The lights of this sensor have one colour, which cannot show the "
+            "direction of a slope: the calibration will probably fail"
         )
 
     def scale_for(self, width_px: int, height_px: int) -> tuple[float, float]:

@@ -61,7 +61,7 @@ def refuse_other_view(images: Sequence[Map], background: Map) -> None:
         if len(moved) >= LEAST_MOVED:
             px = float(np.median(np.hypot(*np.array(moved).T)))
             found = tr(
-                "the background's texture lies {px:.0f} px beside that of the ball images"
+                "the texture of the background is shifted by {px:.0f} px against the ball images"
             ).format(px=px)
     if found:
         raise InputError(

@@ -75,7 +75,7 @@ def scale_from_pins(
         found = max(fits, key=lambda fit: fit[2])
         if found[2] < LEAST_PINS:
             raise InputError(
-                tr("no regular grid of pins is seen ({n} pins of one)").format(n=found[2]),
+                tr("no regular grid of pins was found ({n} pins of one)").format(n=found[2]),
                 where=where,
                 advice=tr("Press the pin grid evenly, 3 x 3 pins or more, or state mm_per_px"),
             )

@@ -53,7 +53,7 @@ class Rectangle:
                     y=self.centre_mm[1],
                 ),
                 where=tr("rectangle"),
-                advice=tr("Give two sides greater than zero, and where its centre lies"),
+                advice=tr("Give two sides greater than zero, and the position of the centre"),
             )
 
     @property
@@ -140,7 +140,7 @@ def nodes_inside(heightmap: HeightMap, rectangle: Rectangle) -> AreaNodes:
     inside &= ((flags & int(Flag.OUTSIDE)) == 0) & np.isfinite(depth)
     if int(inside.sum()) < LEAST_NODES:
         raise InputError(
-            tr("the rectangle holds {n} points of the map").format(n=int(inside.sum())),
+            tr("the rectangle contains {n} points of the map").format(n=int(inside.sum())),
             where=tr("rectangle at ({x:g}, {y:g}) mm").format(
                 x=rectangle.centre_mm[0], y=rectangle.centre_mm[1]
             ),

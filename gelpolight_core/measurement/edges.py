@@ -245,9 +245,9 @@ def _edge_offsets(
     there = inner & (top > least) & found
     if int(there.sum()) < LEAST_POINTS:
         raise InputError(
-            tr("there is no edge near what was drawn"),
+            tr("there is no edge near the drawn shape"),
             where=tr("steepest slope"),
-            advice=tr("Draw it nearer to the edge, or measure it as it is drawn (plain)"),
+            advice=tr("Draw it nearer to the edge, or measure the drawn shape (plain)"),
         )
     return np.asarray(offsets[0] + step * index), there
 

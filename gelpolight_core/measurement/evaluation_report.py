@@ -88,7 +88,7 @@ def evaluation_table(evaluation: Evaluation) -> str:
         )
     if evaluation.skipped:
         lines.append(
-            tr("{count} skipped, of no measured shape: {files}").format(
+            tr("{count} skipped because this shape cannot be measured: {files}").format(
                 count=len(evaluation.skipped), files=", ".join(evaluation.skipped)
             )
         )

@@ -74,7 +74,7 @@ def no_anchor(flags: NDArray[np.uint8] | None, region: PressedRegion) -> str:
 
 
 def _no_end(fit: FitResult) -> str:
-    return "" if fit.converged else tr("the fit did not come to an end")
+    return "" if fit.converged else tr("the fit did not converge")
 
 
 def _wrong_shape(
@@ -124,7 +124,7 @@ def _odd_drape(fit: FitResult) -> str:
     decay = fit.values["drape_decay_mm"]
     if 0.1 <= decay <= 3.0:
         return ""
-    return tr("the drape's decay length comes out as {decay:.2f} mm").format(decay=decay)
+    return tr("the fitted decay length of the drape is {decay:.2f} mm").format(decay=decay)
 
 
 def _cut_drape(window: WindowData) -> str:

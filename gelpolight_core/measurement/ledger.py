@@ -106,7 +106,7 @@ def _damaged(path: Path) -> InputError:
     return InputError(
         tr("the file is not text in UTF-8"),
         where=str(path),
-        advice=tr("Move it away: the presses are measured again"),
+        advice=tr("Move the file away; the presses are then measured again"),
     )
 
 

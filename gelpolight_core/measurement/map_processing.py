@@ -89,7 +89,7 @@ def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightM
     positions = np.asarray(points_mm, np.float64)
     if positions.shape != (3, 2):
         raise InputError(
-            tr("{n} points for a plane").format(n=len(positions)),
+            tr("there are only {n} points for a plane").format(n=len(positions)),
             where=tr("levelling"),
             advice=tr("Choose three points"),
         )
@@ -284,7 +284,7 @@ def _without_errors(heightmap: HeightMap) -> HeightMap:
 
 def _bad_size(size: float) -> InputError:
     return InputError(
-        tr("a filter of size {size:g}").format(size=size),
+        tr("the size of the filter is {size:g}").format(size=size),
         where=tr("smoothing"),
         advice=tr("Choose a sigma above 0 mm, or an odd number of points from 3 to 15"),
     )

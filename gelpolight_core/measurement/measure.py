@@ -218,9 +218,10 @@ def _checked(
     beside = (m for m in (flags, depth_sd_mm) if m is not None)
     if not fits or any(np.shape(m) != depth.shape for m in beside):
         raise InputError(
-            tr("a depth map of shape {shape} with {x} columns and {y} rows named").format(
-                shape=depth.shape, x=x.size, y=y.size
-            ),
+            tr(
+                "the depth map has shape {shape}, but there are positions for {x} "
+                "columns and {y} rows"
+            ).format(shape=depth.shape, x=x.size, y=y.size),
             where=tr("depth map"),
             advice=tr("Give arrays of one grid, at least 8 x 8"),
         )
@@ -251,7 +252,7 @@ def _chosen_region(
         raise InputError(
             tr("no object is pressed"),
             where=tr("depth map"),
-            advice=tr("Press the object into the membrane and take the image again"),
+            advice=tr("Press the object into the membrane and capture the image again"),
         )
     if seed_mm is not None:
         return _region_at(regions, x_mm, y_mm, seed_mm)

@@ -110,7 +110,7 @@ def take_profile(
         raise InputError(
             tr("the line lies outside the working area"),
             where=tr("profile"),
-            advice=tr("Draw it over what is measured"),
+            advice=tr("Draw it over the area to measure"),
         )
     total = np.where(there, depth, 0.0).sum(axis=0)
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
@@ -135,7 +135,7 @@ def _check_line(length: float, width_mm: float, step: float) -> None:
     good = math.isfinite(length) and math.isfinite(width_mm) and width_mm >= 0.0
     if not good or not 2.0 * step <= length <= MOST_POINTS * step:
         raise InputError(
-            tr("a line of {length:g} mm and a width of {width:g} mm").format(
+            tr("the line has a length of {length:g} mm and a width of {width:g} mm").format(
                 length=length, width=width_mm
             ),
             where=tr("profile"),
@@ -340,7 +340,7 @@ def _crossings(
     crossings = np.flatnonzero(above[1:] != above[:-1])
     if crossings.size < 2 or above[0] != above[-1]:
         raise InputError(
-            tr("the profile does not cross {level:.4f} mm and come back").format(level=level),
+            tr("the profile does not cross {level:.4f} mm twice").format(level=level),
             where=tr("width of a profile"),
             advice=tr("Choose another level, or a range that begins and ends beside the object"),
         )

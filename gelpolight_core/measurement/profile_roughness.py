@@ -159,9 +159,9 @@ def _check_cutoff(cutoff_mm: float, pitch_mm: float) -> None:
     if math.isfinite(cutoff_mm) and cutoff_mm >= LEAST_PITCHES * pitch_mm:
         return
     raise InputError(
-        tr("a cut-off of {cutoff:g} mm, with a map that has a point every {pitch:.3f} mm").format(
-            cutoff=cutoff_mm, pitch=pitch_mm
-        ),
+        tr(
+            "the cut-off is {cutoff:g} mm, but the points of the map are {pitch:.3f} mm apart"
+        ).format(cutoff=cutoff_mm, pitch=pitch_mm),
         where=tr("profile roughness"),
         advice=tr("Choose at least {least:.2f} mm; 0.8 mm is usual").format(
             least=LEAST_PITCHES * pitch_mm
@@ -175,7 +175,7 @@ def _inside(profile: Profile) -> slice:
     whole = there.size > 1 and there.size == there[-1] - there[0] + 1
     if not whole:
         raise InputError(
-            tr("the line crosses places without depth"),
+            tr("the line crosses points without depth"),
             where=tr("profile roughness"),
             advice=tr("Draw it where the map has no gaps"),
         )

@@ -199,21 +199,25 @@ def check_protocol(protocol: Protocol, *, where: str = "protocol") -> Protocol:
     if len(set(protocol.shapes)) < len(protocol.shapes):
         raise refusal(tr("a shape is named twice"), tr("Name each shape once"))
     if not protocol.objects:
-        raise refusal(tr("no object is to be pressed"), tr("Choose a shape, and a size or height"))
+        raise refusal(
+            tr("the protocol contains no object"), tr("Choose a shape, and a size or height")
+        )
     counts = {tr("repeats"): protocol.repeats, tr("regions"): protocol.regions}
     for name, count in counts.items():
         if not 0 <= count <= 99:
             raise refusal(
-                tr("{count} {name} are asked for").format(count=count, name=name),
-                tr("Ask for 0 to 99"),
+                tr("the number of {name} is {count}").format(count=count, name=name),
+                tr("Use 0 to 99"),
             )
     if protocol.repeats + protocol.regions == 0:
-        raise refusal(tr("nothing is to be pressed"), tr("Ask for repeats or for regions"))
+        raise refusal(
+            tr("the protocol contains no press"), tr("State a number of repeats or of regions")
+        )
     for truth in protocol.objects:
         room = room_mm(truth, protocol.reach_mm)
         if room <= 0.0:
             raise refusal(
-                tr("a {shape} of {size:g} mm has no room within {reach:.1f} mm").format(
+                tr("a {shape} of {size:g} mm does not fit within {reach:.1f} mm").format(
                     shape=truth.shape, size=truth.size_mm, reach=protocol.reach_mm
                 ),
                 tr("Leave this size out: {mm:.1f} mm are missing").format(mm=-room),
@@ -233,11 +237,11 @@ def _check_lengths(protocol: Protocol, refusal: Callable[[str, str], InputError]
         for length in lengths:
             if not 0.05 <= length <= 200.0:
                 raise refusal(
-                    tr("{name} holds {length:g}").format(name=name, length=length),
+                    tr("{name} contains {length:g}").format(name=name, length=length),
                     tr("Give lengths from 0.05 to 200 mm"),
                 )
         # The names of the images hold hundredths of a millimetre.
         if len({round(100 * length) for length in lengths}) < len(lengths):
             raise refusal(
-                tr("{name} holds a length twice").format(name=name), tr("Name each length once")
+                tr("{name} contains a length twice").format(name=name), tr("Name each length once")
             )

@@ -97,7 +97,7 @@ def read_protocol_file(folder: Path) -> ProtocolFile:
         raise InputError(
             tr("the protocol cannot be read ({reason})").format(reason=brief(str(error), 200)),
             where=str(path),
-            advice=tr("Mend the file; the presses beside it are whole"),
+            advice=tr("Correct the file; the presses in the folder are intact"),
         ) from error
     return _parse(Table(content, "", path))
 

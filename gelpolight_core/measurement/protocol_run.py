@@ -193,7 +193,7 @@ class ProtocolRun:
             raise InputError(
                 tr("this press is not done yet"),
                 where=press.file,
-                advice=tr("Choose one that is done"),
+                advice=tr("Choose a finished press"),
             )
         # The row first: without it the image is only an image, and nothing is lost.
         rows = {file: row for file, row in self._rows.items() if file != press.file}
@@ -236,9 +236,9 @@ def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str
     for name in (FILE_NAME, PRESSES):
         if (folder / name).exists():
             raise InputError(
-                tr("the folder holds a {name} already").format(name=name),
+                tr("the folder already contains a {name}").format(name=name),
                 where=str(folder),
-                advice=tr("Go on with that run, or name a new folder"),
+                advice=tr("Continue that run, or choose a new folder"),
             )
     make_folder(folder / PRESSES)
     content = ProtocolFile(protocol, serial, calibration)
@@ -263,9 +263,9 @@ def open_run(folder: Path) -> ProtocolRun:
         press = wanted.get(row[0])
         if press is None or len(row) != len(COLUMNS) or row[1:-1] != _row(press)[1:-1]:
             raise InputError(
-                tr("the row of {file} is not of this protocol").format(file=brief(row[0])),
+                tr("the row of {file} does not belong to this protocol").format(file=brief(row[0])),
                 where=str(presses / TRUTH),
-                advice=tr("Put protocol.toml and truth.csv back as they were written"),
+                advice=tr("Restore the original protocol.toml and truth.csv"),
             )
         # An image that was taken away is asked for again.
         if (presses / row[0]).is_file():
@@ -337,13 +337,13 @@ def _read_rows(path: Path) -> list[list[str]]:
         raise InputError(
             tr("The file cannot be read ({reason})").format(reason=error),
             where=str(path),
-            advice=tr("Mend it; the images beside it are whole"),
+            advice=tr("Correct it; the images in the folder are intact"),
         ) from error
     if not lines or tuple(lines[0]) != COLUMNS:
         raise InputError(
-            tr("the first line is not that of a protocol's run"),
+            tr("the first line is not that of a protocol run"),
             where=str(path),
-            advice=tr("Put the file back as it was written"),
+            advice=tr("Restore the original file"),
         )
     return lines[1:]
 

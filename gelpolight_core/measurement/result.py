@@ -219,7 +219,7 @@ def compare(measurement: Measurement, truth: Truth) -> Comparison:
     """
     if truth.shape != measurement.shape:
         raise InputError(
-            tr("the truth is a {truth}, measured was a {shape}").format(
+            tr("the true shape is a {truth}, but a {shape} was measured").format(
                 truth=truth.shape, shape=measurement.shape
             ),
             where=tr("truth"),
@@ -228,7 +228,7 @@ def compare(measurement: Measurement, truth: Truth) -> Comparison:
     for value in (truth.size_mm, truth.height_mm):
         if not (math.isfinite(value) and value > 0.0):
             raise InputError(
-                tr("a true size of {value} mm").format(value=value),
+                tr("the true size is {value} mm").format(value=value),
                 where=tr("truth"),
                 advice=tr("Give sizes greater than zero"),
             )

@@ -156,7 +156,7 @@ def read_true_depth(path: Path) -> TrueDepth:
         raise InputError(
             tr("The file does not exist"),
             where=str(path),
-            advice=tr("Use a session that holds the true depth of its presses"),
+            advice=tr("Use a session that contains the true depth of its presses"),
         ) from error
     except UNREADABLE as error:
         raise _not_a_truth(path) from error
@@ -170,7 +170,7 @@ def read_true_depth(path: Path) -> TrueDepth:
 
 def _not_a_truth(path: Path) -> InputError:
     return InputError(
-        tr("the file does not hold the true depth of a press"),
+        tr("the file does not contain the true depth of a press"),
         where=str(path),
         advice=tr("It needs {keys}; simulate the session again").format(keys=", ".join(KEYS)),
     )

@@ -124,9 +124,11 @@ def judge_press(
     """
     nowhere = Contact(0.0, (math.nan, math.nan))
     if len(frames) < LEAST_FRAMES:
-        return PressJudgement(False, tr("One frame cannot show stillness."), math.nan, nowhere)
+        return PressJudgement(
+            False, tr("More than one frame is needed to detect movement."), math.nan, nowhere
+        )
     if any(f.shape != bare.shape or f.dtype != bare.dtype for f in frames):
-        reason = tr("The camera's image has another size than that of the bare membrane.")
+        reason = tr("The camera image and the image of the bare membrane have different sizes.")
         return PressJudgement(False, reason, math.nan, nowhere)
     # The first and the last too: a slow creep is no movement from one frame to the next.
     pairs = [*pairwise(frames), (frames[0], frames[-1])]
@@ -149,5 +151,7 @@ def _reason(
     if position_px is not None:
         away = math.dist(contact.centre_px, position_px)
         if away > tolerance_px:
-            return tr("It is beside the circle by {px:.0f} pixels: move it there.").format(px=away)
+            return tr("It is {px:.0f} pixels away from the circle: move it to the circle.").format(
+                px=away
+            )
     return ""

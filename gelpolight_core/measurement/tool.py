@@ -104,7 +104,7 @@ def tool_result(
     reason = ""
     if share > FLAGGED_SHARE:
         names = [str(f.name).lower() for f in Flag if int(f) & UNKNOWN and np.any(flags & int(f))]
-        reason = tr("{percent:.0f} % of the places are flagged ({names})").format(
+        reason = tr("{percent:.0f} % of the points are flagged ({names})").format(
             percent=100.0 * share, names=", ".join(names)
         )
     verdict = "doubtful" if reason else "ok"

@@ -164,7 +164,7 @@ def _value(field: Field[Any], value: Any, tool: Any) -> Any:
         raise InputError(
             tr("{key} is {value}").format(key=field.name, value=brief(value)),
             where=tr("measuring tool {name}").format(name=tool),
-            advice=tr("Give lengths in mm as numbers, a place as two of them"),
+            advice=tr("Give lengths in mm as numbers, and a position as two numbers"),
         ) from error
 
 

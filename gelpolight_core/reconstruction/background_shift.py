@@ -143,7 +143,7 @@ def zeroed(
         raise InputError(
             tr("there is no image of the untouched sensor"),
             where=tr("zero"),
-            advice=tr("Take one, with nothing on the sensor"),
+            advice=tr("Capture one, with nothing on the sensor"),
         )
     for frame in frames:
         _refuse_unfit(background_shift(frame, calibration))
@@ -231,7 +231,7 @@ def _judge(
             tr("Contacts on the sensor (0: untouched)"),
             float(touched),
             fail=0.5,
-            advice=tr("Take everything off the sensor, and look again"),
+            advice=tr("Remove everything from the sensor and check again"),
         )
     ]
     if shift_px is not None:
@@ -243,7 +243,10 @@ def _judge(
                 "px",
                 warn=0.5,
                 fail=2.0,
-                advice=tr("Camera and elastomer have moved apart: seat them, or calibrate again"),
+                advice=tr(
+                    "Camera and elastomer have moved against each other: seat them, or "
+                    "calibrate again"
+                ),
             )
         )
     figures += [
@@ -266,7 +269,9 @@ def _judge(
             "%",
             warn=5.0,
             fail=80.0,
-            advice=tr("Set to zero; where it stays, clean the sensor or calibrate again"),
+            advice=tr(
+                "Set to zero; if the difference remains, clean the sensor or calibrate again"
+            ),
         )
     )
     return QualityTable(tuple(figures))

@@ -69,9 +69,9 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     kind, size = frame.dtype.kind, frame.dtype.itemsize
     if size not in BYTES_OF_KIND.get(kind, ()):
         raise InputError(
-            tr("the image holds values of type {kind}").format(kind=frame.dtype),
+            tr("the image contains values of type {kind}").format(kind=frame.dtype),
             where=name or tr("image"),
-            advice=tr("Give 8 or 16 bit numbers without sign, or floats of linear light 0..1"),
+            advice=tr("Use unsigned 8 or 16 bit integers, or floats of linear light 0..1"),
         )
     if kind == "u":
         return frame.astype(frame.dtype.newbyteorder("="), copy=False)
@@ -118,15 +118,16 @@ def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float)
         notes.append(
             tr(
                 "{percent:.0f} % of the contact lies in the shadow of an LED, which the "
-                "paper's model does not know: features on steep walls may come out too low; "
-                "use the full model"
+                "paper's model ignores: heights on steep walls may be too low; use the "
+                "full model"
             ).format(percent=100.0 * share)
         )
     if deepest > FROZEN_SHARE * least_height_mm:
         notes.append(
             tr(
-                "the press is deep for its lights, which the paper's model freezes at the "
-                "undeformed surface: depths may be off by 5 % and more; use the full model"
+                "the press is deep for its lights, and the paper's model uses the light "
+                "of the undeformed surface: depths may be wrong by 5 % or more; use the "
+                "full model"
             )
         )
     return tuple(notes)
@@ -150,8 +151,9 @@ def condition_note(calibration: Calibration, leds_mm: NDArray[np.float64]) -> st
 def unanchored_note() -> str:
     """Return the note on a map without an anchor, all of which may be off by a constant."""
     return tr(
-        "nearly all of the boundary is pressed: depths hold between points of the map only, and "
-        "all may be off by one constant; press so that more of the boundary stays free"
+        "nearly all of the boundary is pressed: depth differences within the map "
+        "are valid, but all depths may be wrong by one constant; press so that "
+        "more of the boundary stays free"
     )
 
 
@@ -160,8 +162,8 @@ def unsolved_note(share: float) -> str:
     if share <= UNSOLVED_SHARE:
         return ""
     return tr(
-        "{percent:.1f} % of the membrane is lit by less than two LEDs or turned away from the "
-        "camera, as on steep walls: features on them may come out too low"
+        "{percent:.1f} % of the membrane is lit by less than two LEDs or faces "
+        "away from the camera, as on steep walls: heights there may be too low"
     ).format(percent=100.0 * share)
 
 
@@ -170,8 +172,9 @@ def small_image_note(pitch_mm: float, decay_mm: float) -> str:
     if pitch_mm <= MOST_PITCH * decay_mm:
         return ""
     return tr(
-        "the image is too small for this membrane: one pixel sees {p:.2f} mm, and the drape falls "
-        "off within {d:.2f} mm; heights may be too low by several percent; use larger images"
+        "the image is too small for this membrane: one pixel covers {p:.2f} mm, "
+        "and the decay length of the drape is {d:.2f} mm; heights may be too low "
+        "by several percent; use larger images"
     ).format(p=pitch_mm, d=decay_mm)
 
 
@@ -228,7 +231,9 @@ def refuse_dark_membrane(calibration: Calibration, *, model: str) -> None:
     share = float(np.count_nonzero(lit)) / max(int(valid.sum()), 1)
     if not share > LEAST_USABLE:
         raise InputError(
-            tr("all three LEDs light {share:.1f} % of the membrane").format(share=100.0 * share),
+            tr("only {share:.1f} % of the membrane is lit by all three LEDs").format(
+                share=100.0 * share
+            ),
             where=calibration.identity,
             advice=tr("Place the LEDs lower, or calibrate again with more light"),
         )

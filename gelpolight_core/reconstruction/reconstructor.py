@@ -439,8 +439,8 @@ def _notes(found: NearLightDepth) -> Notes:
     stopped = "" if found.rounds is None else found.rounds.stopped
     note_of = {
         "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
-        "unsettled": tr("the near-light rounds did not settle: damping did not help"),
-        "grows": tr("the near-light rounds did not settle: the last was undone"),
+        "unsettled": tr("the near-light rounds did not converge: damping did not help"),
+        "grows": tr("the near-light rounds did not converge: the last round was undone"),
     }
     notes = [] if found.boundary.free is None else [free_boundary_note()]
     notes += [unanchored_note()] if found.boundary.level_sd_mm > 0.0 else []
@@ -455,5 +455,5 @@ def _light_step(light: LightGain | None) -> TraceStep:
     if light is None:
         return TraceStep(LIGHT, False, tr("it is as at calibration, or cannot be corrected"))
     shares = ", ".join(f"{share:.4f}" for share in light.share)
-    reason = tr("red, green and blue are {shares} of those at calibration, which is undone")
+    reason = tr("red, green and blue are {shares} of those at calibration, which is corrected")
     return TraceStep(LIGHT, True, reason.format(shares=shares), 0.0)

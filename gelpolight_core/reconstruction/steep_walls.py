@@ -44,7 +44,7 @@ def keep_steep_walls(height_map: HeightMap) -> HeightMap:
     """
     if height_map.normals is None:
         raise InputError(
-            tr("The height map holds no normals"),
+            tr("The height map contains no normals"),
             where=height_map.source or tr("height map"),
             advice=tr("Reconstruct it with normals"),
         )

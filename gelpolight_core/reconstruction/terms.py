@@ -7,34 +7,35 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What the full model reckons with in a frame; by default everything.
+    """The effects that the full model includes in a frame; by default all.
 
-    Leaving a term out shows what it is worth. Terms of the membrane and the LEDs are made at
+    A term is switched off to measure its worth. Terms of the membrane and the LEDs belong to the
     calibration (:class:`~gelpolight_core.calibration.terms.CalibrationTerms`).
 
     Attributes
     ----------
     near_light_rounds : int
-        Rounds at quarter scale in which light, inverse square and lobe are computed again at the
-        depth found, before the round at full scale; 0: the light is frozen at the flat membrane.
+        Rounds at quarter scale, before the round at full scale. Each computes light directions,
+        inverse square law and lobe again at the depth found. 0: they are computed for the flat
+        membrane only.
     ray_true_slopes : bool
-        Slopes are integrated along the refracted rays; else as if all rays ran straight down.
+        Slopes are integrated along the refracted rays; otherwise along parallel rays.
     true_positions : bool
-        The depth is brought to where the rays meet the pressed membrane; else it stays where they
-        met the flat one.
+        Each depth is moved to the point where its ray meets the pressed membrane; otherwise it
+        stays where the ray meets the flat membrane.
     shadows : bool
-        A dark channel is missing information; else its value is believed.
+        A dark channel is left out; otherwise its value is used.
     saturation : bool
-        A saturated channel is missing information; else its value is believed.
+        A saturated channel is left out; otherwise its value is used.
     weights : bool
-        Slopes count as far as they can be trusted; else all alike, by one sine transform, which
-        cannot free the boundary either.
+        Slopes are weighted by their reliability; otherwise all have the same weight, and one sine
+        transform integrates them, with a fixed boundary.
     free_rim : bool
-        The boundary is free where a contact crosses it; else depth 0 is held all around.
+        The boundary is free where a contact crosses it; otherwise the whole boundary is at depth 0.
     denoising : bool
-        Even parts of the image are averaged over a few nodes.
+        Uniform areas of the image are averaged over a few nodes.
     sharpening : bool
-        The blur of the image is undone, to first order.
+        The blur of the image is removed, to second order.
     """
 
     near_light_rounds: int = 2

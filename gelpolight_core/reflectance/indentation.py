@@ -218,7 +218,7 @@ def _judge(
     the brightness over the background's, per channel; `saturated` a share of the contact.
     """
     again = tr("Capture the press again, or leave it out")
-    light = tr("Let the lights warm up and take the background again")
+    light = tr("Let the LEDs warm up and capture the background again")
     radius = contour.circle.radius
     residual = 100.0 * contour.residual_px / radius
     worst_residual = 100.0 * max(LARGEST_RESIDUAL, ALLOWED_RESIDUAL_PX / radius)
@@ -227,7 +227,7 @@ def _judge(
         "edge_residual": tr("Edge off the circle"),
         "centre_sd": tr("Uncertainty of the centre"),
         "axis_ratio": tr("Roundness"),
-        "coverage": tr("Edge seen"),
+        "coverage": tr("Visible share of the edge"),
         "signal_to_noise": tr("Signal to noise"),
         "gain_change": tr("Brightness against the background"),
         "drift": tr("Change far from the contact"),

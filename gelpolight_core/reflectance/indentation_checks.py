@@ -222,7 +222,7 @@ def check_shading(
     if shading.explained < BALL_EXPLAINED:
         _refuse_shape(
             Reason.NOT_A_BALL,
-            tr("a ball's shading explains only {share:.0f} % of what is seen").format(
+            tr("a ball's shading explains only {share:.0f} % of the change in the image").format(
                 share=100.0 * max(shading.explained, 0.0)
             ),
             name,
@@ -241,7 +241,7 @@ def refuse_unfitted(hidden: float, name: str) -> NoReturn:
     """Refuse a disturbance with too few pixels for a fit, because of markers or of its size."""
     if hidden > 0.3:
         _refuse_hidden(hidden, name)
-    _refuse_shape(Reason.TOO_SMALL, tr("what differs is too small for a ball"), name)
+    _refuse_shape(Reason.TOO_SMALL, tr("the changed area is too small for a ball"), name)
 
 
 def _refuse_hidden(hidden: float, name: str) -> NoReturn:
@@ -322,15 +322,15 @@ def check_round(contour: Contour, name: str) -> None:
     """
     radius = contour.circle.radius
     if contour.coverage < LEAST_COVERAGE:
-        _refuse_shape(Reason.NOT_ROUND, tr("no round edge of a contact can be made out"), name)
+        _refuse_shape(Reason.NOT_ROUND, tr("no round contact edge was found"), name)
     if contour.coverage > 0.75 and contour.axis_ratio < _LEAST_AXIS_RATIO:
         _refuse_oval(contour.axis_ratio, name)
     if contour.residual_px > max(LARGEST_RESIDUAL * radius, ALLOWED_RESIDUAL_PX):
         _refuse_shape(
             Reason.NOT_ROUND,
-            tr("the indentation's edge lies {res:.1f} px about a circle of {r:.1f} px").format(
-                res=contour.residual_px, r=radius
-            ),
+            tr(
+                "the edge of the indentation deviates by {res:.1f} px from a circle of {r:.1f} px"
+            ).format(res=contour.residual_px, r=radius),
             name,
         )
     if radius < SMALLEST_RADIUS_PX:
@@ -371,7 +371,7 @@ def check_order(
             Reason.SWAPPED,
             tr("the indentation is in the background, not in the press"),
             where=f"{name}, {background_name}",
-            advice=tr("Swap the two images, or take the background without contact again"),
+            advice=tr("Swap the two images, or capture the background again without contact"),
         )
 
 
@@ -404,7 +404,7 @@ def check_light_change(light_change: float, name: str) -> None:
 def _refuse_oval(axis_ratio: float, name: str) -> NoReturn:
     _refuse_shape(
         Reason.NOT_ROUND,
-        tr("the indentation is not round; its axes are as 1 to {ratio:.2f}").format(
+        tr("the indentation is not round; its axis ratio is 1 to {ratio:.2f}").format(
             ratio=1.0 / max(axis_ratio, 0.01)
         ),
         name,

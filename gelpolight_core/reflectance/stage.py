@@ -137,7 +137,7 @@ def calibrate_reflectance(
     """
     if not presses:
         raise InputError(
-            tr("no ball press is left"),
+            tr("no ball press can be used"),
             where=tr("balls"),
             advice=tr("Press a ball of known radius at several places"),
         )
@@ -176,7 +176,7 @@ def _judge(
             ),
             judge(
                 "lowest_cosine",
-                tr("Lowest cosine that all channels have seen"),
+                tr("Lowest cosine covered by all channels"),
                 float(max(f.coverage[0] for f in fits)),
                 warn=0.4,
                 fail=0.7,

@@ -149,7 +149,7 @@ def fit_channel(cosines: Array, values: Array, *, name: str) -> ChannelFit:
     if monotone[-1] < 1.05 * monotone[0]:
         raise _poor(
             name,
-            tr("the {name} channel does not grow brighter as it faces its light ({n} bins)"),
+            tr("the {name} channel does not become brighter towards its LED ({n} bins)"),
             n=centre.size,
         )
     node_cosines, node_values = _close_ends(centre, monotone)

@@ -132,13 +132,13 @@ def _presses(c: InPlaceCalibration, presses: tuple[FoundPress, ...]) -> Listing:
     heads = (
         tr("image"),
         tr("radius (mm)"),
-        tr("place (mm)"),
+        tr("position (mm)"),
         tr("contact (mm)"),
         tr("normals"),
         tr("height"),
         tr("diameter"),
     )
-    title = tr("Each press beside what the others give")
+    title = tr("Each press compared with the other presses")
     return Listing(title, heads, tuple(rows), (1.6, 0.9, 1.2, 0.9, 0.8, 0.8, 0.8))
 
 

@@ -23,14 +23,14 @@ def stage_intro(key: str) -> str:
         "radiance": tr("Measures the light of each LED on the membrane with a white diffuse board"),
         "reflectance": tr("Measures the reflectance of the membrane with balls of known radius"),
         "factors": tr(
-            "Compares the brightness of the bare membrane with the theory, pixel by pixel"
+            "Compares the brightness of the untouched membrane with the model, pixel by pixel"
         ),
         "joint": tr("Fits LEDs, membrane and balls together to all ball presses"),
         "scale": tr("Size of a camera pixel on the membrane, stated or measured"),
         "balls": tr("Finds the pressed balls, whose slopes are known"),
         "in_place": tr(
-            "Fits slope as a function of the change of colour and of the place. Each press is "
-            "compared with what the other presses give"
+            "Fits the slope as a function of colour change and position. Each press "
+            "is compared with the result of the other presses"
         ),
         "gel": tr("Keeps the slopes of an earlier gel with the background of this one"),
     }
@@ -120,7 +120,7 @@ def _kept_facts(full: FullModel) -> Facts:
         "mirror": tr("from the mirror: refinement did not improve held-out presses"),
     }.get(full.kept, full.kept)
     if full.kept == "mirror" and not _held_out(full):
-        kept = tr("from the mirror: there were too few presses to hold any out")
+        kept = tr("from the mirror: there were too few presses to leave any out")
     return ((tr("LEDs used"), kept),)
 
 

@@ -156,6 +156,8 @@ def limit_text(figure: Judged, expression: str) -> str | float:
     """Return what the chapter has to say of a limit: a number, or words."""
     if expression == "None":
         return NOTHING
+    # A limit that some figures have: the chapter states it, and the text says when it is left out.
+    expression = re.sub(r"^None if .+ else ", "", expression)
     names = vars(importlib.import_module(figure.module.removesuffix(".py").replace("/", ".")))
     try:
         return float(eval(expression, dict(names)))

@@ -49,7 +49,7 @@ def test_the_table_says_what_each_term_is_worth(
     terms = "near_light_0,true_positions,gloss,paper"
     assert main(["ablation", str(small), "-o", str(out), "--terms", terms, "--repeats", "1"]) == 0
     captured = capsys.readouterr()
-    assert "light frozen at the flat membrane" in captured.out
+    assert "light computed for depth 0 only" in captured.out
     assert "%" in captured.err  # progress
     rows = json.loads((out / "ablation.json").read_text())["rows"]
     by_term = {row["left_out"]: row for row in rows}

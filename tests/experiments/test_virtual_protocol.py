@@ -150,7 +150,7 @@ def test_the_command_goes_on_with_a_run_and_reports(
     ("arguments", "summary"),
     [
         (["--sizes", "-1"], "sizes_mm holds -1"),
-        (["--repeats", "0", "--regions", "0"], "nothing is to be pressed"),
+        (["--repeats", "0", "--regions", "0"], "the protocol contains no press"),
         (["--seed", "-1"], "The seed is -1"),
     ],
 )

@@ -113,7 +113,7 @@ def test_where_nothing_is_pressed_nothing_is_solved_whatever_the_exposure(
             known.noisy(known.bare() * np.float32(share))
         )
         assert found.trace is not None
-        assert found.trace.done == (CORRECTION, "looking for a contact")
+        assert found.trace.done == (CORRECTION, "contact detection")
         assert not found.depth_mm.any()
 
 

@@ -66,7 +66,7 @@ def test_without_a_contact_nothing_is_solved_at_any_effort(
     """Another frame than the calibration's, with its own noise."""
     heightmap = Reconstructor(virtual_calibration, effort=effort).depth(shown(BareMembrane()))
     assert heightmap.trace is not None
-    assert heightmap.trace.done == ("looking for a contact",)
+    assert heightmap.trace.done == ("contact detection",)
     assert "integration" in heightmap.trace.left_out
     assert not heightmap.depth_mm.any()
     assert heightmap.normals is not None
@@ -204,7 +204,7 @@ def test_a_trace_says_what_was_done_and_why(
     assert trace is not None
     assert trace.effort == effort
     reasons = {step.name: step.reason for step in trace.steps}
-    assert "of the field" in reasons["looking for a contact"]
+    assert "of the field" in reasons["contact detection"]
     assert reasons["normals"]
     assert all(step.milliseconds is not None for step in trace.steps if step.done)
     numbers = reconstruct.near_light.maps.membrane

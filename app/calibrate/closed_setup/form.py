@@ -89,7 +89,7 @@ class ClosedForm(FormPage):
         balls = QGroupBox(tr("Balls"))
         rows = QFormLayout(balls)
         self.ball = length_box("setup.ball", tr("Default ball diameter"), 0.1, 1000.0)
-        self.ball.setToolTip(tr("Diameter as a caliper measures it; each press can have its own"))
+        self.ball.setToolTip(tr("Diameter measured with a calliper; each press can have its own"))
         rows.addRow(tr("Default diameter"), self.ball)
         return box, balls
 
@@ -147,7 +147,7 @@ def _facts(preset: Preset) -> str:
         text += tr(", with {c:.0f} % of the camera image cut off on each side").format(
             c=100.0 * max(preset.cropped)
         )
-    area = tr("The membrane that is seen is {a:g} x {b:g} mm.").format(
+    area = tr("The visible membrane is {a:g} x {b:g} mm.").format(
         a=preset.working_area_mm[0], b=preset.working_area_mm[1]
     )
     markers = ""

@@ -122,7 +122,7 @@ class SetupForm(FormPage):
         box = QGroupBox(tr("Balls"))
         form = QFormLayout(box)
         self.ball = length_box("setup.ball", tr("Default ball diameter"), 0.1, 1000.0)
-        self.ball.setToolTip(tr("Diameter as a caliper measures it; each press can have its own"))
+        self.ball.setToolTip(tr("Diameter measured with a calliper; each press can have its own"))
         form.addRow(tr("Default diameter"), self.ball)
         return box
 

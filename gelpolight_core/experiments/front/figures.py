@@ -33,10 +33,10 @@ def draw_depth_error(points: Sequence[Point]) -> Drawing:
     """Show the depth error of one sensor against time."""
     return draw(
         tr(
-            "Error of the depth against the time of a frame. A curve joins the image sizes of one "
-            "method. Bars: quartiles over the presses, and from the median to the 95th percentile "
-            "of the time. Black: the front of each size; what lies above and to the right of it "
-            "is beaten in both"
+            "Error of the depth against the time of a frame. A curve joins the image "
+            "sizes of one method. Bars: quartiles over the presses, and from the "
+            "median to the 95th percentile of the time. Black: the front of each "
+            "size; methods above and to the right of it are slower and less accurate"
         ),
         110.0,
         lambda figure: paint_depth_error(figure, points),
@@ -87,8 +87,9 @@ def draw_other_errors(points: Sequence[Point]) -> Drawing:
             _label(axes, label)
 
     caption = tr(
-        "The other errors against time, in the colours of the figure above. The star is the "
-        "paper's own statement, of its real sensor and machine"
+        "The other errors against time, with the colours of the figure above. "
+        "The star shows the values that the paper states for its sensor and "
+        "machine"
     )
     return draw(caption, 75.0, paint)
 

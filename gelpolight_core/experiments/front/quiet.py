@@ -53,11 +53,13 @@ class Machine:
     def text(self) -> str:
         """One sentence for people."""
         if self.others_percent is None:
-            return tr("{n} processors; what else ran is not known").format(n=self.processors)
+            return tr("{n} processors; other running programs are not known").format(
+                n=self.processors
+            )
         text = tr("{n} processors; other programs used {p:.0f} % of one of them").format(
             n=self.processors, p=self.others_percent
         )
-        return text if self.quiet else text + tr(": read times against each other only")
+        return text if self.quiet else text + tr(": compare times with each other only")
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""

@@ -178,12 +178,13 @@ def work_precision_page(
     if integrators:
         sections.append(integrator_section(integrators))
     if rules:
-        title = tr("What is left out, and what that changes")
+        title = tr("Skipped steps and their effect")
         sections.append(Section("rules", title, "", none, (), (), (_rule_listing(rules),)))
     intro = tr(
-        "Run time and error of each method. Times are of whole frames over all presses, methods in "
-        "turn; errors are against a truth that no method knows. The paper states {ms:.0f} ms, "
-        "{size:.0f} % in size and {height:.0f} % in height"
+        "Run time and error of each method. Times are for whole frames over all "
+        "presses, with the methods in turn; errors are differences from the true "
+        "depth, which no method uses. The paper states {ms:.0f} ms, {size:.0f} % "
+        "in size and {height:.0f} % in height"
     ).format(ms=PAPER_MS, size=PAPER_SIZE_PERCENT, height=PAPER_HEIGHT_PERCENT)
     if machine is not None:
         intro += ". " + tr("Measured on {machine}").format(machine=machine.text)

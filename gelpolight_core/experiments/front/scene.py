@@ -75,7 +75,7 @@ class Scene:
         full = self.full.full
         if full is None:
             raise InputError(
-                tr("The calibration holds no background"),
+                tr("The calibration contains no background"),
                 where=self.sensor,
                 advice=tr("Calibrate for the full model"),
             )
@@ -170,7 +170,7 @@ def session_presses(session: Session, names: Sequence[str] = ()) -> list[Press]:
         raise InputError(
             tr("No press of a cylinder or cuboid was found"),
             where=str(folder / "truth.csv"),
-            advice=tr("Use a session that holds such presses and their true depth"),
+            advice=tr("Use a session that contains such presses and their true depth"),
         )
     return found
 

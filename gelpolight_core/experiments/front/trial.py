@@ -115,7 +115,10 @@ def _refuse_other(serial: str, calibration: Calibration, where: str) -> None:
                 one=serial, other=calibration.sensor.serial
             ),
             where=where,
-            advice=tr("Choose presses of this sensor that have a truth, or its own calibration"),
+            advice=tr(
+                "Choose presses of this sensor with known true depth, or the calibration "
+                "of their sensor"
+            ),
         )
 
 

@@ -123,9 +123,9 @@ SURFACES: dict[str, tuple[str, Callable[[Array, Array], tuple[Array, Array, Arra
     "cut": (tr("bump cut by the border"), _cut),
     "holes": (tr("bump with holes in the slopes"), _bump),
     "noise": (tr("bump with noise of 0.02 in the slopes"), _bump),
-    "wedge": (tr("ramp with upright sides"), _wedge),
-    "dome": (tr("half a ball"), _dome),
-    "half_wall": (tr("two levels, a ramp and an upright wall"), _half_wall),
+    "wedge": (tr("ramp with vertical sides"), _wedge),
+    "dome": (tr("hemisphere"), _dome),
+    "half_wall": (tr("two levels, a ramp and a vertical wall"), _half_wall),
 }
 STEEP = ("wedge", "dome", "half_wall")
 """Surfaces with walls that no slope shows."""

@@ -151,8 +151,8 @@ class InPlaceSolver:
         if float(np.median(np.abs(thin).max(axis=2))) <= DIFFERENT:
             return ""
         return tr(
-            "most of the image does not look like this sensor's membrane: another exposure, crop, "
-            "gel or sensor; the depth is not to be trusted"
+            "most of the image does not look like this sensor's membrane: another "
+            "exposure, crop, gel or sensor; the depth is not reliable"
         )
 
     def _deviations(self, frame: Map, depth_mm: Map, slope_x: Map, slope_y: Map) -> dict[str, Map]:

@@ -60,7 +60,7 @@ WHOLE = 0.85
 """A region with this share of the grid is extended to all of it."""
 SAMPLED_BYTES, SOLVED_BYTES, SHOWN_BYTES = 45, 88, 6
 """Bytes that a sampled, a solved and a shown node must read and write once."""
-LOOKING = tr("looking for a contact")
+LOOKING = tr("contact detection")
 COMPARING = tr("resampling and comparing")
 COARSE_ROUNDS = tr("near light, quarter scale")
 INTEGRATION = tr("integration")
@@ -316,7 +316,7 @@ class NearLightSolver:
             if wanted.uncertainty:
                 with record.done(tr("standard deviations"), depth.nbytes) as reason:
                     noise = self._noise(image, solved, wanted.terms)
-                    reason.append(tr("asked for"))
+                    reason.append(tr("requested"))
         if not wanted.normals:
             record.left_out(tr("normals"), tr("not requested"))
         if not wanted.uncertainty:
@@ -355,15 +355,15 @@ class NearLightSolver:
         scale = self.maps.scale(COARSE)
         whole = Region((0, 0), scale.kind.shape)
         if everywhere:
-            record.left_out(LOOKING, tr("the whole field is wanted"))
+            record.left_out(LOOKING, tr("the whole field is requested"))
             return whole
         with record.done(LOOKING, image.raw.nbytes) as reason:
             contact = self._finder(image.linear).find(image.raw, self.workers, image.gain)
             if contact is None:
                 reason.append(
-                    tr("the image is that of the background; visible from {um:.0f} um").format(
-                        um=1e3 * self.visible_mm
-                    )
+                    tr(
+                        "the image equals the background; smallest visible depth {um:.0f} um"
+                    ).format(um=1e3 * self.visible_mm)
                 )
                 return None
             region = padded_region(contact, scale, self._margin_mm)
@@ -379,12 +379,14 @@ class NearLightSolver:
         factor = settings.factor
         found, rounds, start = self._begun(image, region, wanted, record)
         if start.boundary.cut:
-            record.left_out(LOOKING, tr("the contact goes on beyond it: the whole field is solved"))
+            record.left_out(
+                LOOKING, tr("the contact extends beyond the region: the whole field is solved")
+            )
             region = Region((0, 0), self.maps.scale(COARSE).kind.shape)
             found, rounds, start = self._begun(image, region, wanted, record)
         nodes, count = region.nodes * (COARSE // factor) ** 2, len(rounds.changes_mm)
         if count < terms.near_light_rounds:
-            record.left_out(tr("second near-light round"), tr("the press is that shallow"))
+            record.left_out(tr("second near-light round"), tr("the press is shallow"))
         with record.done(LAST_ROUND[factor], nodes * SOLVED_BYTES) as reason:
             weighted = self._solver.last_slopes(region, found, start, settings, terms)
             reason.append(tr("from the depth at quarter scale"))
@@ -395,7 +397,7 @@ class NearLightSolver:
             )
         self._left_out(record, factor, terms)
         if factor == 1 and terms.denoising and found.edge is None:
-            record.left_out(tr("denoising"), tr("the image has next to no noise"))
+            record.left_out(tr("denoising"), tr("the image has almost no noise"))
         if start.boundary.free is None:
             record.left_out(tr("free boundary"), tr("no contact crosses the boundary"))
         return rounds, solved
@@ -416,16 +418,14 @@ class NearLightSolver:
                 terms=terms,
                 gain=image.gain,
             )
-            reason.append(tr("crosstalk and camera response undone on the way"))
+            reason.append(tr("crosstalk and camera response are corrected in the same step"))
         size = terms.near_light_rounds * region.nodes * SOLVED_BYTES
         with record.done(COARSE_ROUNDS, size) as reason:
             rounds, start = self._solver.rounds(region, found, settings, terms)
             count, deepest = len(rounds.changes_mm), float(rounds.depth_mm.max())
             reason.append(tr("rounds: {n}; {d:.2f} mm deep").format(n=count, d=deepest))
             if start.around is not None:
-                reason.append(
-                    tr("{n} more with light from around").format(n=settings.around_rounds)
-                )
+                reason.append(tr("{n} more with interreflection").format(n=settings.around_rounds))
             if start.boundary.free is not None:
                 reason.append(tr("a contact crosses the boundary, which is free there"))
         return found, rounds, start
@@ -434,11 +434,11 @@ class NearLightSolver:
         """Note what the scale, the membrane and the terms leave out."""
         if factor > 1:
             record.left_out(tr("denoising"), tr("averages over 2 x 2 pixels have half the noise"))
-            record.left_out(LAST_ROUND[1], tr("this effort does without it"))
+            record.left_out(LAST_ROUND[1], tr("this effort does not use it"))
         elif not terms.denoising:
-            record.left_out(tr("denoising"), tr("left out by hand"))
+            record.left_out(tr("denoising"), tr("switched off"))
         if self.maps.membrane.interreflection is None:
-            record.left_out(tr("interreflection"), tr("this membrane gives none"))
+            record.left_out(tr("interreflection"), tr("this membrane has none"))
         if self.maps.membrane.gloss is None:
             record.left_out(tr("gloss"), tr("this membrane has none"))
 
