@@ -23,13 +23,13 @@ from app.inspect.quality_panel import QualityPanel
 from app.inspect.section_line import INK, REGION_INK, RegionBox, SectionLine
 from app.inspect.section_panel import SectionPanel
 from app.live.frame_results import Shown, Wanted
-from app.live.height_panel import HeightPanel, extent_of
+from app.live.height_panel import HeightPanel
 from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Jobs
 from app.view2d.cuts import Cut, Section
 from app.view2d.display import Display, display_as_text, display_from_text
-from app.view2d.map_view import MapView
+from app.view2d.map_view import MapView, extent_of
 from app.view2d.quantities import Reference, quantity_names
 from app.view3d.panel import SurfacePanel, view_names
 from app.view3d.surface import SurfaceLine

@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog
 
 from app.calibrate.detection import read_raw
-from app.calibrate.maps import Panel
+from app.calibrate.maps import depth_panel
 from app.calibrate.model import WizardModel
 from app.calibrate.validation.panel import ValidationPanel
 from app.calibrate.validation.trial import KnownObject, Trial, run_trial
@@ -47,7 +47,7 @@ class Validating(QObject):
     Signals
     -------
     tried(object)
-        A Panel with the shaded depth map of a press.
+        A Panel with the height map of a press.
     """
 
     tried = Signal(object)
@@ -207,7 +207,8 @@ class Validating(QObject):
         self._reconstructor, self._trial = reconstructor, (trial, text)
         self._panel.show_work(None)
         self._panel.show_trial(trial)
-        self.tried.emit(Panel(tr("Measured depth"), trial.shaded))
+        panel = depth_panel(tr("Measured depth"), trial.heightmap, trial.measurement.outline_mm)
+        self.tried.emit(panel)
 
     def _refuse(self, sentence: str) -> None:
         self._trial = None
