@@ -1,36 +1,91 @@
-"""Results of a stage as images, side by side."""
+"""Results of a stage as images, side by side, with axes and colour bars."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QImage, QPixmap, QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
 
+from app.view2d import shading
+from app.view2d.display import SURROUND, Display, colour_table
+from app.view2d.map_image import map_image
+from app.view2d.map_view import Extent, Grid, MapView, extent_of
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold
 from app.widgets.naming import named
+from app.widgets.units import per_mm, unit_word
+from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.translation import tr
 
 Rgb = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
+class Scale:
+    """What the colours of an image mean.
+
+    Attributes
+    ----------
+    colours : str
+        Name of the colour map.
+    low, high : float
+        Values of the first and the last colour.
+    unit : str
+        Of the values times `factor`.
+    factor : float
+        See `unit`.
+    """
+
+    colours: str
+    low: float
+    high: float
+    unit: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """One image (rows, columns, 3) uint8 with a title and a caption."""
+    """One image with a title and a caption.
+
+    Attributes
+    ----------
+    title : str
+        Above the image.
+    rgb : (rows, columns, 3) uint8
+        The image.
+    extent : (left, top, right, bottom)
+        Its outer edges.
+    in_mm : bool
+        Whether the extent is in mm on the membrane, or in pixels of the camera.
+    caption : str
+        Below the image.
+    scale : Scale or None
+        What the colours mean; None for a photograph.
+    outline_mm : (N, 2) or None
+        Closed line to draw.
+    """
 
     title: str
     rgb: Rgb
+    extent: Extent
+    in_mm: bool = True
     caption: str = ""
+    scale: Scale | None = None
+    outline_mm: NDArray[np.float64] | None = None
 
 
 def three_maps(
-    maps: NDArray[np.float32], known: NDArray[np.bool_], caption: str
+    maps: NDArray[np.float32],
+    known: NDArray[np.bool_],
+    grid: Grid,
+    caption: str,
+    *,
+    unit: str = "",
+    factor: float = 1.0,
 ) -> tuple[Panel, ...]:
     """Return one image for each LED.
 
@@ -40,21 +95,37 @@ def three_maps(
         A value for each node and LED.
     known : (rows, columns) bool
         Where the values are valid.
+    grid : Grid
+        Positions of the nodes.
     caption : str
-        Text with the fields ``low`` and ``high``.
+        The quantity.
+    unit, factor : optional
+        Unit of the values times the factor.
     """
     panels, channels = [], (tr("Red LED"), tr("Green LED"), tr("Blue LED"))
+    colours = Display().colours
+    unknown = np.asarray(~known, np.uint8)
     for k in range(3):
         inside = maps[..., k][known]
         if inside.size == 0:
             continue
         low, high = (float(v) for v in np.percentile(inside, [0.5, 99.5]))
-        scaled = np.clip((maps[..., k] - low) / max(high - low, 1e-6), 0.0, 1.0)
-        image = cv2.applyColorMap((255.0 * scaled).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
-        image[~known] = 128
-        rgb = np.ascontiguousarray(image[..., ::-1])
-        panels.append(Panel(channels[k], rgb, caption.format(low=low, high=high)))
+        values = np.ascontiguousarray(maps[..., k])
+        rgb = shading.coloured(values, colour_table(colours), low, high)
+        rgb = shading.outside_filled(rgb, unknown, SURROUND)
+        scale = Scale(colours, low, high, unit, factor)
+        panels.append(Panel(channels[k], rgb, extent_of(grid), caption=caption, scale=scale))
     return tuple(panels)
+
+
+def depth_panel(
+    title: str, heightmap: HeightMap, outline_mm: NDArray[np.float64] | None = None
+) -> Panel:
+    """Return a height map in colours, with the outline of a measured object."""
+    display = Display()
+    shown = map_image(heightmap, display)
+    scale = Scale(display.colours, *shown.range_mm, unit_word(), per_mm())
+    return Panel(title, shown.rgb, extent_of(heightmap), scale=scale, outline_mm=outline_mm)
 
 
 class MapsView(QWidget):
@@ -104,46 +175,23 @@ class _PanelView(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(4, 4, 4, 4)
         self._title, self._caption = PlainLabel(), PlainLabel()
-        self._image = named(PlainLabel(), name, tr("Result"))
-        self._image.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._image.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
-        self._image.setMinimumSize(120, 90)
+        self._map = MapView(name, tr("Result"))
         make_bold(self._title)
         for label in (self._title, self._caption):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
             label.setWordWrap(True)
-        # The texts stay close to the image, whose height depends on its width.
-        column.addStretch(1)
         column.addWidget(self._title)
-        column.addWidget(self._image, 1000)
+        column.addWidget(self._map, 1)
         column.addWidget(self._caption)
-        column.addStretch(1)
-        self._pixmap = QPixmap()
 
     def show_panel(self, panel: Panel) -> None:
-        rows, columns = panel.rgb.shape[:2]
-        image = QImage(panel.rgb.data, columns, rows, 3 * columns, QImage.Format.Format_RGB888)
-        self._pixmap = QPixmap.fromImage(image)
         self._title.setText(panel.title)
         self._caption.setText(panel.caption)
-        self._image.setAccessibleName(f"{panel.title}. {panel.caption}")
-        self._fit()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        """Show the image at the new size."""
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        if self._pixmap.isNull():
-            return
-        around = self.layout().contentsMargins()
-        wide = self.width() - around.left() - around.right()
-        words = sum(max(w.heightForWidth(wide), 0) for w in (self._title, self._caption))
-        gaps = around.top() + around.bottom() + 4 * self.layout().spacing()
-        room = QSize(wide, self.height() - words - gaps).expandedTo(self._image.minimumSize())
-        shown = self._pixmap.scaled(
-            room, Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
-        )
-        self._image.setMaximumHeight(max(shown.height(), self._image.minimumHeight()))
-        self._image.setPixmap(shown)
+        self._caption.setVisible(bool(panel.caption))
+        self._map.setAccessibleName(f"{panel.title}. {panel.caption}")
+        self._map.set_image(panel.rgb, panel.extent, in_mm=panel.in_mm)
+        self._map.show_outline(panel.outline_mm)
+        self._map.bar.setVisible(panel.scale is not None)
+        if panel.scale is not None:
+            s = panel.scale
+            self._map.show_colours(s.colours, s.low, s.high, s.unit, factor=s.factor)

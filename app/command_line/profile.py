@@ -9,7 +9,7 @@ from app.command_line.common import numbers, points, refuse_overwriting
 from app.command_line.reconstructing import add_model, load_reconstructor, read_frame
 from app.command_line.terminal import say
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.io.atomic import refuse_unwritable
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.translation import tr
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     frame = read_frame(options.image, reconstructor)
     heightmap = reconstructor.depth(frame, name=options.image.name, normals=False, uncertainty=True)
     profile = take_profile(heightmap, start, end, width_mm=options.width)
-    write_profile(profile, options.output)
+    write_profiles({1: profile}, options.output)
     say(
         tr("{n} points over {length:.3f} mm saved to {path}").format(
             n=profile.along_mm.size, length=profile.along_mm[-1], path=options.output

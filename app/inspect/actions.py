@@ -26,7 +26,7 @@ from app.view3d.saving import Player, ViewSaving
 from app.view3d.surface import Surface
 from app.widgets.actions import make_action
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.export.raster import read_npz
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.map_processing import difference
@@ -73,7 +73,7 @@ class FileActions(QObject):
         )  # fmt: skip
         self.profile_action = make_action(
             owner, "inspect.save_profile", tr("Profile…"), self.save_profile,
-            tip=tr("Save the profile of the cross-section as a table (CSV)"),
+            tip=tr("Save the profiles of all section lines as a table (CSV)"),
         )  # fmt: skip
         self.saving = ViewSaving(
             views.surface, owner, settings=context.settings, player=self._player
@@ -141,21 +141,22 @@ class FileActions(QObject):
         )
 
     def save_profile(self) -> None:
-        """Ask for a file, and write the profile as a table."""
-        profile = self._views.section.cut.profile
-        if profile is None:
+        """Ask for a file, and write the profiles of all lines as a table."""
+        profiles = self._views.section.cut.profiles
+        if not profiles:
             self._report(tr("There is no profile yet."), "warn")
             return
         last = self._depth.last
         processed = last is not None and bool(last.processed)
-        file = "profile-processed.csv" if processed else "profile.csv"
+        name = "profiles" if len(profiles) > 1 else "profile"
+        file = f"{name}-processed.csv" if processed else f"{name}.csv"
         proposed = self._context.settings.folder("table") / file
         chosen, _ = QFileDialog.getSaveFileName(
-            self._owner, tr("Save the profile"), str(proposed), tr("Table (*.csv)")
+            self._owner, tr("Save the profiles"), str(proposed), tr("Table (*.csv)")
         )
         if chosen:
             self._context.settings.keep_folder("table", Path(chosen).parent)
-            self._write(Path(chosen), lambda path: write_profile(profile, path))
+            self._write(Path(chosen), lambda path: write_profiles(profiles, path))
 
     # The 3D view
 

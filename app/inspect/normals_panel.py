@@ -6,8 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.live.frame_results import Shown
-from app.live.height_panel import extent_of
-from app.view2d.map_view import MapView
+from app.view2d.map_view import MapView, extent_of
 from app.view2d.quantities import STEEPEST_DEG
 from app.widgets.inputs import ComboBox
 from app.widgets.naming import named

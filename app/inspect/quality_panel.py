@@ -7,9 +7,8 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.live.frame_results import Shown
-from app.live.height_panel import extent_of
 from app.view2d.map_point import flag_words
-from app.view2d.map_view import MapView
+from app.view2d.map_view import MapView, extent_of
 from app.view2d.quantities import FLAG_COLOURS
 from app.widgets.inputs import ComboBox
 from app.widgets.label import MarkupLabel, escaped

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.inspect.line_choice import LineChoice
 from app.view2d.cuts import Cut, Section
 from app.view2d.profile_plot import ProfilePlot
 from app.widgets.inputs import ComboBox, DoubleSpinBox
@@ -34,14 +35,14 @@ CUTOFFS_MM = (0.25, 0.8, 2.5)
 
 
 class SectionPanel(QWidget):
-    """Shows the profile with two ranges to compare, and the level of the width.
+    """Shows the profiles, with two ranges to compare, and the level of the width.
 
     Signals
     -------
     changed()
         A range, the width, the level, or whether the rectangle is measured has changed.
     save_wanted()
-        The user wants to save the profile.
+        The user wants to save the profiles.
     """
 
     changed = Signal()
@@ -53,6 +54,7 @@ class SectionPanel(QWidget):
         self._length = 12.0
         self.cut = Cut()
         self._make_plot()
+        self.choice = LineChoice()
         self._width = named(
             DoubleSpinBox(), "inspect.section.width", tr("Width"),
             tr("Depth is averaged over this width across the line"),
@@ -70,8 +72,8 @@ class SectionPanel(QWidget):
         self._make_level()
         self._make_cutoff()
         save = named(
-            QPushButton(tr("Save…")), "inspect.section.save", tr("Save the profile"),
-            tr("Save as a table (CSV)"),
+            QPushButton(tr("Save…")), "inspect.section.save", tr("Save the profiles"),
+            tr("Save all lines as a table (CSV)"),
         )  # fmt: skip
         save.clicked.connect(self.save_wanted)
         self._figures = named(MarkupLabel(), "inspect.section.figures", tr("Measurements"))
@@ -87,7 +89,7 @@ class SectionPanel(QWidget):
         last.addWidget(self._region, 1)
         last.addWidget(save)
         side = QVBoxLayout()
-        for widget in (self._width, self._level, self._cutoff):
+        for widget in (self.choice, self._width, self._level, self._cutoff):
             widget.setFixedWidth(SIDE_WIDTH)
             side.addWidget(widget)
         side.addLayout(last)
@@ -178,7 +180,7 @@ class SectionPanel(QWidget):
         self.cut = cut
         if cut.profile is not None:
             self._follow_length(float(cut.profile.along_mm[-1]))
-        self._plot.show_profile(cut.profile)
+        self._plot.show_profiles(cut.profiles, cut.chosen)
         self._plot.show_width(cut.width_ends)
         self._figures.setText(
             "<br>".join([*figure_lines(cut.figures), *map(escaped, cut.sentences)])
@@ -195,7 +197,6 @@ class SectionPanel(QWidget):
             item.setRegion([low * length, high * length])
             item.setBounds([0.0, length])
             item.blockSignals(False)
-        self._plot.show_length(length)
 
 
 def figure_lines(figures: Sequence[Measured]) -> list[str]:

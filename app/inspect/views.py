@@ -20,16 +20,17 @@ from app.inspect.level_points import LevelPoints
 from app.inspect.normals_panel import NormalsPanel
 from app.inspect.processing_panel import ProcessingPanel
 from app.inspect.quality_panel import QualityPanel
-from app.inspect.section_line import INK, REGION_INK, RegionBox, SectionLine
+from app.inspect.section_line import REGION_INK, RegionBox, SectionLines
 from app.inspect.section_panel import SectionPanel
 from app.live.frame_results import Shown, Wanted
-from app.live.height_panel import HeightPanel, extent_of
+from app.live.height_panel import HeightPanel
 from app.live.image_view import ImageView
 from app.live.overlay import Marker, Overlay
 from app.services.jobs import Jobs
 from app.view2d.cuts import Cut, Section
 from app.view2d.display import Display, display_as_text, display_from_text
-from app.view2d.map_view import MapView
+from app.view2d.map_view import MapView, extent_of
+from app.view2d.profile_plot import line_colour
 from app.view2d.quantities import Reference, quantity_names
 from app.view3d.panel import SurfacePanel, view_names
 from app.view3d.surface import SurfaceLine
@@ -76,7 +77,7 @@ class Views(QMainWindow):
         self.quality = QualityPanel()
         self.camera = ImageView()
         self.section = SectionPanel()
-        self.line, self.region = SectionLine(self.height.map), RegionBox(self.height.map)
+        self.lines, self.region = SectionLines(self.height.map), RegionBox(self.height.map)
         self.display = DisplayPanel()
         self.processing = ProcessingPanel()
         self.level_points = LevelPoints(self.height.map)
@@ -176,7 +177,11 @@ class Views(QMainWindow):
         self.quality.chosen.connect(self.wanted_changed)
         self.normals.chosen.connect(self.wanted_changed)
         self.processing.changed.connect(self._on_section)
-        for part in (self.line, self.region, self.level_points):
+        self.section.choice.add_wanted.connect(self.lines.add)
+        self.section.choice.remove_wanted.connect(self.lines.remove)
+        self.section.choice.chosen.connect(self.lines.choose)
+        self.lines.changed.connect(self._on_section)
+        for part in (self.lines, self.region, self.level_points):
             part.moved.connect(self._lay_lines)
             part.moved.connect(self.wanted_changed)
         self.section.changed.connect(self._on_section)
@@ -211,10 +216,17 @@ class Views(QMainWindow):
         )
 
     def _section(self) -> Section:
-        start, end = self.line.ends_mm
         first, second = self.section.ranges
-        panel = self.section
-        return Section(start, end, panel.width_mm, first, second, panel.level_mm, panel.cutoff_mm)
+        panel, lines = self.section, self.lines
+        return Section(
+            tuple(lines),
+            lines.chosen,
+            panel.width_mm,
+            first,
+            second,
+            panel.level_mm,
+            panel.cutoff_mm,
+        )
 
     def _measures_region(self) -> bool:
         return self._visible["section"] and self.section.has_region
@@ -333,8 +345,9 @@ class Views(QMainWindow):
             self.wanted_changed.emit()
 
     def _on_section(self) -> None:
-        self.line.show(self._visible["section"] and self._has_depth)
-        self.line.set_width(self.section.width_mm)
+        self.lines.show(self._visible["section"] and self._has_depth)
+        self.lines.set_width(self.section.width_mm)
+        self.section.choice.show_lines(self.lines)
         level = self.processing.level
         region = self._measures_region() or level == "rectangle"
         self.region.show(region and self._has_depth)
@@ -343,10 +356,13 @@ class Views(QMainWindow):
         self.wanted_changed.emit()
 
     def _lay_lines(self) -> None:
-        """Show the section line on the surface."""
+        """Show the section lines on the surface."""
         lines = []
         if self._visible["section"]:
-            lines.append(SurfaceLine(self.line.ends_mm, INK))
+            lines += [
+                SurfaceLine((line.start_mm, line.end_mm), line_colour(line.number))
+                for line in self.lines
+            ]
         if self._measures_region():
             corners = self.region.rectangle.outline_mm
             lines.append(SurfaceLine(tuple((float(x), float(y)) for x, y in corners), REGION_INK))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QComboBox, QWidget
 
-from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.live.advice import Known
 from app.services.jobs import Job, Jobs
@@ -93,7 +92,6 @@ class CalibrationChoice(QObject):
             self._context.toasts.show(str(error), "fail")
             self.entries = ()
         self._box.show_entries(self.entries)
-        show_in_use(self._context, self.entries)
         used = next((e for e in self.entries if e.in_use and e.summary is not None), None)
         state = () if used is None or used.summary is None else (used.path, used.summary.identity)
         if state == self._state:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from app.live.frame_results import Shown
 from app.view2d.colour_bar import depth_counts
 from app.view2d.display import LIMITS_MM
-from app.view2d.map_view import MapView
+from app.view2d.map_view import MapView, extent_of
 from app.widgets.naming import named
 from app.widgets.units import per_mm, unit_word
 from gelpolight_core.reconstruction.height_map import HeightMap
@@ -79,14 +79,3 @@ class HeightPanel(QWidget):
         if histogram:
             self._since_histogram.start()
             self.map.bar.show_histogram(depth_counts(heightmap, range_mm))
-
-
-def extent_of(heightmap: HeightMap) -> tuple[float, float, float, float]:
-    """Return (left, top, right, bottom) of the outer edges of the grid's cells, mm."""
-    half = 0.5 * heightmap.pitch_mm
-    return (
-        float(heightmap.x_mm[0]) - half,
-        float(heightmap.y_mm[0]) - half,
-        float(heightmap.x_mm[-1]) + half,
-        float(heightmap.y_mm[-1]) + half,
-    )

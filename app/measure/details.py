@@ -157,10 +157,9 @@ class Details(QTabWidget):
                 self.show_held()
         profile = found.profile if isinstance(found, ToolResult) else self._cut(tool)
         self.section.setCurrentWidget(self._words if profile is None else self.plot)
-        self.plot.show_profile(profile)
+        self.plot.show_profiles({} if profile is None else {1: profile})
         if profile is None:
             return
-        self.plot.show_length(float(profile.along_mm[-1]))
         width = None
         if isinstance(found, ToolResult) and isinstance(found.tool, ProfileWidth):
             start = np.array(profile.start_mm)

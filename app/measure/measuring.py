@@ -15,10 +15,10 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from app.measure.map_image import MapImage, map_image
 from app.measure.sheet import Sheet
 from app.sources.source import Frame
 from app.view2d.display import Display
+from app.view2d.map_image import MapImage, map_image
 from gelpolight_core.errors import InputError
 from gelpolight_core.image.linear import LinearImage
 from gelpolight_core.image.response import CameraResponse

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import all_pages
 from app.sensors.calibration_actions import CalibrationActions
@@ -266,7 +265,6 @@ class SensorsPage(QWidget):
         sessions = self._library.sessions()
         self._sessions.set_entries(sessions)
         self._stack.setCurrentIndex(1 if entries or sessions else 0)
-        show_in_use(self._context, entries)
         self.trash.setEnabled(bool(self._library.removals()))
         if self._trash is not None:
             self._trash.refresh()

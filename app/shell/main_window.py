@@ -28,6 +28,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.context.calibration_status import show_in_use
 from app.context.context import AppContext
 from app.context.pages import PageEntry, all_pages
 from app.services.dropping import DESCRIPTION, dropped_paths, is_session, sort_dropped
@@ -111,6 +112,7 @@ class MainWindow(QMainWindow):
         requests.new_sensor.connect(self.begin_new_sensor)
         requests.demo.connect(context.source.choose_virtual_sensor)
         requests.begin_demo.connect(self.begin_demo)
+        requests.calibrations_changed.connect(self._show_in_use)
         context.source.changed.connect(self._remember_source)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._follow_desktop)
         self._tidy = QTimer(self)
@@ -209,10 +211,14 @@ class MainWindow(QMainWindow):
             return
         _call(before, "leave")
         self._stack.setCurrentWidget(after)
+        self._show_in_use()  # other programs may have changed the workspace
         _call(after, "enter")
         # Changing pages often does not postpone it.
         if not 0 <= self._tidy.remainingTime() <= TIDY_MS:
             self._tidy.start(TIDY_MS)
+
+    def _show_in_use(self) -> None:
+        show_in_use(self.context)
 
     def _give_back(self) -> None:
         give_back()

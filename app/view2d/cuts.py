@@ -1,8 +1,9 @@
-"""Measurements along the section line and in the rectangle on the height map."""
+"""Measurements along the section lines and in the rectangle on the height map."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from gelpolight_core.errors import InputError
 from gelpolight_core.measurement.area import Rectangle
@@ -24,15 +25,34 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
-    """A line over the height map, and two ranges of it that are compared.
+class Line:
+    """A line over the height map.
 
     Attributes
     ----------
     start_mm, end_mm : (x, y)
-        Ends of the line.
+        Its ends.
+    number : int
+        Its number, which gives it its colour.
+    """
+
+    start_mm: Point = (-6.0, 0.0)
+    end_mm: Point = (6.0, 0.0)
+    number: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Lines over the height map, and two ranges of one of them that are compared.
+
+    Attributes
+    ----------
+    lines : tuple of Line
+        All lines.
+    chosen : int
+        Number of the line that is measured.
     width_mm : float
-        Depth is averaged over this width across the line.
+        Depth is averaged over this width across each line.
     first, second : (from, to)
         Ranges as shares of the line's length.
     level_mm : float or None
@@ -41,8 +61,8 @@ class Section:
         Cut-off of the roughness of the line. None: it is not measured.
     """
 
-    start_mm: Point = (-6.0, 0.0)
-    end_mm: Point = (6.0, 0.0)
+    lines: tuple[Line, ...] = (Line(),)
+    chosen: int = 1
     width_mm: float = 0.2
     first: Point = (0.02, 0.14)
     second: Point = (0.44, 0.56)
@@ -56,33 +76,44 @@ class Cut:
 
     Attributes
     ----------
-    profile : Profile or None
-        None if there is none.
+    profiles : mapping of int to Profile
+        The profile of each line by its number, except of those that could not be taken.
+    chosen : int
+        Number of the line that is measured.
     figures : tuple of Measured
-        Of the profile, then of the rectangle.
+        Of the chosen profile, then of the rectangle.
     sentences : tuple of str
         Why something could not be measured.
     width_ends : (left, right, level) or None
         Ends of the width: two positions along the line, and their depth; mm.
     """
 
-    profile: Profile | None = None
+    profiles: Mapping[int, Profile] = field(default_factory=dict)
+    chosen: int = 1
     figures: tuple[Measured, ...] = ()
     sentences: tuple[str, ...] = ()
     width_ends: tuple[float, float, float] | None = None
 
+    @property
+    def profile(self) -> Profile | None:
+        """The profile of the chosen line. None if there is none."""
+        return self.profiles.get(self.chosen)
 
-def cut(heightmap: HeightMap, section: Section | None, region: Rectangle | None) -> Cut:
-    """Measure along a line and in a rectangle. None: not needed."""
-    profile, ends, figures, sentences = None, None, [], []
-    if section is not None:
+
+def cut(heightmap: HeightMap, section: Section, region: Rectangle | None) -> Cut:
+    """Take the profile of each line, and measure along the chosen one and in a rectangle."""
+    ends, figures, sentences = None, [], []
+    profiles: dict[int, Profile] = {}
+    for line in section.lines:
         try:
-            profile = take_profile(
-                heightmap, section.start_mm, section.end_mm, width_mm=section.width_mm
+            profiles[line.number] = take_profile(
+                heightmap, line.start_mm, line.end_mm, width_mm=section.width_mm
             )
         except InputError as error:
-            sentences.append(str(error))
-    if section is not None and profile is not None:
+            if line.number == section.chosen:
+                sentences.append(str(error))
+    profile = profiles.get(section.chosen)
+    if profile is not None:
         length = float(profile.along_mm[-1])
         first = (length * section.first[0], length * section.first[1])
         second = (length * section.second[0], length * section.second[1])
@@ -109,4 +140,4 @@ def cut(heightmap: HeightMap, section: Section | None, region: Rectangle | None)
             figures.extend(roughness(heightmap, region).figures)
         except InputError as error:
             sentences.append(error.found)
-    return Cut(profile, tuple(figures), tuple(dict.fromkeys(sentences)), ends)
+    return Cut(profiles, section.chosen, tuple(figures), tuple(dict.fromkeys(sentences)), ends)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pyqtgraph as pg
@@ -29,8 +29,34 @@ SCALE_SHARE = 0.25
 """Longest scale bar, of the view's width."""
 
 
+Extent = tuple[float, float, float, float]
+"""Outer edges of an image: (left, top, right, bottom)."""
+
+
+class Grid(Protocol):
+    """A regular grid on the membrane: a height map, or the grid of a calibration."""
+
+    @property
+    def x_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def y_mm(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def pitch_mm(self) -> float: ...  # noqa: D102
+
+
+def extent_of(grid: Grid) -> Extent:
+    """Return (left, top, right, bottom) of the outer edges of the grid's cells, mm."""
+    half = 0.5 * grid.pitch_mm
+    return (
+        float(grid.x_mm[0]) - half,
+        float(grid.y_mm[0]) - half,
+        float(grid.x_mm[-1]) + half,
+        float(grid.y_mm[-1]) + half,
+    )
+
+
 class MapView(pg.GraphicsView):  # type: ignore[misc]
-    """Shows an image over an extent in mm, x right and y down, in the sensor frame.
+    """Shows an image over an extent, x right and y down, in mm of the sensor frame or in pixels.
 
     Parameters
     ----------
@@ -83,6 +109,9 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         self.box.addItem(self._image, ignoreBounds=True)
         self._lines = self._make_cursor()
         self._scale = _RoundScaleBar(self.box)
+        self._outline = pg.PlotCurveItem(pen=pg.mkPen(CURSOR, width=2))
+        self.box.addItem(self._outline, ignoreBounds=True)
+        self._in_mm = True
         self._unit = pg.LabelItem()
         self._lay_out()
         self._words = self._make_words()
@@ -136,21 +165,39 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
         self.scene().sigMouseMoved.connect(self._on_pointer)
         self.scene().sigMouseClicked.connect(self._on_click)
 
-    def set_image(self, rgb: NDArray[np.uint8], extent_mm: tuple[float, ...]) -> None:
-        """Show an image over (left, top, right, bottom)."""
-        left, top, right, bottom = extent_mm
-        extent = QRectF(left, top, right - left, bottom - top)
+    def set_image(self, rgb: NDArray[np.uint8], extent: Extent, *, in_mm: bool = True) -> None:
+        """Show an image over an extent in mm, or in pixels of the camera image."""
+        left, top, right, bottom = extent
+        if in_mm != self._in_mm:
+            self._in_mm = in_mm
+            self._apply_theme()
+            self._show_scales(self.has_image)
+        area = QRectF(left, top, right - left, bottom - top)
         self._image.setImage(rgb, autoLevels=False)
         self.shown_images += 1
-        if self._image.boundingRect().size() != extent.size() or extent != self._extent:
-            self._image.setRect(extent)
-        if extent != self._extent:
-            self._extent = extent
+        if self._image.boundingRect().size() != area.size() or area != self._extent:
+            self._image.setRect(area)
+        if area != self._extent:
+            self._extent = area
             self._words.hide()
             self._show_scales(True)
-            reach = REACH_MM + max(extent.width(), extent.height())
-            self.box.setLimits(minXRange=0.2, xMin=-reach, xMax=reach, yMin=-reach, yMax=reach)
+            beyond = REACH_MM + max(area.width(), area.height())
+            reach = area.adjusted(-beyond, -beyond, beyond, beyond)
+            self.box.setLimits(
+                minXRange=0.2,
+                xMin=reach.left(),
+                xMax=reach.right(),
+                yMin=reach.top(),
+                yMax=reach.bottom(),
+            )
             self.fit()
+
+    def show_outline(self, outline: NDArray[np.float64] | None) -> None:
+        """Draw a closed line (N, 2) over the image. None: no line."""
+        if outline is None:
+            self._outline.clear()
+        else:
+            self._outline.setData(*np.vstack([outline, outline[:1]]).T)
 
     def show_colours(
         self, colours: str, low: float, high: float, unit: str, *, factor: float = 1.0
@@ -214,11 +261,12 @@ class MapView(pg.GraphicsView):  # type: ignore[misc]
             axis.setPen(theme.colour("muted"))
             axis.setTextPen(theme.colour("text"))
             axis.setStyle(tickFont=font)
-        self._unit.setText(tr("mm"), color=theme.colour("text"), size=f"{font.pointSize()}pt")
+        unit = tr("mm") if self._in_mm else tr("px")
+        self._unit.setText(unit, color=theme.colour("text"), size=f"{font.pointSize()}pt")
         self.bar.apply_theme(font)
 
     def _show_scales(self, on: bool) -> None:
-        self._scale.setVisible(on)
+        self._scale.setVisible(on and self._in_mm)
         roomy = min(self.width(), self.height()) >= ROOMY_PX
         for side in ("left", "bottom"):
             self._plot.showAxis(side, on and roomy)

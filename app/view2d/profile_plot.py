@@ -1,6 +1,8 @@
-"""Depth along a line, with the level and the ends of the measured width."""
+"""Depth along one or more lines, with the level and the ends of the measured width."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 import pyqtgraph as pg
@@ -13,13 +15,19 @@ from app.widgets.units import length_unit, per_mm, unit_word
 from gelpolight_core.measurement.profile import Profile
 from gelpolight_core.translation import tr
 
-CURVE = "#d6249f"
+LINE_COLOURS = "#e0309f", "#2f95e8", "#d63d43", "#14958f", "#a07cf0", "#868d96"
+"""Of the lines by their number, none like the level, for light and dark surroundings."""
 LEVEL = "#d97a00"
 LEAST_SPAN_MM = 0.05
 
 
+def line_colour(number: int) -> str:
+    """Return the colour of a line and of its curve. Numbers begin with 1."""
+    return LINE_COLOURS[(number - 1) % len(LINE_COLOURS)]
+
+
 class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
-    """Shows a profile.
+    """Shows profiles, each in the colour of its line.
 
     Signals
     -------
@@ -40,7 +48,7 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         self.showGrid(x=True, y=True, alpha=0.2)
         self.hideButtons()
         self.setMouseEnabled(x=False, y=False)
-        self._curve = self.plot(pen=pg.mkPen(CURVE, width=2))
+        self._curves: dict[int, pg.PlotDataItem] = {}
         dashed = pg.mkPen(LEVEL, width=1.5, style=Qt.PenStyle.DashLine)
         self._level = pg.InfiniteLine(angle=0, pen=dashed, hoverPen=pg.mkPen(LEVEL, width=3))
         self._level.sigDragged.connect(lambda line: self.level_dragged.emit(float(line.value())))
@@ -56,19 +64,23 @@ class ProfilePlot(pg.PlotWidget):  # type: ignore[misc]
         """Make the level draggable."""
         self._level.setMovable(True)
 
-    def show_profile(self, profile: Profile | None) -> None:
-        """Show a profile. None: there is none."""
-        if profile is None:
-            self._curve.setData([], [])
+    def show_profiles(self, profiles: Mapping[int, Profile], chosen: int = 1) -> None:
+        """Show profiles by the numbers of their lines; the chosen one is thicker."""
+        for number in set(self._curves) - set(profiles):
+            self.removeItem(self._curves.pop(number))
+        if chosen not in profiles:
             self.show_width(None)
+        if not profiles:
             return
         self._take_unit()
-        self._curve.setData(profile.along_mm, profile.depth_mm)
-        self._fit(profile.depth_mm)
-
-    def show_length(self, length_mm: float) -> None:
-        """Show this length of the line."""
-        self.setXRange(0.0, length_mm, padding=0.02)
+        for number, profile in profiles.items():
+            if number not in self._curves:
+                self._curves[number] = self.plot()
+            curve = self._curves[number]
+            curve.setPen(pg.mkPen(line_colour(number), width=2.5 if number == chosen else 1.2))
+            curve.setData(profile.along_mm, profile.depth_mm)
+        self.setXRange(0.0, max(p.along_mm[-1] for p in profiles.values()), padding=0.02)
+        self._fit(np.concatenate([profile.depth_mm for profile in profiles.values()]))
 
     def show_width(self, ends: tuple[float, float, float] | None) -> None:
         """Show the ends of a width: two positions along the line and their depth. None: hidden."""

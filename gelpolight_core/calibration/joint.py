@@ -66,6 +66,8 @@ class JointResult:
         Robust relative misfit over all pixels.
     ball_misfits : (balls,)
         The same for each press; NaN if it has no usable pixels.
+    ball_names : tuple of str
+        Names of these presses.
     held_out : tuple of 2 floats
         Mean robust loss on held-out presses: with the LEDs from the mirror, and with refined ones.
     kept : str
@@ -88,6 +90,7 @@ class JointResult:
     balls: tuple[BallPose, ...]
     misfit: float
     ball_misfits: Array
+    ball_names: tuple[str, ...]
     held_out: tuple[float, float]
     kept: str
     membrane_held_out: tuple[float, float]
@@ -157,6 +160,7 @@ def refine_jointly(
         _balls_of(x, pixels),
         solved.misfit,
         solved.ball_misfits,
+        tuple(press.name for press in presses),
         held_out,
         "refined" if refine else "mirror",
         membranes,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,7 +26,6 @@ from gelpolight_core.quality import Figure, QualityTable, judge
 from gelpolight_core.radiance.whiteboard import RadianceResult
 from gelpolight_core.reflectance.agreement import LEAST_PRESSES
 from gelpolight_core.reflectance.membrane import MEMBRANES
-from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.reflectance.stage import ReflectanceResult
 from gelpolight_core.response.stage import ResponseResult
 from gelpolight_core.sensor_calibration import MODELS, Calibration, FullModel
@@ -228,7 +227,7 @@ def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
                 fail=1.0,
                 advice=tr("Press more balls at more positions"),
             ),
-            *(() if results.joint is None else judge_presses(results.joint, results.presses)),
+            *(() if results.joint is None else judge_presses(results.joint)),
             *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
@@ -243,20 +242,18 @@ def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
     )
 
 
-def judge_presses(joint: JointResult, presses: Sequence[BallPress]) -> tuple[Figure, ...]:
+def judge_presses(joint: JointResult) -> tuple[Figure, ...]:
     """Judge the ball press that the model explains worst, beside the others.
 
     Parameters
     ----------
     joint : JointResult
-        Of these presses.
-    presses : sequence of BallPress
-        In the order of the refinement; fewer than four say nothing of each other.
+        Fewer than four presses say nothing of each other.
     """
-    if len(presses) < LEAST_PRESSES:
+    if len(joint.ball_names) < LEAST_PRESSES:
         return ()
     misfits = joint.ball_misfits
-    worst = presses[int(np.argmax(misfits))].name
+    worst = joint.ball_names[int(np.argmax(misfits))]
     return (
         judge(
             "worst_press_ratio",

@@ -1,28 +1,29 @@
-"""Write a profile as a table for spreadsheets."""
+"""Write profiles as a table for spreadsheets."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from gelpolight_core.io.atomic import write_atomically
 from gelpolight_core.measurement.profile import Profile
 
-COLUMNS = ("along_mm", "x_mm", "y_mm", "depth_mm", "depth_sd_mm", "flags")
+COLUMNS = ("along_mm", "x_mm", "y_mm", "depth_mm", "depth_sd_mm", "flags", "line")
 
 
-def write_profile(profile: Profile, path: Path) -> None:
-    """Write a profile as CSV (UTF-8, decimal points), completely or not at all.
+def write_profiles(profiles: Mapping[int, Profile], path: Path) -> None:
+    """Write profiles as CSV (UTF-8, decimal points), completely or not at all.
 
-    One row per point: distance from the start, position, depth, its standard deviation and the
-    flags. A cell is empty if the depth or its deviation is unknown.
+    One row per point: distance from the start, position, depth, its standard deviation, the flags
+    and the number of its line. A cell is empty if the depth or its deviation is unknown.
 
     Parameters
     ----------
-    profile : Profile
-        The profile.
+    profiles : mapping of int to Profile
+        The profiles by the numbers of their lines.
     path : Path
         The file.
 
@@ -34,11 +35,12 @@ def write_profile(profile: Profile, path: Path) -> None:
     stream = io.StringIO(newline="")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
-    sd = profile.depth_sd_mm
-    for k, (x, y) in enumerate(profile.points_mm.tolist()):
-        spread = math.nan if sd is None else float(sd[k])
-        lengths = (float(profile.along_mm[k]), x, y, float(profile.depth_mm[k]), spread)
-        cells = [f"{v:.6f}" if math.isfinite(v) else "" for v in lengths]
-        writer.writerow([*cells, int(profile.flags[k])])
+    for number, profile in profiles.items():
+        sd = profile.depth_sd_mm
+        for k, (x, y) in enumerate(profile.points_mm.tolist()):
+            spread = math.nan if sd is None else float(sd[k])
+            lengths = (float(profile.along_mm[k]), x, y, float(profile.depth_mm[k]), spread)
+            cells = [f"{v:.6f}" if math.isfinite(v) else "" for v in lengths]
+            writer.writerow([*cells, int(profile.flags[k]), number])
     data = stream.getvalue().encode()
     write_atomically(path, lambda file: file.write(data))

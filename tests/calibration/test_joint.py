@@ -430,8 +430,7 @@ def test_a_press_with_a_wrong_radius_stands_out_under_a_glossy_membrane() -> Non
     wrong = 0.75 * presses[odd].pose.radius_mm
     presses[odd] = replace(presses[odd], pose=replace(presses[odd].pose, radius_mm=wrong))
     pixels[odd] = replace(pixels[odd], radius_mm=wrong)
-    joint = refine_jointly(presses, pixels, MIRROR, SLAB)
-    named = tuple(replace(press, name=f"ball_{k}.png") for k, press in enumerate(presses))
-    figure = judge_presses(joint, named)[0]
+    named = [replace(press, name=f"ball_{k}.png") for k, press in enumerate(presses)]
+    figure = judge_presses(refine_jointly(named, pixels, MIRROR, SLAB))[0]
     assert figure.verdict is Verdict.FAIL
     assert named[odd].name in figure.advice

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from maps import PITCH, X, Y, drawn, made, stated
 
 from gelpolight_core.errors import InputError
-from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.measurement.profile import (
     angle_between,
     slope,
@@ -148,9 +148,12 @@ def test_what_the_model_leaves_open_is_larger_between_far_places_than_near_ones(
 def test_a_spreadsheet_reads_the_profile(tmp_path: Path) -> None:
     heightmap = made(lambda x, y: 0.1 * x + 0.2, **stated(8, 0.003))
     profile = take_profile(heightmap, (0.0, -6.0), (1.0, 5.0), width_mm=0.3)
-    write_profile(profile, tmp_path / "section.csv")
+    other = take_profile(heightmap, (0.0, 0.0), (1.0, 0.0))
+    write_profiles({1: profile, 3: other}, tmp_path / "section.csv")
     with (tmp_path / "section.csv").open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
+        whole = list(csv.DictReader(stream))
+    rows = [row for row in whole if row["line"] == "1"]
+    assert [row["line"] for row in whole[len(rows) :]] == ["3"] * other.along_mm.size
     assert len(rows) == profile.along_mm.size
     known = [k for k, row in enumerate(rows) if row["depth_mm"]]
     assert known == np.flatnonzero(np.isfinite(profile.depth_mm)).tolist()

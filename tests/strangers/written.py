@@ -21,7 +21,7 @@ from gelpolight_core.calibration.file import write_calibration
 from gelpolight_core.design.sensor_design import SensorDesign
 from gelpolight_core.export.board_page import write_board
 from gelpolight_core.export.heightmap_files import FORMATS, write_heightmap
-from gelpolight_core.export.profile_file import write_profile
+from gelpolight_core.export.profile_file import write_profiles
 from gelpolight_core.measurement.ledger import Ledger
 from gelpolight_core.measurement.profile import take_profile
 from gelpolight_core.measurement.protocol import Protocol
@@ -106,7 +106,8 @@ def _heights(name: str, folder: Path, which: int) -> None:
 
 
 def _profile(folder: Path, which: int) -> None:
-    write_profile(take_profile(heightmap(0.5 + which), (-1.0, 0.0), (1.0, 0.0)), folder / "p.csv")
+    profile = take_profile(heightmap(0.5 + which), (-1.0, 0.0), (1.0, 0.0))
+    write_profiles({1: profile}, folder / "p.csv")
 
 
 def _table(folder: Path, which: int) -> None:

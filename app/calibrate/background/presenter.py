@@ -43,9 +43,11 @@ class BackgroundStep(ImageStep):
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the reflectance factor of each LED."""
-        found = self.model.project.results.factors
-        text = tr("Reflectance factor {low:.2f} to {high:.2f}")
-        return () if found is None else three_maps(found.factors, found.usable, text)
+        results = self.model.project.results
+        found, table = results.factors, results.table
+        if found is None or table is None:
+            return ()
+        return three_maps(found.factors, found.usable, table.grid, tr("Reflectance factor"))
 
 
 def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detection:

@@ -10,6 +10,7 @@ import numpy as np
 
 from app.calibrate.closed_balls.detector import to_px
 from app.calibrate.maps import Panel
+from app.view2d.map_view import extent_of
 from gelpolight_core.calibration.in_place_session import SETTLED, InPlaceRun, expected_gain
 from gelpolight_core.translation import tr
 
@@ -94,7 +95,8 @@ def residual_panel(run: InPlaceRun) -> Panel:
     return Panel(
         tr("Presses and their residual"),
         np.ascontiguousarray(rgb),
-        tr("Mean error of the normals of each press, in degrees, found without that press"),
+        extent_of(grid),
+        caption=tr("Mean error of the normals of each press, in degrees, found without that press"),
     )
 
 

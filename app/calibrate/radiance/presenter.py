@@ -44,9 +44,12 @@ class RadianceStep(ImageStep):
 
     def result_panels(self) -> tuple[Panel, ...]:
         """Return the light intensity of each LED."""
-        found = self.model.project.results.radiance
-        text = tr("Light intensity {low:.2f} to {high:.2f} of full scale")
-        return () if found is None else three_maps(found.radiance, found.usable, text)
+        results = self.model.project.results
+        found, table = results.radiance, results.table
+        if found is None or table is None:
+            return ()
+        text = tr("Light intensity in percent of full scale")
+        return three_maps(found.radiance, found.usable, table.grid, text, unit="%", factor=100.0)
 
 
 def _check(rgb: Rgb, table: ResamplingTable | None, known: KnownImage) -> Detection:

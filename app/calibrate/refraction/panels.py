@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.calibrate.maps import Panel
+from app.view2d.map_view import Extent
 from gelpolight_core.optics.resampling import ResamplingTable
 from gelpolight_core.reflectance.press import BallPress
 from gelpolight_core.translation import tr
@@ -42,16 +43,24 @@ def refraction_panels(
     flat = table.apply(eight.astype(np.float32) / np.float32(255.0))
     after = (255.0 * np.clip(flat, 0.0, 1.0)).astype(np.uint8)
     text = tr("axis ratio {a:.3f} : 1")
+    grid = table.grid
+    seen, seen_extent = _close_up(eight, before, ellipse=True)
+    flat_view, at = _close_up(after, found.contour, ellipse=False)
+    x, y, pitch = float(grid.x_mm[0]), float(grid.y_mm[0]), grid.pitch_mm
+    left, top, right, bottom = (pitch * edge for edge in at)
     return (
         Panel(
             tr("Raw camera image"),
-            _close_up(eight, before, ellipse=True),
-            text.format(a=_axes(before)),
+            seen,
+            seen_extent,
+            in_mm=False,
+            caption=text.format(a=_axes(before)),
         ),
         Panel(
             tr("Lens, tilt and refraction corrected"),
-            _close_up(after, found.contour, ellipse=False),
-            text.format(a=_axes(found.contour)),
+            flat_view,
+            (x + left, y + top, x + right, y + bottom),
+            caption=text.format(a=_axes(found.contour)),
         ),
     )
 
@@ -61,8 +70,8 @@ def _axes(points: NDArray[Any]) -> float:
     return max(one, other) / max(min(one, other), 1e-9)
 
 
-def _close_up(rgb: Rgb, points: NDArray[Any], *, ellipse: bool) -> Rgb:
-    """Return an enlarged view of a contour with the curve fitted to it."""
+def _close_up(rgb: Rgb, points: NDArray[Any], *, ellipse: bool) -> tuple[Rgb, Extent]:
+    """Return an enlarged view of a contour with the curve fitted to it, and its outer edges."""
     centre = points.mean(axis=0)
     reach = CLOSE_UP * float(np.linalg.norm(points - centre, axis=1).max())
     scale = CLOSE_UP_PX / (2.0 * reach)
@@ -79,7 +88,8 @@ def _close_up(rgb: Rgb, points: NDArray[Any], *, ellipse: bool) -> Rgb:
     else:
         u, v, radius = _fit_circle(at)
         cv2.circle(near, (round(u), round(v)), round(radius), (255, 255, 255), 1, cv2.LINE_AA)
-    return np.asarray(near, np.uint8)
+    first, last = ((edge - shift) / scale for edge in (-0.5, CLOSE_UP_PX - 0.5))
+    return np.asarray(near, np.uint8), (*map(float, first), *map(float, last))
 
 
 def _fit_circle(points: NDArray[Any]) -> tuple[float, float, float]:

@@ -38,6 +38,8 @@ class ValidationPanel(QWidget):
         Measure a press from an image file.
     keep_wanted()
         Record the trial as the validation of this calibration.
+    use_wanted()
+        Put the validated calibration into use.
     help_wanted()
         The user wants to read about this step.
     """
@@ -46,6 +48,7 @@ class ValidationPanel(QWidget):
     trial_wanted = Signal()
     import_wanted = Signal()
     keep_wanted = Signal()
+    use_wanted = Signal()
     help_wanted = Signal()
 
     def __init__(self, step: Step, parent: QWidget | None = None) -> None:
@@ -124,6 +127,14 @@ class ValidationPanel(QWidget):
         self.verdict.setWordWrap(True)
         make_bold(self.verdict)
         column.addWidget(self.verdict)
+        self.use = named(
+            QPushButton(tr("&Use it now")),
+            "validation.use",
+            tr("Use the validated calibration"),
+            tr("Use this calibration on the Inspect and Measure pages"),
+        )
+        self.use.clicked.connect(self.use_wanted)
+        column.addWidget(self.use)
         column.addStretch(1)
         self.show_trial(None)
 
@@ -251,8 +262,9 @@ class ValidationPanel(QWidget):
         self.result.setText(markup)
         show_meaning(self.result, meaning)
 
-    def show_verdict(self, text: str, *, passed: bool) -> None:
-        """Show whether the calibration is validated."""
+    def show_verdict(self, text: str, *, passed: bool, may_use: bool = False) -> None:
+        """Show whether the calibration is validated, and offer to use it."""
+        self.use.setVisible(may_use)
         self.verdict.setText(text)
         show_meaning(self.verdict, "pass" if passed else "fail")
 

@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
-import numpy as np
 from numpy.typing import NDArray
 
 from app.workspace.validation import Comparison
@@ -19,8 +17,6 @@ from gelpolight_core.reconstruction.height_map import HeightMap
 from gelpolight_core.reconstruction.reconstructor import Reconstructor
 from gelpolight_core.session.capture import average_frames
 from gelpolight_core.translation import tr
-
-LIGHT = np.array([-0.5, -0.6, 0.62])
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +48,13 @@ class Trial:
         Measurement of the object.
     comparisons : tuple of Comparison
         Comparisons with the true values.
-    shaded : (rows, columns, 3) uint8
-        The shaded depth map with the outline of the object.
+    heightmap : HeightMap
+        The depth it was measured in.
     """
 
     measurement: Measurement
     comparisons: tuple[Comparison, ...]
-    shaded: NDArray[np.uint8]
+    heightmap: HeightMap
 
 
 def run_trial(
@@ -102,38 +98,4 @@ def run_trial(
             Comparison(tr("height"), measured.height_mm, known.height_mm, height_limit_percent)
         )
     measured = judged(measured, heightmap)
-    return Trial(measured, tuple(comparisons), shaded_depth(heightmap, measured.outline_mm))
-
-
-def shaded_depth(
-    heightmap: HeightMap, outline_mm: NDArray[np.float64] | None = None
-) -> NDArray[np.uint8]:
-    """Return a shaded depth map, coloured by depth, (rows, columns, 3) uint8.
-
-    Parameters
-    ----------
-    heightmap : HeightMap
-        The map.
-    outline_mm : (N, 2), optional
-        Closed line to draw.
-    """
-    depth = heightmap.depth_mm
-    slope_y, slope_x = np.gradient(depth.astype(np.float64), heightmap.pitch_mm)
-    normal = np.stack([slope_x, slope_y, np.ones_like(slope_x)], axis=-1)
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    shade = np.clip(normal @ (LIGHT / np.linalg.norm(LIGHT)), 0.0, 1.0)
-    top = max(float(np.percentile(depth, 99.9)), 0.05)
-    level = (255.0 * np.clip(depth / top, 0.0, 1.0)).astype(np.uint8)
-    colour = cv2.applyColorMap(level, cv2.COLORMAP_VIRIDIS)[..., ::-1].astype(np.float64)
-    rgb = np.ascontiguousarray(np.clip(colour * (0.35 + shade[..., None]), 0, 255).astype(np.uint8))
-    if outline_mm is not None and len(outline_mm) > 2:
-        at = np.stack(
-            [
-                (outline_mm[:, 0] - heightmap.x_mm[0]) / heightmap.pitch_mm,
-                (outline_mm[:, 1] - heightmap.y_mm[0]) / heightmap.pitch_mm,
-            ],
-            axis=-1,
-        )
-        points = np.round(16.0 * at).astype(np.int32).reshape(-1, 1, 2)
-        cv2.polylines(rgb, [points], True, (255, 255, 255), 2, cv2.LINE_AA, 4)
-    return rgb
+    return Trial(measured, tuple(comparisons), heightmap)

@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QFileDialog
 
 from app.calibrate.detection import read_raw
-from app.calibrate.maps import Panel
+from app.calibrate.maps import depth_panel
 from app.calibrate.model import WizardModel
 from app.calibrate.validation.panel import ValidationPanel
 from app.calibrate.validation.trial import KnownObject, Trial, run_trial
@@ -47,7 +47,7 @@ class Validating(QObject):
     Signals
     -------
     tried(object)
-        A Panel with the shaded depth map of a press.
+        A Panel with the height map of a press.
     """
 
     tried = Signal(object)
@@ -69,6 +69,8 @@ class Validating(QObject):
         panel.trial_wanted.connect(self.measure)
         panel.import_wanted.connect(self.choose_press)
         panel.keep_wanted.connect(self.keep)
+        panel.use_wanted.connect(self.put_into_use)
+        context.requests.calibrations_changed.connect(self._show_verdict)
         self._show_calibration()
         self._find_earlier()
         model.changed.connect(self._show_calibration)
@@ -207,7 +209,8 @@ class Validating(QObject):
         self._reconstructor, self._trial = reconstructor, (trial, text)
         self._panel.show_work(None)
         self._panel.show_trial(trial)
-        self.tried.emit(Panel(tr("Measured depth"), trial.shaded))
+        panel = depth_panel(tr("Measured depth"), trial.heightmap, trial.measurement.outline_mm)
+        self.tried.emit(panel)
 
     def _refuse(self, sentence: str) -> None:
         self._trial = None
@@ -233,8 +236,16 @@ class Validating(QObject):
             self._context.toasts.show(str(error), "fail")
             return
         self._context.requests.calibrations_changed.emit()
-        self._show_verdict()
         self._model.changed.emit()
+
+    def put_into_use(self) -> None:
+        """Use the validated calibration on the other pages from now on."""
+        try:
+            self._context.workspace.use(self._path)
+        except InputError as error:
+            self._context.toasts.show(str(error), "fail")
+            return
+        self._context.requests.calibrations_changed.emit()
 
     def _recorded(self) -> Validation | None:
         if self._path is None:
@@ -253,13 +264,14 @@ class Validating(QObject):
         if found is None:
             self._panel.show_verdict(tr("Not validated."), passed=False)
         elif found.passed:
-            self._panel.show_verdict(
-                tr(
-                    "This calibration is validated. You can use it on the Inspect and Measure "
-                    "pages."
-                ),
-                passed=True,
-            )
+            used = self._context.workspace.in_use == self._path
+            text = tr("Validated and in use: the Inspect and Measure pages measure with it.")
+            if not used:
+                text = tr(
+                    "This calibration is validated, but not in use. The Inspect and Measure pages "
+                    "do not measure with it."
+                )
+            self._panel.show_verdict(text, passed=True, may_use=not used)
         else:
             self._panel.show_verdict(
                 tr("Not validated: the errors of the recorded trial are beyond the limits."),

@@ -11,7 +11,7 @@ import pytest
 from app.live.frame_results import Maker, Wanted
 from app.sources.source import Frame
 from app.view2d import shading
-from app.view2d.cuts import Section
+from app.view2d.cuts import Line, Section
 from app.view2d.display import QUANTITIES, SURROUND, Display, Light, colour_table
 from app.view2d.processing import Processing
 from app.view2d.quantities import FLAG_COLOURS, Reference
@@ -89,9 +89,12 @@ def test_new_display_settings_do_not_reconstruct_a_frozen_image(
 def test_the_profile_on_screen_equals_that_of_the_core(dome: HeightMap, frame: Frame) -> None:
     from gelpolight_core.measurement.profile import take_profile, width_at
 
-    section = Section((-4.0, -1.0), (7.0, -1.0), 0.2)
+    line, other = Line((-4.0, -1.0), (7.0, -1.0), 2), Line((-4.0, 2.0), (4.0, 2.0))
+    section = Section((other, line), chosen=2, width_mm=0.2)
     shown, _ = _made(dome, frame, section=section, region=Rectangle((0.0, 4.0), (2.0, 2.0)))
-    expected = take_profile(dome, section.start_mm, section.end_mm, width_mm=0.2)
+    expected = take_profile(dome, line.start_mm, line.end_mm, width_mm=0.2)
+    beside = take_profile(dome, other.start_mm, other.end_mm, width_mm=0.2)
+    np.testing.assert_array_equal(shown.cut.profiles[1].depth_mm, beside.depth_mm)
     np.testing.assert_array_equal(shown.cut.profile.depth_mm, expected.depth_mm)
     figures = {figure.name: figure.value for figure in shown.cut.figures}
     assert figures["width"] == width_at(expected).value
@@ -99,9 +102,9 @@ def test_the_profile_on_screen_equals_that_of_the_core(dome: HeightMap, frame: F
 
 
 def test_the_width_is_measured_at_the_level_that_is_chosen(dome: HeightMap, frame: Frame) -> None:
-    line = (-4.0, -1.0), (7.0, -1.0)
-    half, _ = _made(dome, frame, section=Section(*line))
-    low, _ = _made(dome, frame, section=Section(*line, level_mm=0.1))
+    lines = (Line((-4.0, -1.0), (7.0, -1.0)),)
+    half, _ = _made(dome, frame, section=Section(lines))
+    low, _ = _made(dome, frame, section=Section(lines, level_mm=0.1))
     assert half.cut.width_ends is not None and low.cut.width_ends is not None
     assert half.cut.width_ends[2] == pytest.approx(0.4, abs=0.01)
     assert low.cut.width_ends[2] == 0.1
@@ -115,7 +118,7 @@ def test_the_width_is_measured_at_the_level_that_is_chosen(dome: HeightMap, fram
 def test_a_line_off_the_sensor_measures_nothing_and_is_reported(
     dome: HeightMap, frame: Frame
 ) -> None:
-    shown, _ = _made(dome, frame, section=Section((40.0, 40.0), (44.0, 40.0)))
+    shown, _ = _made(dome, frame, section=Section((Line((40.0, 40.0), (44.0, 40.0)),)))
     assert shown.cut.profile is None
     assert "outside" in shown.cut.sentences[0]
 
@@ -149,7 +152,7 @@ def test_a_frozen_height_map_is_shown_and_measured_as_processed(
     tilt = 0.02 * dome.x_mm.astype(np.float32)
     tilted = replace(dome, depth_mm=dome.depth_mm + tilt)
     steps = Processing(reference=Reference(replace(dome, depth_mm=0.0 * dome.depth_mm + tilt)))
-    line = Section((-6.0, -1.0), (6.0, -1.0))
+    line = Section((Line((-6.0, -1.0), (6.0, -1.0)),))
     views = {"surface": True, "section": line, "quality": "flags", "processing": steps}
     shown, _ = _made(tilted, frame, still=True, **views)
     np.testing.assert_allclose(shown.heightmap.depth_mm, dome.depth_mm, atol=1e-6)

@@ -112,8 +112,8 @@ def test_using_one_that_is_not_validated_warns(
     chosen = page.chosen()
     assert chosen is not None
     assert chosen.in_use
-    assert context.status.value.calibration == "made"
-    assert context.status.value.calibration_note == "not validated"
+    assert context.workspace.in_use == chosen.path
+    assert not chosen.validated
     assert context.toasts.shown()[-1].kind == "warn"
     assert not page.use.isEnabled()
 
@@ -135,7 +135,9 @@ def test_a_validated_calibration_is_marked(
     assert "+2.0 %" in words(page)
     count = len(context.toasts.shown())
     page.use.trigger()
-    assert context.status.value.calibration_note == "validated"
+    again = page.chosen()
+    assert again is not None
+    assert again.in_use and again.validated
     assert len(context.toasts.shown()) == count
 
 
@@ -156,11 +158,11 @@ def test_removing_the_calibration_in_use_asks_first(
     page.remove.trigger()
     answer(page, "answer0")
     assert "No sensor yet" in words(page)
-    assert context.status.value.calibration is None
+    assert context.workspace.in_use is None
     undo = context.toasts.shown()[-1].findChild(QWidget, "toast.action0")
     undo.click()
     assert page.chosen() is not None
-    assert context.status.value.calibration is not None
+    assert context.workspace.in_use is not None
 
 
 def test_removing_a_validated_calibration_asks_first(

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import scene
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import (
     QAction,
@@ -565,6 +566,19 @@ def test_the_status_line_shows_what_is_known(window: MainWindow) -> None:
     assert "not validated" in said["main.status.calibration"]
     with pytest.raises(TypeError):
         window.context.status.update(speed=1)
+
+
+def test_the_status_line_names_the_calibration_in_use_whatever_page_is_open(
+    window: MainWindow,
+) -> None:
+    context = window.context
+    assert context.status.value.calibration is None
+    path = context.workspace.keep_calibration(scene.calibration(), "made")
+    for used, expected in ((path, ("made", "not validated")), (None, (None, ""))):
+        context.workspace.use(used)
+        context.requests.calibrations_changed.emit()
+        value = context.status.value
+        assert (value.calibration, value.calibration_note) == expected
 
 
 @pytest.mark.parametrize("shows", [True, False], ids=["with a viewer", "without"])

@@ -58,7 +58,7 @@ def test_readings_scales_and_axes_follow_the_unit(um: None, dome: HeightMap, qtb
     assert slope.in_unit() is slope
     plot = ProfilePlot("plot")
     qtbot.addWidget(plot)
-    plot.show_profile(None)
+    plot.show_profiles({})
     assert plot.getAxis("left").scale == 1e3
 
 

@@ -126,3 +126,24 @@ def test_only_a_trial_of_this_calibration_and_of_the_present_captures_validates(
     assert technician.state("validation") == "pass"
     controller.jobs.cancel()
     technician.rest()
+
+
+def test_a_validated_calibration_that_is_not_in_use_can_be_put_into_use(
+    technician: Technician, computed_project: Made, tmp_path: Path
+) -> None:
+    path = save(technician, computed_project(), tmp_path / "workspace")
+    step = technician.wizard.at("validation")
+    context = step.context
+    passed = Comparison("height", 1.0, 1.0, 8.0)
+    identity = read_summary(path).identity
+    write_validation(
+        Validation(identity, "2026-03-01T12:00:00+00:00", "Ada", "cylinder", (passed,)), path
+    )
+    context.requests.calibrations_changed.emit()
+    assert context.workspace.in_use == path
+    assert not step.form.use.isVisible()
+    context.workspace.use(None)
+    context.requests.calibrations_changed.emit()
+    technician.click("validation.use")
+    assert context.workspace.in_use == path
+    assert not step.form.use.isVisible()
