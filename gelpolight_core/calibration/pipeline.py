@@ -250,15 +250,16 @@ def judge_presses(joint: JointResult) -> tuple[Figure, ...]:
     joint : JointResult
         Fewer than four presses say nothing of each other.
     """
-    if len(joint.ball_names) < LEAST_PRESSES:
-        return ()
+    # A press without any usable pixel has no misfit.
     misfits = joint.ball_misfits
-    worst = joint.ball_names[int(np.argmax(misfits))]
+    if np.isfinite(misfits).sum() < LEAST_PRESSES:
+        return ()
+    worst = joint.ball_names[int(np.nanargmax(misfits))]
     return (
         judge(
             "worst_press_ratio",
             tr("Unexplained signal of the worst press over the usual ({name})").format(name=worst),
-            float(misfits.max() / np.median(misfits)),
+            float(np.nanmax(misfits) / np.nanmedian(misfits)),
             warn=1.5,
             fail=2.0,
             advice=tr(
