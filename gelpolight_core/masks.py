@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Mask = NDArray[np.bool_]
 
 SATURATED = 0.995
-"""From here on a pixel is at its upper end: it only says that there is at least so much light."""
+"""From this value a pixel is saturated: its light is at least this much."""
 LEAST_LIGHT = 0.01
 """Below this light of the untouched membrane, the ratio of press to background is noise."""
 DARK_COSINE = 0.03

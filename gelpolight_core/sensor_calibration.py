@@ -273,7 +273,7 @@ class Calibration:
 
     @property
     def fault(self) -> str:
-        """Why no measurement with it can be trusted, as a clause; empty where it did not fail.
+        """Why no measurement with it is reliable, as a clause; empty if it did not fail.
 
         A calibration with warnings is within the limits in which its stated uncertainties hold.
         """

@@ -1,4 +1,4 @@
-"""How far the lengths that a person states may be off, and what that does to all results.
+"""Tolerances of the lengths that the user states, and their effect on all results.
 
 No image shows such an error. The board on the top surface is seen in air: its squares give the
 surface's distance. Under the elastomer the surface then appears nearer, by what thickness and index

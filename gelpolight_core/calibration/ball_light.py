@@ -1,4 +1,4 @@
-"""Light that the membrane around a pressed ball throws onto itself, for the joint refinement.
+"""Light that the membrane around a pressed ball reflects onto itself, for the joint refinement.
 
 The surface is that of the ball and its drape, as far as the refinement knows them; it is gathered
 again when they are known better. It is computed for a membrane that absorbs nothing.

@@ -40,7 +40,7 @@ class CoarseView:
     view : (rows, columns, 3)
         Unit directions back to the camera.
     throwing : (rows, columns) float32
-        Share of each facet that throws light onto other parts of the membrane.
+        Share of each facet that reflects light onto other parts of the membrane.
     pitch_mm : float
         Distance between nodes.
     factor : int
@@ -98,7 +98,7 @@ class BallPixels:
     view_of_field : CoarseView
         The whole membrane that may throw light on them.
     field : (rows, columns, 3) float32
-        Press over background there; 1 where it is not usable, and 0 where nothing throws light.
+        Press over background there; 1 where it is not usable, and 0 where nothing reflects light.
     around, around_flat : (N, 3)
         Light that they receive from the rest of a membrane that absorbs nothing, in the press and
         while the membrane is flat, in units of the flat membrane's direct light.

@@ -1,4 +1,4 @@
-"""The membrane's reflectance, from its brightness beside that of the white board."""
+"""The membrane's reflectance, from its brightness relative to the white board."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ were taken at different exposures, or the board is not white."""
 
 
 class BesideBoard(NamedTuple):
-    """The untouched membrane beside the white board, at some nodes.
+    """The untouched membrane compared with the white board, at some nodes.
 
     Attributes
     ----------

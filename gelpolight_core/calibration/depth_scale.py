@@ -125,7 +125,7 @@ def depth_scale_sd(full: FullModel, table: ResamplingTable, covariance: Array) -
         Grid and rays.
     covariance : (14, 14) or (26, 26)
         Covariance of the shared parameters of the joint refinement, in their order: LEDs (9),
-        exponent, gloss, roughness, reflectance for light from around, decay length,
+        exponent, gloss, roughness, reflectance for interreflected light, decay length,
         heights of the curves.
     """
     field, depth, plateau = synthetic_press(full, table)
@@ -216,7 +216,7 @@ def _shaded(
     stride: int,
     pitch_mm: float,
 ) -> tuple[Map, Map]:
-    """Return press over background, and the light from around in it."""
+    """Return press over background, and the interreflected light in it."""
     points, rays, position, depth, normals = seen
     view = view_directions(rays)
     flat = np.concatenate([points, np.zeros((len(points), 1))], axis=1)
@@ -251,7 +251,7 @@ def direct_flat(full: FullModel, light: Array, distance: Array, view: Array) -> 
 
 
 def _around(full: FullModel, surface: Surface, flat: Array, pitch_mm: float) -> Array:
-    """Return light from around (rows, columns, 3), in units of the flat membrane's."""
+    """Return interreflected light (rows, columns, 3), in units of the flat membrane's."""
     around = np.zeros_like(flat)
     if full.membrane.interreflection <= LEAST_SHARE:
         return around

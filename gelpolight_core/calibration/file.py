@@ -69,7 +69,7 @@ ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 def write_calibration(
     calibration: AnyCalibration, path: str | PathLike[str], *, new: bool = False
 ) -> None:
-    """Write a calibration file, whole or not at all.
+    """Write a calibration file, completely or not at all.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def _arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
     if c.response is not None:
         arrays["camera_response"] = c.response.curves
     if c.bad is not None:
-        # Older programs read this file too, and know arrays of floats only.
+        # Older versions of the program also read this file and support arrays of floats only.
         arrays[BAD_PIXELS] = c.bad.pixels.astype(np.float32)
     return arrays
 

@@ -1,4 +1,4 @@
-"""From a closed sensor's session folder to its calibration."""
+"""Calibrate a closed sensor from its session folder."""
 
 from __future__ import annotations
 
@@ -69,11 +69,11 @@ def calibrate_closed_session(
     Parameters
     ----------
     session : ClosedSession
-        What was captured, and what a person decided about it.
+        Images and decisions of the user.
     towards : (terms, 2), optional
         Coefficients of an earlier calibration that these presses are to correct.
     progress : callable, optional
-        Told the stage's name and the share done, 0..1.
+        Called with the stage name and the share done, 0..1.
 
     Raises
     ------
@@ -287,7 +287,7 @@ def judge_in_place(result: InPlaceResult, scale_sd: float) -> dict[str, QualityT
 
 
 def _learning_figures(result: InPlaceResult, more: str) -> tuple[Figure, ...]:
-    """Return what a further ball is expected to bring, by fits with fewer balls."""
+    """Return the expected improvement by one more ball, from fits with fewer balls."""
     gain = expected_gain(result)
     if gain is None:
         return ()
@@ -306,7 +306,8 @@ def _learning_figures(result: InPlaceResult, more: str) -> tuple[Figure, ...]:
 def expected_gain(result: InPlaceResult) -> float | None:
     """Return the share by which one more ball is expected to make the slope error smaller.
 
-    The error falls as a power of the number of balls, towards what no number mends.
+    The error decreases as a power of the number of balls, to a limit that more balls do not
+    improve.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ from gelpolight_core.reflectance.press import BallPress
 Array = NDArray[np.float64]
 INTERREFLECTION = 12
 SIGNIFICANT = 3.0
-"""Standard deviations from which on light from around counts as seen."""
+"""Interreflection counts as present above this many standard deviations."""
 _NAMES = ("exponent", "gloss", "roughness", "interreflection", "decay_mm")
 
 
@@ -77,7 +77,7 @@ class JointResult:
     membrane_kept : str
         ``two-lobe`` or ``one-dimensional``: the form of `membrane`.
     covariance : (14, 14) or (26, 26)
-        Of LEDs (9), exponent, gloss, roughness, reflectance for light from around and decay
+        Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light and decay
         length and, if the membrane is one-dimensional, of the heights of its curves; from
         leaving out one press at a time. 0 for fixed parameters.
     """
@@ -109,7 +109,7 @@ def refine_jointly(
 ) -> JointResult:
     """Refine LEDs, membrane and balls together.
 
-    The LEDs from the mirror are kept if they do better on held-out presses, and the membrane is
+    The LEDs from the mirror are kept if they fit held-out presses better, and the membrane is
     one-dimensional if two lobes do no better.
 
     Parameters
@@ -121,13 +121,13 @@ def refine_jointly(
     slab : Slab
         What is below the membrane.
     board : BesideBoard, optional
-        The membrane beside the white board, which says what it reflects.
+        The untouched membrane and the white board, which give the reflectance.
     terms : CalibrationTerms, optional
         The effects to model; by default all.
     """
     if terms.interreflection:
         seen = _first_light(presses, pixels, led_positions_mm, slab, terms)
-        # A membrane that shows no light from around needs none to be gathered in any frame.
+        # Without interreflection, no frame needs to compute it.
         pixels, terms = (
             (pixels, replace(terms, interreflection=False)) if seen is None else (seen, terms)
         )
@@ -177,14 +177,14 @@ def _membrane_of(x: Array, balls_end: int) -> Membrane:
 
 
 def _expected(board: BesideBoard, solved: _Solution, balls_end: int) -> tuple[float, float] | None:
-    """Return the reflectance to expect beside the board, and its standard deviation."""
+    """Return the reflectance expected from the white board, and its standard deviation."""
     x = solved.x
     shown = float(x[INTERREFLECTION]), float(solved.sd[INTERREFLECTION])
     return board.expected(x[:9].reshape(3, 3), _membrane_of(x, balls_end), shown)
 
 
 def _lit(pixels: Sequence[BallPixels], x: Array, slab: Slab) -> list[BallPixels]:
-    """Return the pixels with light from around, by a solution."""
+    """Return the pixels with the interreflected light of a solution."""
     end = COMMON + 3 * len(pixels)
     balls = _balls_of(x, pixels)
     return with_light_from_around(
@@ -199,7 +199,7 @@ def _first_light(
     slab: Slab,
     terms: CalibrationTerms,
 ) -> list[BallPixels] | None:
-    """Return the pixels with light from around, by a fit to some of them; None if they show none.
+    """Return the pixels with interreflected light, from a fit to some; None if there is none.
 
     The fit starts from the light that a matt membrane would throw.
     """

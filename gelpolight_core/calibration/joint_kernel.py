@@ -47,7 +47,7 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     Parameters
     ----------
     pixels : tuple
-        Points (N, 2), directions to the camera (N, 3), ratio, weight, and light from around in the
+        Points (N, 2), directions to the camera (N, 3), ratio, weight, interreflected light in the
         press and on the flat membrane (N, 3).
     seen : tuple
         Points (N, 3), normals (N, 3) and whether they are on the ball (N,).
@@ -60,7 +60,7 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     no_curves : (3, 0)
         Diffuse curves of the two-lobe membrane, which has none.
     reflectance : float
-        For light from around.
+        For interreflected light.
     result : (4, N, 3)
         Written.
     """
@@ -86,7 +86,7 @@ def model_press(  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
             direct *= light[2] / flat[2] * (flat_far / far) ** 2
             lit = min(max((facing - SHADOW_COSINE) / SHADOW_COSINE, 0.0), 1.0)
             scale = weight[i, k] * lit / CORRELATION
-            # The background holds light from around, too.
+            # The background also contains interreflected light.
             direct /= 1.0 + reflectance * around_flat[i, k]
             more = reflectance * around[i, k] / (1.0 + reflectance * around_flat[i, k])
             result[0, i, k] = (direct + more - ratio[i, k]) * scale

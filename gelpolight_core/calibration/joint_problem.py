@@ -20,7 +20,7 @@ Surface = tuple[Array, Array, NDArray[np.bool_]]
 LED_LATERAL_SD_MM = 0.05
 LED_HEIGHT_SD_MM = 0.2
 PRIOR_STRENGTH = 3.0
-# LEDs (9), exponent, gloss, roughness, reflectance for light from around, decay length.
+# LEDs (9), exponent, gloss, roughness, reflectance for interreflected light, decay length.
 COMMON, DECAY = 14, 13
 # The one-dimensional membrane: cos times the exponential of a spline through these cosines; it is 0
 # at the last. Below the first, which balls hardly reach, it continues with Lambert's law.
@@ -70,7 +70,7 @@ class Problem:
 
     The parameters are the common ones, then x, y and depth of each ball and, if the membrane is
     one-dimensional, the heights of its curves; only those that are `free` are solved for. The
-    reflectance for light from around may be expected, with a standard deviation.
+    reflectance for interreflected light may be expected, with a standard deviation.
     """
 
     presses: Sequence[BallPixels]

@@ -243,7 +243,7 @@ def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
 
 
 def judge_presses(joint: JointResult) -> tuple[Figure, ...]:
-    """Judge the ball press that the model explains worst, beside the others.
+    """Judge the ball press with the largest residual, compared with the others.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def _scale_figures(full: FullModel) -> tuple[Figure, ...]:
 
 
 def _membrane_figures(full: FullModel) -> tuple[Figure, ...]:
-    """Return which membrane was kept, and the ratio of errors; empty if no press was held out."""
+    """Return the selected membrane and the ratio of errors; empty if no press was held out."""
     two_lobe, one_dimensional = full.membrane_held_out
     if two_lobe <= 0.0:
         return ()

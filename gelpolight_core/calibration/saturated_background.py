@@ -26,7 +26,7 @@ Mask = NDArray[np.bool_]
 REACH_MM = 2.0
 """Farther than this from a pixel that is not saturated, the coating is not known."""
 RIM_MM = 0.2
-"""The coating at the very rim of the field may be cut or in shadow, and is no example."""
+"""The coating at the edge of the field may be incomplete or in shadow, and is not used."""
 EVENED_MM = 0.5
 """Blur of the coating's share of the light: it leaves out specks and noise."""
 

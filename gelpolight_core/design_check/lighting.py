@@ -78,7 +78,7 @@ def compare_lighting(
 ) -> tuple[LightingRow, ...]:
     """Press a cylinder under both kinds of light, and reconstruct it by both methods.
 
-    The membrane is taken as matt and without crosstalk and the calibration as exact, so that only
+    The membrane is assumed matt, without crosstalk, and the calibration exact, so that only
     the light differs.
 
     Parameters
@@ -92,7 +92,7 @@ def compare_lighting(
     elevations_deg : sequence of float, optional
         Of directional light above the top surface.
     progress : callable, optional
-        Told what is being done and the share done; what it raises stops the work.
+        Called with the present task and the share done; its exceptions stop the work.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""What each term of the full model is worth, and what it costs: each left out in turn.
+"""Benefit and cost of each term of the full model: each term is left out in turn.
 
-Terms of a frame are left out of the reconstruction alone. Terms of the membrane and the LEDs are
-left out of the joint refinement, so that the other terms can make up for them as far as they can.
-Times are those of the processor, all threads together, so that other programs at work do not count.
-Every press is reconstructed by all variants before the next one is taken, so that a slow spell of
-the machine meets all alike; what a term costs is the median of the differences within a press.
+Terms of a frame are left out of the reconstruction only. Terms of the membrane and the LEDs are
+left out of the joint refinement, so that the other terms can compensate as far as possible. Times
+are processor times of all threads together, so that other programs have little effect. Every press
+is reconstructed by all variants in turn, so that a slow phase of the machine affects all equally.
+The cost of a term is the median of the differences for one press.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from gelpolight_core.session.session import Session
 from gelpolight_core.translation import marked, tr
 
 RIM_MM = 1.0
-"""What lies nearer to the edge of the working circle is not scored: the truth knows no edge."""
+"""Nodes closer to the edge of the working circle are not scored: the true depth has no edge."""
 CALIBRATING = 0.6
-"""Share of the work that the calibrations are, for the progress."""
+"""Share of the calibrations in the total work, for the progress."""
 
 Progress = Callable[[str, float], None]
 
@@ -57,7 +57,7 @@ class Variant:
     name : str
         On the command line and in files.
     label : str
-        What is done instead, for a person.
+        What is done instead, as shown to the user.
     terms : Terms
         Of the reconstruction.
     calibration : CalibrationTerms
@@ -126,8 +126,7 @@ class TermResult:
     cost_ms : float
         What the term adds to a frame: median difference to all terms on; 0 for all terms on.
     calibration_s : float
-        Processor time of the joint refinement that the variant rests on; NaN for the paper's
-        model.
+        Processor time of the joint refinement of the variant; NaN for the paper's model.
     """
 
     variant: Variant
@@ -177,7 +176,7 @@ class TruePress:
 
 @dataclass(slots=True)
 class _Candidate:
-    """A variant at work: its reconstructor, and what was seen of it so far."""
+    """A variant during the run: its reconstructor and its results so far."""
 
     variant: Variant
     reconstruct: Reconstructor
@@ -199,7 +198,7 @@ def ablate(
     Parameters
     ----------
     session : Session
-        With ``presses/truth.csv`` and ``truth/*.npz`` beside the images of the stages.
+        With ``presses/truth.csv`` and ``truth/*.npz`` in addition to the images of the stages.
     variants : sequence of Variant, optional
         To be compared with all terms on.
     repeats : int, optional
@@ -207,7 +206,7 @@ def ablate(
     workers : int, optional
         Threads of a reconstruction.
     progress : callable, optional
-        Told what is being done and the share done, 0..1.
+        Called with the present task and the share done, 0..1.
 
     Raises
     ------
@@ -221,7 +220,7 @@ def ablate(
     presses = read_presses(linear, radius_mm)
     candidates = _calibrated(session, (EVERYTHING, *variants), workers, progress)
     for candidate in candidates:
-        candidate.reconstruct.depth(presses[0].rgb, normals=False)  # makes maps and kernels ready
+        candidate.reconstruct.depth(presses[0].rgb, normals=False)  # prepares maps and kernels
     for number, press in enumerate(presses):
         progress(press.row.file, CALIBRATING + (1.0 - CALIBRATING) * number / len(presses))
         _take_in_turn(candidates, press, repeats, radius_mm)
@@ -241,7 +240,7 @@ def ablate(
 
 
 def read_presses(session: Session, radius_mm: float) -> list[TruePress]:
-    """Read all presses of a session with truth, so that what is missing is reported at once.
+    """Read all presses of a session with true depth, so that missing files are reported first.
 
     Parameters
     ----------
@@ -304,7 +303,7 @@ def _take_in_turn(
 def _calibrated(
     session: Session, variants: Sequence[Variant], workers: int, progress: Progress
 ) -> list[_Candidate]:
-    """Calibrate the stages once, and refine them for every set of terms that is asked for."""
+    """Calibrate the stages once, and refine them for every requested set of terms."""
     asked = {variant.calibration for variant in variants}
     whole = 1 + len(asked)
     results = StageResults()

@@ -1,4 +1,4 @@
-"""Where the time of a frame goes, beside the plain version and the cost of copying the bytes."""
+"""Time of each step of a frame, compared with the plain version and with a memory copy."""
 
 from __future__ import annotations
 

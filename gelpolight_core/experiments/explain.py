@@ -1,4 +1,4 @@
-"""Where the full model's error comes from: images predicted at the true surface beside the images.
+"""Causes of the full model's errors: images predicted for the true surface, and the real ones.
 
 For each press with a true depth two questions are answered. *Which step loses the height?* The
 slopes that were found are replaced by the true ones, everywhere or in part, and integrated with

@@ -1,4 +1,4 @@
-"""What each rule that leaves out work saves, and the largest change it makes to the depth.
+"""Time saved by each rule that skips a step, and its largest change of the depth.
 
 Each rule is switched off in turn, for every effort, on the same frames. Frames take turns with and
 without the rule, so that a slow spell of the machine meets both alike.
@@ -140,7 +140,7 @@ def measure_rules(
     workers : int, optional
         Threads.
     progress : callable, optional
-        Told what is being done and the share done; what it raises stops the work.
+        Called with the present task and the share done; its exceptions stop the work.
     """
     assert calibration.full is not None
     usual = NearLightSolver(calibration, calibration.full, workers=workers)

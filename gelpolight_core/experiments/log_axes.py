@@ -1,4 +1,4 @@
-"""Logarithmic axes with numbers as a person writes them."""
+"""Logarithmic axes with plain numbers as labels."""
 
 from __future__ import annotations
 

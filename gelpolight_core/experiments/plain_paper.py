@@ -1,4 +1,4 @@
-"""The paper's model once more, in plain NumPy and SciPy: the yardstick of the fused pass.
+"""The paper's model in plain NumPy and SciPy, as a reference for the fused version.
 
 Written from the equations, array by array, in double precision and without regard to speed. Tests
 hold the fused pass to it, and the benchmark shows both.

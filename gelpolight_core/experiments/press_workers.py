@@ -1,4 +1,4 @@
-"""Presses that are made on the virtual sensor and measured, several at a time.
+"""Make and measure presses on the virtual sensor in several processes.
 
 Each worker is a process of its own with one thread: two threads may not enter the compiled loops
 together, and one frame keeps two cores less busy than two frames do.

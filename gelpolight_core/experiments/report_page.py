@@ -28,7 +28,7 @@ class Page:
 
 
 def write_page(page: Page, path: Path) -> None:
-    """Write a page as one HTML file that needs nothing else, whole or not at all.
+    """Write a page as one HTML file that needs nothing else, completely or not at all.
 
     Raises
     ------

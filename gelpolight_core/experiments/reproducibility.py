@@ -1,4 +1,4 @@
-"""Whether numbers repeat: single and double precision, run to run, whatever the threads."""
+"""Check that results repeat: precision, repeated runs, number of threads."""
 
 from __future__ import annotations
 

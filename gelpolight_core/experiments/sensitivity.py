@@ -1,4 +1,4 @@
-"""What an error of each calibration parameter does to the depth: the tornado chart's numbers.
+"""Effect of an error of each calibration parameter on the depth, for the tornado chart.
 
 Each parameter is changed by itself, the images stay as they are, and everything that the
 calibration derives from images (background, light) is computed from them again. A fit of several
@@ -142,7 +142,7 @@ def sensitivities(
     chosen : sequence of Parameter, optional
         By default all of :func:`parameters`.
     progress : callable, optional
-        Told the parameter and the share done.
+        Called with the parameter and the share done.
     """
     press = known.pressed(PRESS, x_mm=PRESS_AT_MM[0], y_mm=PRESS_AT_MM[1])
     exact, exact_height = _found(known.calibration, press)
@@ -247,7 +247,7 @@ def _exponent(known: KnownSensor, by: float) -> Calibration:
 def _gloss(known: KnownSensor, by: float) -> Calibration:
     full = known.calibration.full
     assert full is not None
-    # A share below zero is no membrane: low stands for what high does, turned round.
+    # A negative share is impossible: low is the effect of high with the opposite sign.
     membrane = replace(full.membrane, gloss=max(full.membrane.gloss + 0.01 * by, 0.0))
     return replace(known.calibration, full=replace(full, membrane=membrane))
 

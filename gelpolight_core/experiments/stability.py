@@ -1,9 +1,9 @@
-"""Extreme and stiff cases, each of which must come out right or be refused with its reason.
+"""Extreme cases, each of which must be correct or be refused with its reason.
 
-A case is a function that does one hard thing and says what it saw. What it raises as
-:class:`InputError` is a refusal, and so is a wrong result that says of itself that it is not to be
-trusted; anything else that it raises is a failure of the program, which the report must show and
-therefore outlives.
+A case is a function that returns what it measured. An :class:`InputError`
+counts as refused, and so does a wrong result that reports that it is not
+reliable. Any other exception is a failure of the program; the run continues and the report shows
+it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ModeSeen:
-    """What one mode made of a case.
+    """Result of one mode in a case.
 
     Attributes
     ----------
@@ -40,8 +40,7 @@ class ModeSeen:
     error_um, bound_um : float or None
         As in :class:`Seen`; None where nothing was measured.
     warning : str
-        What the result says of itself where it is not to be trusted; empty where it trusts itself.
-    summary : str
+        What the result reports if it is not reliable; otherwise empty. summary : str
         What happened, in a few words.
     """
 
@@ -63,12 +62,12 @@ class ModeSeen:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a case saw.
+    """What a case measured.
 
     Attributes
     ----------
     right : bool
-        Whether all that the case requires holds.
+        Whether the case meets all its requirements.
     summary : str
         One sentence of what happened, without its full stop.
     finite : bool
@@ -83,8 +82,7 @@ class Seen:
     rounds : int or None
         Near-light rounds, or those of the solver.
     warning : str
-        What the result says of itself where it is not to be trusted; empty where it trusts itself.
-    modes : tuple of ModeSeen
+        What the result reports if it is not reliable; otherwise empty. modes : tuple of ModeSeen
         What each mode made of it, where several were run; the case ends as the worst of them.
     """
 
@@ -102,16 +100,16 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One hard thing.
+    """One extreme case.
 
     Attributes
     ----------
     name, subject : str
         On the command line, and the group that it belongs to.
     label : str
-        What is done, for a person.
+        What is done, as shown to the user.
     required : str
-        What must come of it.
+        The required result.
     run : callable
         Does it.
     quick : bool
@@ -131,7 +129,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """A case with what came of it.
+    """A case with its result.
 
     Attributes
     ----------
@@ -140,13 +138,13 @@ class CaseResult:
     outcome : Outcome
         How it ended.
     summary : str
-        One sentence for a person, without its full stop.
+        One sentence for the user, without its full stop.
     seen : Seen or None
-        None where the case was refused or broke off.
+        None where the case was refused or raised an error.
     seconds : float
         Of the whole case, its rendering included.
     memory_mb : float or None
-        Most that its arrays took at once; None where it was not looked at.
+        Peak memory of its arrays; None where it was not measured.
     """
 
     case: Case
@@ -158,7 +156,7 @@ class CaseResult:
 
 
 def run_case(case: Case) -> CaseResult:
-    """Run one case; whatever it raises becomes its result, except Ctrl-C."""
+    """Run one case; any exception becomes its result, except Ctrl-C."""
     begin = time.perf_counter()
     if case.memory:
         tracemalloc.start()
@@ -177,7 +175,7 @@ def _outcome(case: Case) -> tuple[Outcome, str, Seen | None]:
         seen = case.run()
     except InputError as error:
         return Outcome.REFUSED, str(error).rstrip("."), None
-    except Exception as error:  # a fault of the program is what the report is there to show
+    except Exception as error:  # the report must show faults of the program
         return Outcome.FAILED, f"{type(error).__name__}: {error}", None
     if not seen.finite:
         text = tr("the result is not finite; {summary}")
@@ -200,7 +198,7 @@ def _outcome(case: Case) -> tuple[Outcome, str, Seen | None]:
 def _within_bound(seen: Seen) -> bool:
     if seen.error_um is None:
         return True
-    # An error that is not a number is within no bound.
+    # An error that is not a number exceeds every bound.
     return seen.error_um <= (math.inf if seen.bound_um is None else seen.bound_um)
 
 
@@ -217,9 +215,9 @@ def run_cases(
     cases : sequence of Case
         From :func:`~gelpolight_core.experiments.stability_cases.all_cases`.
     progress : callable, optional
-        Told what is being done and the share done, 0..1.
+        Called with the present task and the share done, 0..1.
     done : callable, optional
-        Given every result as it comes.
+        Called with each result.
     """
     results = []
     for number, case in enumerate(cases):

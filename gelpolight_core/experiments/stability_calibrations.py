@@ -1,4 +1,4 @@
-"""Extreme calibrations: maps with holes, tables that are none, files that were tampered with."""
+"""Extreme calibrations: maps with holes, invalid curves, modified files."""
 
 from __future__ import annotations
 

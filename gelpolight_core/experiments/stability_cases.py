@@ -1,4 +1,4 @@
-"""All stability cases, in the order in which a person reads them."""
+"""All stability cases, in the order of the report."""
 
 from __future__ import annotations
 

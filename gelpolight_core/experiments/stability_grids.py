@@ -177,7 +177,7 @@ def _tiny(value: float) -> Seen:
 
 
 def _walled() -> tuple[Map, Map, Map, Map, float]:
-    """Return a bump whose slopes are wrong along a ring, with weights that know of it."""
+    """Return a bump whose slopes are wrong along a ring, with low weights there."""
     depth, slope_x, slope_y, pitch = bump(240, 320)
     y, x = np.mgrid[:240, :320]
     ring = np.abs(np.hypot(x - 160, y - 120) - 60.0) < 2.0

@@ -1,4 +1,4 @@
-"""Extreme images: values that no camera should give, and all that the file formats allow."""
+"""Extreme images: values that no camera delivers, and all number types of image files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SPOILT_UM = 8.0
 """Of 40 bad pixels, a twentieth of a per cent, on a press of 1 mm."""
 SAME_UM = 1.0
 BESIDE_UM = 2.0
-"""What is left out beside the region of a contact, root mean square (docs/speed.md)."""
+"""Effect of the skipped field beside a contact, root mean square (docs/speed.md)."""
 HIDDEN_MM = 1.0
 
 

@@ -177,9 +177,9 @@ def write_stability(
     results : sequence of CaseResult
         Of the cases.
     found : sequence of Sensitivity
-        Of the calibration parameters; empty where not asked for.
+        Of the calibration parameters; empty where not requested.
     costs : sequence of LengthCost
-        Of the stated lengths; empty where not asked for.
+        Of the stated lengths; empty where not requested.
     folder : Path
         Where to write.
 

@@ -1,4 +1,4 @@
-"""Extreme sensors and presses: LEDs, layers, lenses that nobody should build; deep, steep walls."""
+"""Extreme sensors and presses: unusual LEDs, layers and lenses; deep presses, steep walls."""
 
 from __future__ import annotations
 

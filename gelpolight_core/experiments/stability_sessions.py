@@ -1,8 +1,8 @@
-"""Stressed calibrations: sessions with too little, spoilt or wrongly stated data.
+"""Extreme calibrations: sessions with too little, damaged or wrong data.
 
 Each case changes a session of the virtual sensor, calibrates from it, and measures a press whose
 size is known, in every mode. It is right where height and size are within three stated standard
-deviations; otherwise the calibration or the measurement must say that it is not to be trusted.
+deviations; otherwise the calibration or the measurement must say that it is not reliable.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LIT = ("mirror", "whiteboard", "background", "balls", "presses")
 
 @dataclass(frozen=True, slots=True)
 class Length:
-    """A length or index that a person states in ``session.toml``.
+    """A length or index that the user states in ``session.toml``.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ def length_costs(*, progress: Progress | None = None) -> tuple[LengthCost, ...]:
     Parameters
     ----------
     progress : callable, optional
-        Told the length and the share done.
+        Called with the length and the share done.
     """
     progress = progress or (lambda _name, _share: None)
     with _changed(lambda _: None, SCALE) as folder:

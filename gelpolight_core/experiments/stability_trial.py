@@ -1,4 +1,4 @@
-"""What the cases on whole images share: a sensor made once, both models, and what they say."""
+"""Shared parts of the cases on whole images: one sensor, both models, and their notes."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def judged(
         The full one is run at each effort. Efforts and the paper's model may exceed the bound by
         their own error (:func:`own_share`).
     radius_mm : float, optional
-        Of the compared area; by default the working circle less its rim.
+        Of the compared area; by default the working circle without its edge.
     """
     image = press.frame if frame is None else frame
     calibration = known.calibration
@@ -199,7 +199,7 @@ def judged(
 
 
 def _raised(heightmap: HeightMap, needs: Sequence[Flag]) -> list[str]:
-    """Return the flags of a spoilt area, where a case requires them and all are raised."""
+    """Return the flags of a damaged area, if a case requires them and all are set."""
     if not needs or not all(flagged(heightmap, flag).any() for flag in needs):
         return []
     return [tr("flagged: {flags}").format(flags=", ".join(str(flag.name) for flag in needs))]
@@ -216,7 +216,7 @@ def own_share(heightmap: HeightMap) -> float:
 
 
 def warnings_of(found: HeightMap) -> tuple[str, ...]:
-    """Return the notes of a map that say its depth is not to be trusted."""
+    """Return the notes of a map that say its depth is not reliable."""
     harmless = {free_boundary_note()}
     if found.health is not None:
         harmless |= {finding.line for finding in found.health.findings if finding.corrected}

@@ -1,4 +1,4 @@
-"""What the camera's rays and the LEDs see of a surface whose true depth is known."""
+"""Which points of a surface with known depth the camera and the LEDs reach."""
 
 from __future__ import annotations
 

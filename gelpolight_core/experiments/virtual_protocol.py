@@ -48,7 +48,7 @@ def calibrate_virtual_sensor(
     model : str, optional
         Of the calibration.
     progress : callable, optional
-        Told a name and the share done, 0..1.
+        Called with a name and the share done, 0..1.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def press_protocol(
     workers : int, optional
         Presses that are worked on at a time.
     progress : callable, optional
-        Told what was done and the share done, 0..1; what it raises stops the work, and nothing
+        Called with the last task and the share done, 0..1; its exceptions stop it, and nothing
         that is done is lost.
 
     Raises
@@ -146,7 +146,7 @@ def measure_folder(
     workers : int, optional
         Images that are worked on at a time.
     progress : callable, optional
-        Told the file's name and the share done, 0..1.
+        Called with the file name and the share done, 0..1.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def measure_folder(
 
 
 def evaluate_run(run: ProtocolRun, reconstructor: Reconstructor, ledger: Ledger) -> Evaluation:
-    """Evaluate what is pressed so far; what the ledger knows is not measured again.
+    """Evaluate the presses so far; presses in the ledger are not measured again.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Checks whether an image is of this sensor, in the state in which it was calibrated."""
+"""Check whether an image is from this sensor and whether the sensor is unchanged."""

@@ -1,4 +1,4 @@
-"""The health check of a frame: one pass over samples, a fit, and what it means."""
+"""The health check of a frame: sample the image, fit the light, find faults."""
 
 from __future__ import annotations
 
@@ -35,9 +35,10 @@ from gelpolight_core.sensor_calibration import Calibration
 
 Map = NDArray[np.float32]
 LEAST_UNTOUCHED = 0.12
-"""Share of the field that must look as at calibration for anything to be said of the rest."""
+"""Share of the field that must look as at calibration; otherwise all faults are unknown."""
 RIM_CHANGE, LEAST_RIM = 0.02, 0.5
-"""Or else this share of the field's rim, within so much light: a contact covers the rest."""
+"""Alternatively this share of the edge of the field, within this change of light: a contact covers
+the rest."""
 UNJUDGED = tuple(key for key in KEYS if key not in ("other_sensor", "colour_order", "dark"))
 SWAPPED_UNTOUCHED = 0.4
 DARK = 0.1

@@ -1,4 +1,4 @@
-"""What the camera sees of the untouched membrane, by a calibration."""
+"""The expected camera image of the untouched membrane, from a calibration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Map = NDArray[np.float32]
 
 
 def raw_background(calibration: Calibration) -> Map:
-    """Return the background that a calibration rests on, as the camera saw it on the grid.
+    """Return the background of a calibration, as captured by the camera, on the grid.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a health check finds: each fault with its cause and its remedy in one line."""
+"""The result of a health check: each fault with its cause and remedy in one line."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class Finding:
     severity : Verdict
         ``warn``: the depth is less exact than stated; ``fail``: it is far off.
     meaningless : bool
-        Whether the depth says nothing about the object.
+        Whether the depth is meaningless.
     value : float
         How large the fault is, in `unit`.
     unit : str
         Such as ``%`` or ``px``.
     corrected : bool
-        Whether the depth is corrected for it, so that it is as exact as stated.
+        Whether the depth is corrected for it and keeps its stated accuracy.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""How the light of the untouched part of the membrane has changed, and which part that is.
+"""Find the untouched part of the membrane and the change of its light.
 
 A robust least-squares fit over cells: gain and room light of each channel, shift and blur. Cells
 that do not follow the common change are pressed, dirty, or of another sensor.
@@ -42,7 +42,7 @@ rest of the field is pressed, such as by a shallow face."""
 AS_BEFORE_OFF = 0.4
 """Its light may have changed by this share of the supposed change."""
 WITHOUT_OFFSETS = np.array([0, 2, 4, 6, 7, 8])
-"""Room light cannot be told from gain by much; where there is none, the gain alone is surer."""
+"""Room light and gain are hard to separate; without room light, the gain alone is more accurate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ def common_change(samples: Samples, change: Array, square: Array, full: Array) -
     change, square, full
         From :func:`~gelpolight_core.health.samples.compare_samples`.
     """
-    # A saturated sample says nothing of the light.
+    # A saturated sample contains no information about the light.
     usable = full == 0.0
     values = np.zeros(PARAMETERS)
     light = change[:, :6:2] / samples.normal[:, [0, 2, 4], [0, 2, 4]]

@@ -1,4 +1,4 @@
-"""From what a frame shows to faults, each with a limit that keeps the depth's error at 10 um."""
+"""Derive faults from the fit of a frame; the limits keep the error of the depth at 10 um."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far the camera has moved against the membrane, where that is too far for the fit.
+"""Camera movement against the membrane that is too large for the fit.
 
 The samples are looked up beside their places: first on a coarse lattice of shifts, then on finer
 ones about the best. What is left is followed by the fit.

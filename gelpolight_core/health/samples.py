@@ -1,4 +1,4 @@
-"""Which places of the membrane a frame is checked at, and what is expected there.
+"""The sample points of the health check, with their expected values.
 
 The field is parted into cells of about a millimetre. In each, a few short runs of grid nodes are
 sampled from the raw frame, by the same interpolation as the background was. How a change of light,

@@ -1,4 +1,4 @@
-"""How far the membrane has moved in the image, seen by its own grain and specks."""
+"""Movement of the membrane in the image, measured from its texture and specks."""
 
 from __future__ import annotations
 

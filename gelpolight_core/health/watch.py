@@ -1,4 +1,4 @@
-"""The health of a live sensor: faults that last, and a gel that has not recovered yet."""
+"""The health of a live sensor: persistent faults, and a gel that has not recovered yet."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class HealthWatch:
         self._recovery = Recovery()
 
     def update(self, health: Health, time_s: float) -> Health:
-        """Take in a frame's health; return what lasts.
+        """Add the health of a frame; return persistent faults.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class Recovery:
         self._left: deque[tuple[float, float]] = deque()
 
     def update(self, cells: Array | None, time_s: float) -> float | None:
-        """Take in a frame; return which share of the last press is left, None where nothing is.
+        """Add a frame; return the remaining share of the last press, None if there is none.
 
         Parameters
         ----------

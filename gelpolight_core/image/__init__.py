@@ -1,1 +1,1 @@
-"""Images of the camera: decoded from files, with the camera response undone."""
+"""Images of the camera: decoded from files, with the camera response corrected."""

@@ -55,7 +55,7 @@ def linear_image(
     name : str
         Name of the image.
     response : CameraResponse, optional
-        Response of the camera, which is undone; without it the camera is linear.
+        Response of the camera, which is corrected; without it the camera is linear.
     grey : bool, optional
         Whether the file had a single channel.
     """

@@ -1,4 +1,4 @@
-"""The slopes of a pressed ball, and where a ball lies by the slopes that are seen."""
+"""The slopes of a pressed ball, and the position of a ball from measured slopes."""
 
 from __future__ import annotations
 

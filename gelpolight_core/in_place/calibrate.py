@@ -184,7 +184,7 @@ def calibrate_in_place(
     towards : (terms, 2), optional
         Coefficients of an earlier calibration that few presses are to correct.
     progress : callable, optional
-        Told the share done.
+        Called with the share done.
 
     Raises
     ------

@@ -66,7 +66,7 @@ class PressSums:
 
 @dataclass(frozen=True, slots=True)
 class Ridge:
-    """How much the polynomial is held back.
+    """Strength of the ridge penalty.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Calibration folders of the open libraries: which images, balls and circles they hold.
+"""Calibration folders of other open libraries: their images, balls and circles.
 
 Three forms are known: ``catalog.csv`` with a folder for each press (gs_sdk), ``annotations/`` with
 ``probe_images/`` (py3DCal), and ``annotate.csv`` beside the images (digit-depth).
@@ -40,7 +40,7 @@ class ForeignPress:
     radius_mm : float or None
         Of the ball; None where the folder does not state it.
     circle : PlacedCircle or None
-        The contact as a person has labelled it.
+        The contact labelled by a person.
     """
 
     image: Path
@@ -50,7 +50,7 @@ class ForeignPress:
 
 @dataclass(frozen=True, slots=True)
 class ForeignFolder:
-    """What a calibration folder of another library holds.
+    """The content of a calibration folder of another library.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What presses that were left out show of a calibration in place: errors of slope and height."""
+"""Errors of slope and height of presses left out of an in-place calibration."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ INSIDE = 0.9
 TOP, RING = 0.15, (0.82, 0.92)
 """Shares of the contact radius between which the height of the cap is taken."""
 FAR = 2.2
-"""Contact radii from the centre from which the membrane is taken as untouched."""
+"""Distance from the centre, in contact radii, beyond which the membrane counts as untouched."""
 CURVE_NODES = 6
 
 
 @dataclass(frozen=True, slots=True)
 class HeldOutPress:
-    """A press beside what the calibration without it makes of it.
+    """A press compared with the result of the calibration without it.
 
     Attributes
     ----------

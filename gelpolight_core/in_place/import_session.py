@@ -21,7 +21,7 @@ from gelpolight_core.translation import tr
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """What a person states about a folder, each with precedence over the folder.
+    """What the user states about a folder, each with precedence over the folder.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ def import_session(found: ForeignFolder, stated: Stated, out: Path) -> ClosedSes
     found : ForeignFolder
         Presses and what the folder states.
     stated : Stated
-        What a person states.
+        What the user states.
     out : Path
         Folder to create; it must not exist, or be empty.
 

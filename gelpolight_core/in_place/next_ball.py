@@ -1,4 +1,4 @@
-"""What further presses would bring, and where."""
+"""Expected improvement by further presses, and their best position."""
 
 from __future__ import annotations
 

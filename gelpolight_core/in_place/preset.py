@@ -1,4 +1,4 @@
-"""Presets of closed sensors: what their makers state, as a start for a calibration in place."""
+"""Presets of closed sensors: data of their makers, as start values for in-place calibration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A first circle for a ball press, from its image beside the background."""
+"""A first circle for a ball press, from its image and the background."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def refuse_other_view(images: Sequence[Map], background: Map) -> None:
     images : sequence of (rows, columns, 3) float32
         With balls at different places.
     background : (rows, columns, 3) float32
-        Said to be of the same sensor.
+        Images that should be of the same sensor.
 
     Raises
     ------

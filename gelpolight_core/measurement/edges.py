@@ -1,10 +1,10 @@
-"""The edge near a drawn circle or rectangle, and the shape through there.
+"""Find the edge near a drawn circle or rectangle, and fit the shape to it.
 
 The edge belongs to the steepest place nearby: it is where half of that slope is reached, on the
 deeper side. Where a membrane leaves the face of an object its slope jumps, and a map blurs that
 jump, so that the steepest place itself lies outside the object by a node or two. What is found so
 is the rim of the face, within the rounding of the object's edge: an indenter that is rounded by
-0.05 mm comes out 0.1 mm smaller than it is nominally. The fitted indenters reckon with that.
+0.05 mm is measured 0.1 mm smaller than it is nominally. The fitted indenters reckon with that.
 """
 
 from __future__ import annotations
@@ -29,19 +29,20 @@ Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 REACH_SHARE = 0.25
-"""How far beside a drawn edge the steepest place is looked for, as a share of the half size."""
+"""Search distance for the steepest point beside a drawn edge, as a share of the half size."""
 REACH_MM = 1.0
 """The same at most."""
 LINES = 180
 """Lines across a circle's rim; four sides of a rectangle take a quarter each."""
 MIDDLE = 0.7
-"""Share of a rectangle's side that is looked at: its corners are round."""
+"""Share of a rectangle's side that is used: its corners are round."""
 FLAT_SHARE = 0.3
 """A place less steep than this share of the median is no edge."""
 LEAST_SLOPE = 0.02
 """Nor is any place that is flatter than this (mm per mm)."""
 CENTRE_NODES = 0.1
-"""Blur moves a rim alike all around: the centre is known to this share of a node, the radius to
+"""Blur moves an edge equally on all sides: the centre is accurate to this share of a node, the
+radius to
 one."""
 ROUNDS = 3
 """Of a rectangle."""

@@ -32,7 +32,7 @@ def evaluate_presses(
     measure : callable (image's path, shape) -> Measurement
         From :func:`~gelpolight_core.measurement.presses.press_measurement`.
     progress : callable, optional
-        Told the file's name and the share done, 0..1.
+        Called with the file name and the share done, 0..1.
     crossing : Crossing, optional
         Of the series, where a protocol was pressed.
     ledger : Ledger, optional

@@ -29,7 +29,7 @@ scales for the residual would only throw out the edges that carry the size."""
 BLUR_SD_MM = 0.1
 """Root of the sd of the squared blur: camera, denoising and coarse nodes blur a map by 0.02 to
 0.12 mm. If a fit is allowed less blur than there is, it finds a rounder edge instead: with 0.2 mm
-in place of 0.1 mm, a press of 0.5 mm comes out 0.1 mm too wide."""
+instead of 0.1 mm, a press of 0.5 mm is measured 0.1 mm too wide."""
 CORNER_SD = 0.05
 """Strength of a corner's rounding, either sign: a sharp corner holds the membrane further out."""
 CORNER_MM = 0.6
@@ -78,7 +78,7 @@ class WindowData:
     pitch_mm : float
         Distance of pixels.
     seen_share : float
-        Share of the drape's first millimetre and a half that the map holds.
+        Share of the first 1.5 mm of the drape that is on the map.
     reach_mm : float
         Length over which the map's errors hang together at least; 0 where they may be white.
     """
@@ -113,7 +113,7 @@ class FitResult:
     correlated_pixels : float
         How many neighbouring pixels err together.
     converged : bool
-        Whether the solver stopped by itself.
+        Whether the solver converged.
     """
 
     values: Mapping[str, float]
@@ -190,7 +190,7 @@ def fit_indenter(
     vector = np.array([first[name] for name in names])
     weight = window.weight[chosen]
     least_together = max(np.pi * (window.reach_mm / window.pitch_mm) ** 2, 1.0)
-    # Until the residuals are known, a twentieth of the height stands for their scale.
+    # Until the residuals are known, a twentieth of the height is used as their scale.
     sigma, together, robust = 0.05 * start["height_mm"], 30.0, np.ones(weight.shape)
     for n in range(most_rounds):
         before = vector

@@ -1,4 +1,4 @@
-"""When a measurement is not to be trusted, and why."""
+"""When a measurement is not reliable, and why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The depth map that a measured object would give: what its fit explains, and what is left."""
+"""The depth map of the fitted object, and the residual."""
 
 from __future__ import annotations
 

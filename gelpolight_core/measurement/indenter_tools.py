@@ -18,13 +18,13 @@ from gelpolight_core.reconstruction.near_light.settings import SETTINGS
 from gelpolight_core.translation import tr
 
 AUTO = "auto"
-"""The shape that asks for the shape to be found."""
+"""The value for automatic selection of the shape."""
 
 
 def measure_heightmap(
     heightmap: HeightMap, *, shape: str, seed_mm: Point | None = None
 ) -> Measurement:
-    """Measure the object that is pressed, with all that a height map knows.
+    """Measure the pressed object with all data of a height map.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Measurements that were made already, one line each, so that nothing is measured twice.
+"""Finished measurements, one line each, so that no press is measured twice.
 
 A line is found by what its result depends on: the image's bytes, the shape, and the name that
 the ledger was opened for (the calibration, the model, the program's version). So an image that
@@ -91,7 +91,7 @@ class Ledger:
         self._torn = False
 
     def _take_in(self, line: str) -> None:
-        """Take in one line; one that was torn is measured again."""
+        """Read one line; the press of an incomplete line is measured again."""
         try:
             content = parse_json(line)
             outcome = content["outcome"]

@@ -36,7 +36,7 @@ def usable(heightmap: HeightMap) -> Mask:
 
 
 def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightMap:
-    """Take the least-squares plane of the untouched surface off a height map.
+    """Subtract the least-squares plane of the untouched surface from a height map.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def level_by_plane(heightmap: HeightMap, *, mask: Mask | None = None) -> HeightM
 
 
 def level_by_points(heightmap: HeightMap, points_mm: Sequence[Point]) -> HeightMap:
-    """Take the plane through three points of the surface off a height map.
+    """Subtract the plane through three points of the surface from a height map.
 
     Parameters
     ----------

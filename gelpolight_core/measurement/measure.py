@@ -51,7 +51,7 @@ OTHER_REACH_MM = 2.5
 DRAPE_MM = 1.5
 """Where the drape falls to a tenth of the height, about two decay lengths."""
 EDGE_RADIUS_MM = 0.08
-"""Fillet of an object's edge that is taken before the map is seen."""
+"""Start value of the edge radius of an object."""
 SEED_REACH_MM = 1.0
 """How far beside an object's half-height outline a seed point may lie."""
 

@@ -1,4 +1,4 @@
-"""One measured value with its standard deviation, and the map's errors that it follows from."""
+"""A measured value with its standard deviation from the errors of the map."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Measured:
 
     @property
     def label(self) -> str:
-        """The name as a person reads it."""
+        """The name shown to the user."""
         return figure_labels().get(self.name, self.name)
 
     def as_json(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Tools that follow an outline: circle and rectangle, as drawn or at the steepest places nearby."""
+"""Tools that follow an outline: circle and rectangle, as drawn or at the nearest edge."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tools between places on the surface: distance, angle, and the step between two areas."""
+"""Tools between points on the surface: distance, angle, and the step between two areas."""
 
 from __future__ import annotations
 
@@ -223,7 +223,7 @@ def with_placing(
 
 
 def _known_depth(heightmap: HeightMap, x_mm: Array, y_mm: Array) -> Array:
-    """Return the depth at places a person chose; refuse one outside."""
+    """Return the depth at points chosen by the user; refuse a point outside."""
     depth = depth_at(heightmap, x_mm, y_mm)
     if not np.isfinite(depth).all():
         k = int(np.flatnonzero(~np.isfinite(depth))[0])

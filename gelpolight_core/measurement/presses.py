@@ -1,4 +1,4 @@
-"""Images of presses as the evaluation takes them: read, measured, and named for a ledger."""
+"""Images of presses for the evaluation: read, measured, and named for a ledger."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A section through a height map, and what is read off it: steps, widths, slopes and angles."""
+"""A section through a height map, with its steps, widths, slopes and angles."""
 
 from __future__ import annotations
 

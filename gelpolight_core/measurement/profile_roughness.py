@@ -40,7 +40,7 @@ class ProfileRoughness:
     along_mm : (n,)
         Places of the evaluation length along the line.
     roughness_mm, waviness_mm : (n,)
-        What the filter takes for roughness and for waviness there.
+        Roughness and waviness separated by the filter.
     """
 
     ra: Measured

@@ -1,4 +1,4 @@
-"""Which known indenter is pressed: ball, cylinder or cuboid, or none of them."""
+"""Detect which known indenter is pressed: ball, cylinder, cuboid, or none."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UNCLEAR = "unclear"
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """What is pressed, as far as the depth map tells.
+    """The shape of the pressed object, estimated from the depth map.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Proposal:
     at_mm : (float, float)
         Where it is, (x, y): the centroid of its upper half.
     height_mm : float
-        How high it stands, roughly.
+        Its approximate height.
     residual_mm : mapping of str to float
         What each shape leaves unexplained, root mean square.
     """
@@ -43,7 +43,7 @@ class Proposal:
 
 
 def propose(heightmap: HeightMap, *, seed_mm: tuple[float, float] | None = None) -> Proposal | None:
-    """Say which indenter is pressed; None where nothing is, or none of the three.
+    """Return the pressed indenter; None if there is none, or another shape.
 
     All three are fitted with their drape. The best one counts when it leaves no more than 6 % of
     the height, and less than three quarters of what the next one leaves; the limits are those by

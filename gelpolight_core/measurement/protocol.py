@@ -64,7 +64,7 @@ class PressWanted:
 
     @property
     def row(self) -> PressTruth:
-        """What ``truth.csv`` says of it."""
+        """Its row in ``truth.csv``."""
         return PressTruth(self.file, self.truth, self.region, str(self.repeat))
 
 

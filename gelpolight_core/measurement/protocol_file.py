@@ -1,4 +1,4 @@
-"""``protocol.toml``: what a run of the evaluation protocol asks for, and of which sensor."""
+"""``protocol.toml``: the objects and presses of a protocol run, and its sensor."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LONGEST_MM = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class ProtocolFile:
-    """What ``protocol.toml`` holds.
+    """The content of ``protocol.toml``.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class ProtocolFile:
 
 
 def write_protocol_file(content: ProtocolFile, folder: Path) -> None:
-    """Write ``protocol.toml``, whole or not at all.
+    """Write ``protocol.toml``, completely or not at all.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A run of the evaluation protocol: a folder that can be left at any time and gone on with.
+"""A run of the evaluation protocol: a folder; the run can be stopped and continued at any time.
 
     protocol.toml   presses/*.png   presses/truth.csv   refused.csv   discarded/*.png
 
@@ -143,7 +143,7 @@ class ProtocolRun:
         Raises
         ------
         InputError
-            If the disk refuses it; the press is then asked for again.
+            If the disk refuses it; the press is then requested again.
         """
         write_image(average_frames(frames), self.image(press))
         self.record(press)
@@ -158,7 +158,7 @@ class ProtocolRun:
             If ``truth.csv`` cannot be written.
         """
         order = {wanted.file: k for k, wanted in enumerate(self.wanted)}
-        # What another program has added to the same run meanwhile stays.
+        # Rows that another program added to the same run meanwhile are kept.
         there = {
             row[0]: row
             for row in _read_rows(self.presses / TRUTH)
@@ -169,7 +169,7 @@ class ProtocolRun:
         self._rows = rows
 
     def refuse(self, press: PressWanted, reason: str) -> None:
-        """Note that a press was refused and why; it stays the next one.
+        """Log that a press was refused and why; it remains the next press.
 
         Raises
         ------
@@ -267,7 +267,7 @@ def open_run(folder: Path) -> ProtocolRun:
                 where=str(presses / TRUTH),
                 advice=tr("Restore the original protocol.toml and truth.csv"),
             )
-        # An image that was taken away is asked for again.
+        # A deleted image is requested again.
         if (presses / row[0]).is_file():
             rows[row[0]] = row
     return ProtocolRun(folder, content, rows)

@@ -1,4 +1,4 @@
-"""What a measurement says, and how it compares with the truth."""
+"""The result of a measurement, and its comparison with true values."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Measurement:
     edge_radius_mm, blur_mm : float or None
         Fillet of the object and blur of the map as fitted; None for a ball.
     baseline_mm : float
-        Level of the ground under the object, already taken off `height_mm`.
+        Level of the ground under the object, already subtracted from `height_mm`.
     residual_rms_mm : float
         Map minus fit around the object.
     correlated_pixels : float
@@ -179,7 +179,7 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A measurement beside the truth.
+    """A measurement compared with the true values.
 
     Attributes
     ----------

@@ -80,7 +80,7 @@ def roughness(
     Raises
     ------
     InputError
-        If the region holds too few nodes.
+        If the region contains too few nodes.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""How far a depth map is from the true one: height of the plateau, size at half height, depth."""
+"""Errors of a depth map against the true one: plateau height, size at half height, depth."""
 
 from __future__ import annotations
 
@@ -47,9 +47,10 @@ class DepthScore:
     Attributes
     ----------
     height_percent : float
-        Median over the true plateau (above 98 % of the nominal height), beside the true median.
+        Median over the true plateau (above 98 % of the nominal height), compared with the true
+        median.
     size_percent : float
-        Root of the area above half the nominal height, beside the true one.
+        Root of the area above half the nominal height, compared with the true one.
     rms_um : float
         Root mean square of the difference of the depths.
     """

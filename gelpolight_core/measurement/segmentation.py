@@ -1,4 +1,4 @@
-"""Finding the pressed objects of a depth map before anything is known of their shape."""
+"""Find the pressed objects of a depth map without knowledge of their shape."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Standard deviations of measured sizes: noise, calibration, mode, and what the fit leaves over.
+"""Standard deviations of measured sizes: noise, calibration, mode, and residual of the fit.
 
 ``noise`` is what repeats of the image scatter by: examples of the depth map's noise pass through
 the fit's last step. The fit's weights move with the noise too, which that step does not show: where

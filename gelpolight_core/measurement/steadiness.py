@@ -1,4 +1,4 @@
-"""Is something pressed, at the right place, and does it hold still? Judged by the camera's noise.
+"""Check from the camera noise whether an object is pressed, at the right position, and still.
 
 A press is recognised by what it changes in the image of the bare membrane. This needs no
 calibration and keeps up with the camera.
@@ -109,7 +109,7 @@ def judge_press(
     position_px: tuple[float, float] | None = None,
     tolerance_px: float = math.inf,
 ) -> PressJudgement:
-    """Judge whether consecutive frames show a press that is held still.
+    """Check whether consecutive frames show a press without movement.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def judge_press(
     position_px : (float, float), optional
         Where to press, (u, v) in pixels.
     tolerance_px : float, optional
-        How far beside it the middle of the press may be.
+        Largest distance of the middle of the press from it.
     """
     nowhere = Contact(0.0, (math.nan, math.nan))
     if len(frames) < LEAST_FRAMES:

@@ -1,4 +1,4 @@
-"""What all measuring tools share: frozen geometry in mm that is applied to a height map.
+"""The base of all measuring tools: frozen geometry in mm that is applied to a height map.
 
 A tool and a height map give one result, wherever they come from: the screen, a stored file or the
 command line.
@@ -31,7 +31,7 @@ FLAGGED_SHARE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class ToolResult:
-    """What a tool says of a height map.
+    """The result of a tool on a height map.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def tool_result(
     flags: Flags,
     profile: Profile | None = None,
 ) -> ToolResult:
-    """Return a result; doubtful where much of what it rests on is flagged.
+    """Return a result; doubtful if many of the points that it uses are flagged.
 
     Parameters
     ----------

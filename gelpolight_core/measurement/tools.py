@@ -1,4 +1,4 @@
-"""The measuring tools, and they and their results as plain values for JSON."""
+"""The measuring tools, and their conversion with results to plain values for JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A measurement is never better than its calibration and its image."""
+"""Mark measurements as doubtful if the calibration or the image has a fault."""
 
 from __future__ import annotations
 

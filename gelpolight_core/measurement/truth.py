@@ -1,4 +1,4 @@
-"""Reading ``truth.csv``: what was pressed, where, and how often."""
+"""Read ``truth.csv``: the pressed objects, their positions and repeats."""
 
 from __future__ import annotations
 

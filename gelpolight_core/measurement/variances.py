@@ -1,4 +1,4 @@
-"""Variances of repeated measurements, within a place and between places."""
+"""Variances of repeated measurements, within a position and between positions."""
 
 from __future__ import annotations
 

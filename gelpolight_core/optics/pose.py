@@ -28,7 +28,7 @@ from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.translation import tr
 
 MOST_LENS_BLUR_PX = 1.0
-"""A solve undoes this much blur; what is left of more makes walls flatter than they are."""
+"""The reconstruction removes up to this blur; the rest of a larger blur makes walls too flat."""
 
 
 class Decision(StrEnum):

@@ -1,4 +1,4 @@
-"""Has an untouched sensor moved away from its calibration, and setting it to zero again."""
+"""Background shift of an untouched sensor since its calibration, and setting it to zero."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def zeroed(
     """Return the calibration with the present background in the place of its own (tare).
 
     The full model compares a press with its background, which is replaced. The paper's model has it
-    in its reflectance factors (Eq. 9), which are computed anew with the table and radiance as they
+    in its reflectance factors (Eq. 9), which are computed again with the table and radiance as they
     are. Lights, lens and membrane stay; where they have changed, zero hides it on the bare membrane
     only.
 
@@ -211,7 +211,7 @@ def _touched(coarse: Map, there: Mask, pitch_mm: float) -> bool:
     even = cv2.GaussianBlur(known, (0, 0), sigma) / np.maximum(share, 1e-6)[..., None]
     quiet = cv2.GaussianBlur(np.where(there[..., None], coarse / even, 1.0), (0, 0), 1.0)
     changed = (np.abs(quiet - 1.0) > TOUCHED_SHARE).any(axis=2) & there
-    # The field's edge moves against the lit rim when the camera does: no contact begins there.
+    # When the camera moves, the edge of the field changes: this is not a contact.
     changed &= ndimage.binary_erosion(there, iterations=2)
     labels, count = ndimage.label(changed)
     if count == 0:
@@ -278,7 +278,7 @@ def _judge(
 
 
 def _refuse_unfit(shift: BackgroundShift) -> None:
-    """Refuse to take an image for the background that is none, or that zero cannot mend."""
+    """Refuse an image that is not a background, or that setting to zero cannot correct."""
     for key in ("drift_touched", "drift_shift_px"):
         figures = [f for f in shift.quality.figures if f.key == key]
         if figures and figures[0].verdict is Verdict.FAIL:

@@ -1,4 +1,4 @@
-"""Work buffers that are kept from frame to frame."""
+"""Work buffers that are reused from frame to frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 class Buffers:
-    """Lends arrays by name; what they hold is of no use to the next who takes them."""
+    """Provides arrays by name; their content is undefined."""
 
     def __init__(self) -> None:
         self._kept: dict[str, NDArray[Any]] = {}
@@ -17,7 +17,7 @@ class Buffers:
     def take(
         self, name: str, shape: tuple[int, ...], dtype: type[np.generic] = np.float32
     ) -> NDArray[Any]:
-        """Return an array of this shape and kind, with whatever it holds."""
+        """Return an array of this shape and type with undefined content."""
         size = int(np.prod(shape))
         kept = self._kept.get(name)
         if kept is None or kept.size < size:

@@ -1,4 +1,4 @@
-"""What a reconstruction takes: images of the right kind, lights that can be solved."""
+"""Checks before and after a reconstruction: valid images, solvable lights, notes on the map."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ USABLE_STEP = 8
 def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     """Return a frame as uint8, uint16 or float32 in this machine's byte order.
 
-    Floats are limited to 0..1, so that no wild value spreads to its neighbours: below there is no
-    light, above the pixel is saturated. What is not a number stays so and counts as missing.
+    Floats are limited to 0..1, so that no extreme value spreads to its neighbours: values below 0
+    mean no light, values above 1 mean saturation. Values that are not numbers count as missing.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
     Raises
     ------
     InputError
-        If the frame holds other numbers.
+        If the frame contains other numbers.
     """
     kind, size = frame.dtype.kind, frame.dtype.itemsize
     if size not in BYTES_OF_KIND.get(kind, ()):
@@ -83,7 +83,7 @@ def accepted(frame: NDArray[Any], *, name: str) -> NDArray[Any]:
 
 
 def free_boundary_note() -> str:
-    """Return the note on a map whose boundary a contact crosses; its depth is as good as any."""
+    """Return the note on a map whose boundary a contact crosses; its depth is still accurate."""
     return tr("a contact crosses the boundary of the field: the boundary is free there")
 
 
@@ -98,7 +98,7 @@ def held_boundary_note() -> str:
 def paper_notes(depth_mm: Map, flags: NDArray[np.uint8], least_height_mm: float) -> tuple[str, ...]:
     """Return the notes on a map of the paper's model outside of what the model assumes.
 
-    It takes three lights for granted, frozen at the undeformed surface.
+    It assumes three lights, with the directions at the undeformed surface.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def condition_note(calibration: Calibration, leds_mm: NDArray[np.float64]) -> st
 
 
 def unanchored_note() -> str:
-    """Return the note on a map without an anchor, all of which may be off by a constant."""
+    """Return the note on a map without an anchor, which may be wrong by a constant."""
     return tr(
         "nearly all of the boundary is pressed: depth differences within the map "
         "are valid, but all depths may be wrong by one constant; press so that "
@@ -158,7 +158,7 @@ def unanchored_note() -> str:
 
 
 def unsolved_note(share: float) -> str:
-    """Return what is to be said of nodes that light alone does not decide; empty where few are."""
+    """Return the note on nodes that the light alone does not determine; empty if there are few."""
     if share <= UNSOLVED_SHARE:
         return ""
     return tr(
@@ -210,14 +210,14 @@ def refuse_coplanar_lights(calibration: Calibration, leds_mm: NDArray[np.float64
 
 
 def refuse_dark_membrane(calibration: Calibration, *, model: str) -> None:
-    """Refuse a calibration that has light on next to nothing of the membrane.
+    """Refuse a calibration with light on almost no part of the membrane.
 
     Parameters
     ----------
     calibration : Calibration
         The sensor's.
     model : str
-        ``full``, which looks at the background, or ``paper``, which looks at the radiance.
+        ``full``, which checks the background, or ``paper``, which checks the radiance.
 
     Raises
     ------

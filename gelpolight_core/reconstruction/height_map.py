@@ -1,4 +1,4 @@
-"""The depth map of one image, with all that is needed to use it elsewhere."""
+"""The depth map of one image, with all data needed to use it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gelpolight_core.reconstruction.trace import Trace
 
 
 class Flag(IntFlag):
-    """Why the depth of a pixel is to be trusted less; several may hold at once.
+    """Reasons why the depth of a pixel is less reliable; a pixel can have several.
 
     Examples
     --------
@@ -28,7 +28,7 @@ class Flag(IntFlag):
     OUTSIDE = 1
     """Outside the working area or the image."""
     SATURATED = 2
-    """A channel at its upper end: it says nothing."""
+    """A saturated channel: it contains no information."""
     DARK = 4
     """A channel without signal: in shadow."""
     EXTRAPOLATED = 8
@@ -38,7 +38,7 @@ class Flag(IntFlag):
     INVALID = 32
     """Not finite, or no light or reflectance factor there."""
     UNANCHORED = 64
-    """Nearly all of the boundary is pressed: the depth may be off by a constant."""
+    """Nearly all of the boundary is pressed: the depth may be wrong by a constant."""
 
 
 FLAG_NAMES = MappingProxyType({str(flag.name).lower(): flag.value for flag in Flag})
@@ -76,17 +76,16 @@ class HeightMap:
     source : str
         Name of the image, such as ``press_03.png``.
     notes : tuple of str
-        What is to be said of this map, in sentences for a person.
+        Notes on this map for the user.
     slope_sd, depth_sd_mm : (rows, columns) float32 or None
-        What repeats of the image scatter by: standard deviations of the surface's slopes (root
-        mean square of x and y) and of the depth, from the image's noise. None where they were
-        not asked for, or by the paper's model.
+        Scatter of repeated images: standard deviations of the slopes of the surface (root mean
+        square of x and y) and of the depth, from the noise of the image. None where they were
+        not requested, or by the paper's model.
     slope_model_sd, depth_model_sd_mm : (rows, columns) float32 or None
-        The same from what the model does not explain of a press: alike in every repeat, another
-        in every press.
+        The same from errors of the model: equal in every repeat, different in every press.
     noise_mm : (examples, rows / 4, columns / 4) float32 or None
-        Errors of the depth that this noise could as well have made, on every fourth of the nodes
-        (averages over blocks of 4 x 4).
+        Examples of depth errors that this noise can cause, on every fourth node (averages over
+        blocks of 4 x 4).
     depth_scale_sd, lateral_scale_sd : float or None
         Relative standard deviations, from the calibration and the lengths stated for it, of
         depths and slopes, and of lengths across. They are common to all pixels and all images of
@@ -94,17 +93,17 @@ class HeightMap:
         `depth_sd_mm`, `depth_model_sd_mm`, and `depth_scale_sd` times the depth. None where the
         calibration does not say.
     visible_depth_mm : float or None
-        Smallest depth of a pressed flat face that the sensor shows above its noise; shallower
-        relief reads 0. None by the paper's model, which does not look for contacts.
+        Smallest depth of a pressed flat face that is visible above the noise; a shallower face has
+        depth 0. None for the paper's model, which does not detect contacts.
     trace : Trace or None
         Which steps were done, and why the others were left out.
     calibration_fault : str
-        Why no measurement with the calibration can be trusted; empty where it did not fail.
+        Why no measurement with the calibration is reliable; empty if the calibration did not fail.
     health : Health or None
         The faults of the frame that it was made of.
     lateral_per_mm : float
-        How much too wide an object comes out per mm of its depth, as a share: the paper's model
-        leaves each point where its ray meets the undeformed surface. 0 for the full model.
+        Relative error of the width of an object per mm of its depth: the paper's model leaves each
+        point where its ray meets the undeformed surface. 0 for the full model.
 
     Raises
     ------

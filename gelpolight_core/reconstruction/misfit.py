@@ -1,6 +1,7 @@
 """How well a solved surface explains the image that it was solved from.
 
-Three brightnesses decide two slopes: one is over, and says whether the model holds. The paper's
+Three brightnesses determine two slopes. The remaining one shows whether the model is
+valid. The paper's
 model solves for a normal of any length (Eq. 10), and its length less 1 is what is over. The full
 model's normals have length 1; there it is the image that the surface would give beside the one
 that was taken.

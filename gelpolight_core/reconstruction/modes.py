@@ -21,7 +21,7 @@ class Mode:
     model : str
         ``paper``, ``full`` or ``in-place``.
     effort : str
-        One of `EFFORTS`; the paper's model knows ``best`` only.
+        One of `EFFORTS`; the paper's model has ``best`` only.
     """
 
     model: str = FULL

@@ -1,4 +1,4 @@
-"""From one image to a height map, with nothing but a calibration."""
+"""Reconstruct a height map from one image and a calibration."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ LIGHT = tr("light of the image")
 
 
 class Reconstructor:
-    """Reconstructs height maps; what does not change from frame to frame is made ready once.
+    """Reconstructs height maps; what does not change from frame to frame is prepared once.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Reconstructor:
     ------
     InputError
         If the calibration was not made for the model, its lights lie nearly in one plane,
-        or there is light on next to nothing of the membrane.
+        or almost no part of the membrane has light.
     ValueError
         If there is no such effort.
 
@@ -117,7 +117,7 @@ class Reconstructor:
 
     @property
     def _open(self) -> Calibration:
-        """The calibration, which knows optics and lights."""
+        """The calibration with optics and lights."""
         return require_open(self.calibration, where=self.calibration.identity)
 
     @cached_property
@@ -127,7 +127,7 @@ class Reconstructor:
 
     @cached_property
     def health_check(self) -> HealthCheck:
-        """What compares frames with the calibration's background."""
+        """The comparison of frames with the background of the calibration."""
         return HealthCheck(self._open)
 
     @cached_property
@@ -154,7 +154,7 @@ class Reconstructor:
         return self.near_light.visible_mm if self.model == "full" else None
 
     def at_effort(self, effort: str) -> Reconstructor:
-        """Return one of another effort, which shares what is made ready already.
+        """Return a reconstructor of another effort that shares all prepared data.
 
         Raises
         ------
@@ -168,9 +168,9 @@ class Reconstructor:
         return other
 
     def warm_up(self, dtype: DTypeLike = np.uint8) -> None:
-        """Make ready all that the first frame would wait for: maps, compiled parts, buffers.
+        """Prepare everything that the first frame needs: maps, compiled parts, buffers.
 
-        The compiled parts are kept on disk; the very first time they take most of a minute.
+        The compiled parts are stored on disk; their first compilation takes almost a minute.
 
         Parameters
         ----------
@@ -183,8 +183,8 @@ class Reconstructor:
     def needs(self, frame: NDArray[Any], *, name: str = "") -> Trace:
         """Return which steps a frame needs, without reconstructing it.
 
-        It costs no more than the check of its health and looking for a contact. What was done for
-        a frame, with times, is the ``trace`` of its result.
+        It takes only the time of the health check and of the contact detection. The ``trace`` of a
+        result contains the steps that were done, with times.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ class Reconstructor:
         return self.paper.slopes(frame, None if light is None else light.share)
 
     def linearise(self, frame: NDArray[Any]) -> NDArray[Any]:
-        """Return a frame with the camera's response undone; floats are linear light already."""
+        """Return a frame with the camera's response corrected; floats are linear light already."""
         return linearised(frame, self.calibration.response)
 
     def depth(
@@ -248,17 +248,17 @@ class Reconstructor:
         name : str, optional
             The image's name, kept in the result.
         normals : bool, optional
-            Whether the result holds normals.
+            Whether the result contains normals.
         uncertainty : bool, optional
-            Whether the result holds how far each pixel may be off; several times as slow.
-            The paper's model states none.
+            Whether the result contains standard deviations of each pixel; takes several times as
+            long. The paper's model has none.
         health : Health, optional
             Of this frame, where it is known; by default the quick check for live images is made.
 
         Raises
         ------
         InputError
-            If the frame is not of the calibration's size, or holds other numbers than these.
+            If the frame has another size than the calibration, or another number type than these.
         """
         frame = self._accepted(frame, name)
         if self.model == IN_PLACE:
@@ -323,7 +323,7 @@ class Reconstructor:
     ) -> HeightMap:
         full = self._open.full
         assert full is not None
-        # Small images need a finer scale; standard deviations are those of the best answer.
+        # Small images need a finer scale; standard deviations are those of effort best.
         effort = "best" if uncertainty else self.near_light.effort_for(self.effort)
         if effort == "best":
             # One way for a camera's numbers and for light, so that both give the same depth.
@@ -404,7 +404,7 @@ class Reconstructor:
         )
 
     def _accepted(self, frame: NDArray[Any], name: str) -> NDArray[Any]:
-        """Return a frame of the right size as numbers that every step takes."""
+        """Return a frame of the correct size in the number type of all steps."""
         camera = self.calibration.camera
         if frame.shape != (camera.height, camera.width, 3):
             shape = "x".join(str(n) for n in (*frame.shape[1::-1], *frame.shape[2:]))
@@ -435,7 +435,7 @@ def _refuse_other_model(calibration: AnyCalibration, model: str) -> None:
 
 
 def _notes(found: NearLightDepth) -> Notes:
-    """Return what a person must know of a reconstruction, in sentences."""
+    """Return the notes on a reconstruction for the user, in sentences."""
     stopped = "" if found.rounds is None else found.rounds.stopped
     note_of = {
         "damped": tr("the press is deep for its lights: the near-light rounds were damped"),
@@ -451,7 +451,7 @@ def _notes(found: NearLightDepth) -> Notes:
 
 
 def _light_step(light: LightGain | None) -> TraceStep:
-    """Return what was done about the light of a frame."""
+    """Return the trace step about the light of a frame."""
     if light is None:
         return TraceStep(LIGHT, False, tr("it is as at calibration, or cannot be corrected"))
     shares = ", ".join(f"{share:.4f}" for share in light.share)

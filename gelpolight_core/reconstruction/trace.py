@@ -1,4 +1,4 @@
-"""What was computed for a frame, and why the other steps were left out."""
+"""The steps computed for a frame, and why the others were skipped."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Any
 
 EFFORTS = ("fast", "balanced", "best")
-"""How much work a frame is worth, from least to most."""
+"""The efforts, from the fastest to the most accurate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class TraceStep:
     done : bool
         Whether it was needed.
     reason : str
-        Why it was done so, or left out, in a sentence for a person.
+        Why it was done in this way, or skipped, in a sentence for the user.
     milliseconds : float or None
         Its time; None where it was left out or not timed.
     bytes : int

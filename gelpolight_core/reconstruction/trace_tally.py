@@ -1,4 +1,4 @@
-"""Which steps ran how often over the last minute, and what leaving out the others saved."""
+"""How often each step ran in the last minute, and the time saved by skipped steps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class StepCount:
     mean_ms : float or None
         Of the frames in which it ran; None where it never ran or was not timed.
     saved_ms : float or None
-        What leaving it out saved, if it would have taken as long as when it ran.
+        Time saved by skipping it, if it would have taken as long as when it ran.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Judge each ball press against the others: does the stated radius agree with them.
+"""Compare each ball press with the others: does its stated radius agree with them.
 
 The other presses give the membrane's curve (brightness over the light's cosine, Eq. 6); with that
 curve the radius and the centre of a press follow from its own shading. A press whose radius comes
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 
 LEAST_PRESSES = 4
-"""With fewer, nobody knows which of two that disagree is wrong."""
+"""With fewer presses, it is unknown which of two different presses is wrong."""
 MOST_PIXELS = 1500
 BINS = np.linspace(0.05, 1.0, 39)
 LEAST_IN_BIN = 8
@@ -47,7 +47,7 @@ class PressAgreement:
     name : str
         The image's file.
     stated_radius_mm, radius_mm : float
-        Of the ball: as stated, and as the press's shading asks for.
+        Of the ball: as stated, and as fitted to the shading of the press.
     moved_share : float
         How far the shading moves the centre, of the contact radius.
     misfit : float

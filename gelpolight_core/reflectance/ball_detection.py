@@ -1,4 +1,4 @@
-"""Find a ball's indentation in an image without any help.
+"""Find the indentation of a ball in an image automatically.
 
 Four steps, none of which needs the lights, the camera or the scale; everything is in pixels of the
 image given, raw or resampled. (1) Markers printed on the membrane are found in the background and
@@ -68,7 +68,7 @@ _MODEL_OF_SHADING, _APART_OF_SHADING = 0.09, 0.35
 
 @dataclass(frozen=True, slots=True)
 class BallDetection:
-    """The answer to: is there a ball's indentation in this image, and where.
+    """Whether and where an image shows the indentation of a ball.
 
     Attributes
     ----------

@@ -4,8 +4,8 @@ Around a ball the membrane's slopes run through all directions: they grow from t
 contact's edge and die away in the drape. Whatever the lights, a channel's brightness is a smooth
 function of slope, here a polynomial of degree 2 whose coefficients are free for each channel. So
 the only shape in the fit is the ball's: centre, contact radius and decay length. All pixels take
-part, none of them alone decides, and pixels without a value are simply left out. What such a fit
-leaves unexplained tells a ball from anything else.
+part, none of them alone decides, and pixels without a value are simply left out. The residual of
+this fit distinguishes a ball from other objects.
 """
 
 from __future__ import annotations

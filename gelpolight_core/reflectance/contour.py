@@ -3,7 +3,7 @@
 The membrane leaves the ball along a tangent: the slope is continuous at the contact's edge and
 largest there, and its derivative along the radius jumps. Whatever the light and the reflectance,
 brightness is a smooth function of slope, so every colour channel has a kink at the same radius.
-A filter that answers to a kink and to no parabola finds it without a threshold on brightness.
+A filter that responds to a kink but not to a parabola finds it without a brightness threshold.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Each facet of the surface sends out what the camera sees of it, turned into the other direction by
 the glossy lobe. A point receives all facets through its own response, so that light that one wall
-throws onto another is counted with its direction. What the camera sees holds all earlier
+reflects onto another is counted with its direction. What the camera sees holds all earlier
 reflections and all shadows, so that one gathering is enough. The diffuse share is Lambertian.
 What the elastomer's lower face returns (Fresnel, and totally beyond the critical angle) comes from
 the facets' mirror images in it.
@@ -117,7 +117,7 @@ def ratio_thrown(ratio: NDArray[np.floating], known: NDArray[np.bool_], throwing
     known : (rows, columns, 3) or (rows, columns, 1) bool
         Where it is known; elsewhere facets throw as much as untouched ones.
     throwing : (rows, columns) float32
-        Share of each facet that throws light.
+        Share of each facet that reflects light.
     """
     return np.asarray(np.where(known, np.maximum(ratio, 0.0), 1.0) * throwing[..., None])
 

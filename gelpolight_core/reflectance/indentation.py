@@ -59,7 +59,7 @@ class Indentation:
     centre_sd_px, radius_sd_px : float
         Standard deviations of the centre, per axis, and of the radius.
     found_by : str
-        What the circle rests on: ``edge``, ``shading``, or ``hand`` if a person placed it.
+        Source of the circle: ``edge``, ``shading``, or ``hand`` if the user placed it.
     axis_ratio : float
         Shorter over longer axis of the ellipse through the contour.
     coverage : float
@@ -105,7 +105,7 @@ def indentation_at(
     name: str = "press",
     background_name: str = "background",
 ) -> Indentation:
-    """Describe an indentation whose contact a person has placed.
+    """Describe an indentation whose contact the user has placed.
 
     Parameters
     ----------

@@ -45,7 +45,8 @@ LARGEST_LIGHT_CHANGE = 0.1
 # give 0.2 and less, domed ones 0.5.
 _LEAST_INNER_CHANGE = 0.7
 _LEAST_VISIBLE = 0.4
-# Behind markers only guesses are left: above the first no object can be told, above the second
+# Behind markers the image is estimated: above the first limit no object can be recognised, above
+# the second
 # no ball can be denied.
 MOST_HIDDEN = 0.7
 _MUCH_HIDDEN = 0.45

@@ -23,7 +23,7 @@ CURVE_NODES = 257
 
 @dataclass(frozen=True, slots=True)
 class Membrane:
-    """How the membrane answers light.
+    """The response of the membrane to light.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Membrane:
         Reflectance for light from other parts of the membrane, in units of the reflectance that
         :meth:`response` describes; 0: it gives none to itself.
     diffuse : tuple of 3 tuples of `CURVE_NODES` floats
-        The diffuse share of each channel at even cosines from 0 to 1, in place of
+        The diffuse share of each channel at even cosines from 0 to 1, instead of
         ``cosine**exponent``; empty where the power stands.
     """
 

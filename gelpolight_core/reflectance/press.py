@@ -73,7 +73,7 @@ class BallPress:
 
 @dataclass(frozen=True, slots=True)
 class PlacedContact:
-    """A contact placed by a person, where it is seen on the undeformed top surface.
+    """A contact placed by the user, where it is seen on the undeformed top surface.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ def find_ball(
     usable : (rows, columns) bool, optional
         Nodes with light; by default all that the camera sees.
     placed : PlacedContact, optional
-        The contact as a person has placed it; by default it is looked for. Its centre is refined
+        The contact placed by the user; by default it is detected. Its centre is refined
         on the shading either way.
 
     Raises

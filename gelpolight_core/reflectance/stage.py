@@ -32,7 +32,7 @@ LEAST_COSINE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class ReflectanceResult:
-    """The reflectance table with what it rests on.
+    """The reflectance table with its data.
 
     Attributes
     ----------

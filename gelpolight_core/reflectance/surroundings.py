@@ -1,4 +1,4 @@
-"""What a point of the membrane sees of the camera."""
+"""The camera as seen from a point of the membrane."""
 
 from __future__ import annotations
 

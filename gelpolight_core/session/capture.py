@@ -29,7 +29,7 @@ def average_frames(frames: Sequence[Frame]) -> Frame:
 
 
 def write_image(rgb: Frame, path: Path, *, new: bool = False, inside: Path | None = None) -> None:
-    """Write a PNG file, whole or not at all.
+    """Write a PNG file, completely or not at all.
 
     Parameters
     ----------

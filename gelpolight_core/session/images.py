@@ -232,7 +232,7 @@ def read_image(path: Path, *, response: CameraResponse | None = None) -> LinearI
     path : Path
         PNG or TIFF, 8 or 16 bit.
     response : CameraResponse, optional
-        Response of the camera, which is undone; without it the camera is linear.
+        Response of the camera, which is corrected; without it the camera is linear.
 
     Raises
     ------

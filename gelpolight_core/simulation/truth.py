@@ -1,4 +1,4 @@
-"""What a simulated session says of the truth behind its images."""
+"""The true data of a simulated session."""
 
 from __future__ import annotations
 

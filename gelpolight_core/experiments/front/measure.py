@@ -1,6 +1,7 @@
-"""Error against run time: what each method costs and how accurate it is.
+"""Error against run time of each method.
 
-Errors are against a truth that no method knows. Every press is timed, and all methods take turns on
+Errors are differences from the true depth, which no method
+uses. Every press is timed, and all methods take turns on
 it, so that a slow spell of the machine meets all alike. A method that fails or refuses is a gap
 with its reason.
 """
@@ -114,7 +115,7 @@ def measure_scene(
     repeats : int, optional
         How often each press is timed, after a first run for the error.
     progress : callable, optional
-        Told what is being done and the share done; what it raises stops the work.
+        Called with the present task and the share done; its exceptions stop the work.
     """
     progress = progress or (lambda _what, _share: None)
     runs = []

@@ -168,7 +168,7 @@ def _rival(rivals: Rivals, kind: str, wrong: bool, scene: Scene) -> Solve:
         slope_x, slope_y = (np.ascontiguousarray(slopes[..., k]) for k in (0, 1))
         if wrong:
             depth = shifted_cosine_transform(slope_x, slope_y, grid.pitch_mm)
-            # Its constant is free; depth 0 at the border is the best that can be said.
+            # Its constant is free; depth 0 at the border is the best assumption.
             return depth - np.median(depth[border]), (slope_x, slope_y)
         return solver.integrate(slope_x, slope_y).depth_mm, (slope_x, slope_y)
 

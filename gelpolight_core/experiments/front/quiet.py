@@ -1,4 +1,4 @@
-"""What else the machine is doing while times are measured."""
+"""Other programs that run while times are measured."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gelpolight_core.translation import tr
 
 PROC = Path("/proc")
 QUIET_PERCENT = 15.0
-"""Of one processor: what a desktop does by itself."""
+"""Of one processor: the normal load of a desktop."""
 LOOK_S = 2.0
 
 
@@ -46,7 +46,7 @@ class Machine:
 
     @property
     def quiet(self) -> bool:
-        """Whether times can be trusted as those of the machine alone."""
+        """Whether other programs had no significant effect on the times."""
         return self.others_percent is not None and self.others_percent <= QUIET_PERCENT
 
     @property
@@ -67,14 +67,14 @@ class Machine:
 
 
 class Watch:
-    """Waits for a quiet machine, then counts what others use of it.
+    """Waits until the machine is quiet, then measures the load by other programs.
 
     Parameters
     ----------
     most_s : float, optional
         Longest time to wait.
     progress : callable, optional
-        Told that it waits, and for what share of the time; what it raises stops the waiting.
+        Called while it waits, with the share of the time; its exceptions stop the waiting.
     """
 
     def __init__(

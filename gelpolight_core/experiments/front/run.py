@@ -131,7 +131,7 @@ def measure_sensor(
     seed : int, optional
         Of a virtual sensor.
     progress : callable, optional
-        Told what is being done and the share done; what it raises stops the work.
+        Called with the present task and the share done; its exceptions stop the work.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def prepared(source: Source, seed: int, progress: Progress) -> tuple[Session, Sc
     seed : int
         Of a virtual sensor.
     progress : callable
-        Told what is being done and the share done.
+        Called with the present task and the share done.
     """
     folder = source.folder
     if source.design is not None and not (folder / "truth.json").is_file():
@@ -188,7 +188,7 @@ def measure_leaving_out(
     repeats : int, optional
         How often each frame is timed.
     progress : callable, optional
-        Told what is being done and the share done; what it raises stops the work.
+        Called with the present task and the share done; its exceptions stop the work.
 
     Raises
     ------

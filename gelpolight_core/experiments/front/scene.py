@@ -114,7 +114,7 @@ def calibrated_scene(session: Session, kept: Path, progress: Progress) -> Scene:
     kept : Path
         Folder of ``paper.gplcal``, ``full.gplcal`` and ``balls.npz``.
     progress : callable
-        Told what is being done and the share done.
+        Called with the present task and the share done.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def calibrated_scene(session: Session, kept: Path, progress: Progress) -> Scene:
             progress(stage.value, number / (len(stages) + 2))
             results = run_stage(stage, session, results)
         progress(Stage.JOINT.value, len(stages) / (len(stages) + 2))
-        # What is written last says that all is there.
+        # This file is written last: if it exists, all others do.
         write_calibration(assemble(session, results, model="paper").calibration, files[0])
         write_calibration(bare_calibration(session, refine_with(session.sensor, results)), files[1])
         write_samples(ball_samples(results), files[2])

@@ -20,7 +20,7 @@ from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
 USUAL = ("paper", "full_fast", "full_balanced", "full_best")
-"""What a person chooses between."""
+"""The choices of the user."""
 RENDERING = 0.4
 
 
@@ -50,7 +50,7 @@ def measure_calibration(
     repeats : int, optional
         How often each press is timed.
     progress : callable, optional
-        Told what is being done and the share done; what it raises stops the work.
+        Called with the present task and the share done; its exceptions stop the work.
 
     Raises
     ------

@@ -116,7 +116,7 @@ def measure_integrators(
     repeats : int, optional
         Timed runs; one for those that take long.
     progress : callable, optional
-        Told what is being done and the share done.
+        Called with the present task and the share done.
     """
     work = [("bump", n) for n in sides if n != side] + [(name, side) for name in SURFACES]
     points = []

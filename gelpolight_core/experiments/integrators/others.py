@@ -1,7 +1,7 @@
 """Integrators of others, from their published equations, in double precision.
 
 Each takes d(depth)/dx and d(depth)/dy (rows, columns) and the pitch in mm, and returns the depth in
-mm. The constant is free: these methods do not know where the depth is 0.
+mm. The constant is free: these methods do not determine where the depth is 0.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def shifted_cosine_transform(slope_x: Array, slope_y: Array, pitch_mm: float) ->
     """Do the same with the faults that open tactile libraries share.
 
     Wave k is divided by the eigenvalue of wave k + 1, and differences over two nodes are not
-    halved: depths come out too low or too high by the width of the contact.
+    halved: depths are too low or too high, depending on the width of the contact.
     """
     padded_x, padded_y = (np.pad(s, 1, mode="edge") for s in (slope_x, slope_y))
     divergence = padded_x[1:-1, 2:] - padded_x[1:-1, :-2] + padded_y[2:, 1:-1] - padded_y[:-2, 1:-1]
@@ -79,7 +79,7 @@ def sparse_quadratic(
         shape=(target.size, slope_x.size),
     )
     weighted = difference.T @ diags_array(own)
-    # The constant, and nodes without any edge, are held by a weight that nothing feels.
+    # A very small weight fixes the constant, and nodes without any edge.
     matrix = (weighted @ difference + 1e-9 * diags_array(np.ones(slope_x.size))).tocsc()
     return np.asarray(spsolve(matrix, weighted @ target)).reshape(shape)
 

@@ -101,7 +101,7 @@ def _wedge(x: Array, y: Array) -> tuple[Array, Array, Array]:
 
 
 def _dome(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Return half a ball, whose rim no image shows."""
+    """Return a hemisphere, whose vertical edge no image shows."""
     square = x**2 + y**2
     on = square < 2.9**2
     z = np.sqrt(np.maximum(9.0 - square, 1e-3))

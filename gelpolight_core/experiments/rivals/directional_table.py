@@ -1,6 +1,6 @@
 """The common method: one table from colour to slope, n = F(I) (the paper's Eq. 2).
 
-Light is taken as parallel and even, so that the same colour means the same slope everywhere. The
+Light is assumed parallel and uniform, so that a colour means the same slope everywhere. The
 colour is the relative change I / I0 - 1. Colours that no ball has shown take the slope of the
 nearest one that a ball has shown.
 """

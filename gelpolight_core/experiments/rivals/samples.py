@@ -1,4 +1,4 @@
-"""What the rivals learn from: pixels of ball presses with their known slopes."""
+"""Training data of the other methods: pixels of ball presses with their known slopes."""
 
 from __future__ import annotations
 

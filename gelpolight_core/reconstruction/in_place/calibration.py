@@ -1,4 +1,4 @@
-"""The calibration of a closed sensor: all that a reconstruction of its images needs."""
+"""The calibration of a closed sensor: all data for the reconstruction of its images."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gelpolight_core.translation import tr
 
 MODEL = "in-place"
 UNKNOWN = ("optics", "refraction", "temperature")
-"""What calibration in place cannot know."""
+"""Quantities that in-place calibration cannot determine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class InPlaceCalibration:
 
     @property
     def fault(self) -> str:
-        """Why no measurement with it can be trusted, as a clause; empty where it did not fail."""
+        """Why no measurement with it is reliable, as a clause; empty if it did not fail."""
         return failure(self.quality)
 
 
@@ -103,7 +103,7 @@ AnyCalibration = Calibration | InPlaceCalibration
 
 
 def require_open(calibration: AnyCalibration, *, where: str) -> Calibration:
-    """Return a calibration that knows optics and lights.
+    """Return a calibration with optics and lights.
 
     Raises
     ------

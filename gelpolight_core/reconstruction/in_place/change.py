@@ -52,7 +52,7 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class ColourChange:
-    """What an image shows beside its reference.
+    """An image compared with its reference.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ def common_gain(smooth: Map, base: Reference) -> NDArray[np.float64]:
 
 
 def _smooth(rgb: Map, trusted: Mask) -> Map:
-    """Smooth an image; where only some nodes are trusted, from these alone."""
+    """Smooth an image, with the reliable nodes only."""
     if trusted.all():
         return np.asarray(cv2.GaussianBlur(rgb, (0, 0), SMOOTHING_NODES), np.float32)
     share = cv2.GaussianBlur(trusted.astype(np.float32), (0, 0), SMOOTHING_NODES)

@@ -14,9 +14,9 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 Map = NDArray[np.float32]
 
 FREE = 1e-4
-"""How firmly depth 0 is held where a contact crosses the border."""
+"""Weight of depth 0 where a contact crosses the border."""
 ROUGHLY_FREE = 1e-3
-"""How firmly it is held all around in a first, coarse solution."""
+"""Weight of depth 0 on the whole border in a first, coarse solution."""
 COARSE = 4
 CROSSES = 0.08
 """Share of the greatest depth at the border from which it is not held all around ..."""
@@ -50,7 +50,7 @@ def depth_of(
     pitch_mm : float
         Distance between nodes.
     weight : (rows, columns) float32
-        How far each slope is trusted, 0..1.
+        Weight of each slope, 0..1.
     workers : RowWorkers, optional
         Threads; by default one.
 
@@ -111,7 +111,7 @@ def _near_walls(slope_x: Map, slope_y: Map, pitch_mm: float) -> NDArray[np.bool_
 
 
 def _firm(rough_mm: Map, near: NDArray[np.bool_], least_mm: float) -> Map | None:
-    """Return how firmly the border is held by a solution that hardly is; None: everywhere."""
+    """Return the weight of depth 0 at the border, from a nearly free one; None: 1 everywhere."""
 
     def border(values: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])

@@ -1,4 +1,4 @@
-"""What calibration in place knows of a closed sensor, and the slopes that it gives."""
+"""The calibrated model of a closed sensor, and the slopes that it gives."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ class InPlaceSolver:
         effort : str
             Kept in the trace; there is one mode.
         with_normals, uncertainty : bool
-            What the result holds beside the depth.
+            Results in addition to the depth.
         """
         model, record = self._model, TraceRecorder()
         why = tr("calibration in place has one mode")

@@ -1,4 +1,4 @@
-"""Integration that keeps steps: at each node the smoother of its two sides decides.
+"""Integration that preserves steps: at each node the smoother of its two sides decides.
 
 Bilateral normal integration (Cao, Santo, Shi, Okura, Matsushita, ECCV 2022), for parallel
 projection. Each node states its slope to both of its neighbours along an axis; a logistic weight
@@ -42,7 +42,7 @@ class BilateralIntegration:
     rounds : int
         Of weights and depth in turn.
     converged : bool
-        Whether the energy had settled.
+        Whether the energy converged.
     """
 
     depth_mm: Array
@@ -139,7 +139,7 @@ class _Sides:
         return float(np.sum(self._trust * (ahead * after**2 + (1.0 - ahead) * before**2)))
 
     def _ahead(self, depth: Array, steepness: float) -> Array:
-        """Return the share of each node's trust that goes to the edge after it."""
+        """Return the share of the weight of each node for the edge after it."""
         before, after = self._residuals(depth)
         preferred = steepness * self._trust * (before**2 - after**2) / self._typical(before, after)
         share = 1.0 / (1.0 + np.exp(-np.clip(preferred, -60.0, 60.0)))
@@ -174,7 +174,7 @@ class _Sides:
 def _solved(edges: list[tuple[int, Array, Array]], start: Array) -> Array:
     """Return the depth that fits the edges best: conjugate gradients from a first guess.
 
-    A cosine transform that takes all edges for alike leads the way.
+    A cosine transform with equal weights is the preconditioner.
     """
     waves = [4.0 * np.sin(0.5 * np.pi * np.arange(n) / n) ** 2 for n in start.shape]
     eigenvalues = waves[0][:, None] + waves[1]

@@ -1,4 +1,4 @@
-"""The half of the Poisson solve that needs no transform: columns of tridiagonal equations.
+"""The part of the Poisson solver without a transform: tridiagonal equations along columns.
 
 A sine transform along the rows leaves, for every wave, one tridiagonal system down the columns. It
 is solved directly, many waves at a time, with one pass down and one up: a sixth of the work of

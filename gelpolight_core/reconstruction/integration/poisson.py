@@ -47,7 +47,7 @@ class Integration:
     depth_mm : (rows, columns)
         Depth at the pixel centres, 0 half a pixel outside the outermost ones.
     sanitised_count : int
-        How many slope values (of two per pixel) were not finite and taken as 0.
+        Number of slope values (two per pixel) that were not finite and were set to 0.
     clipped_count : int
         How many slope values were beyond the limit and brought back to it.
     """
@@ -80,7 +80,7 @@ class EdgeWeights:
 
 
 class PoissonSolver:
-    """Integrates slopes on a grid of one size; everything that does not change is made ready once.
+    """Integrates slopes on a grid of one size; everything that does not change is prepared once.
 
     Solves, in the least-squares sense over all pixel edges, ``d[j + 1] - d[j] = e[j]`` with ``e``
     the integral of the slope along the edge (the discrete form of the paper's Poisson equation
@@ -103,7 +103,7 @@ class PoissonSolver:
     dtype : dtype, optional
         float32 (live path) or float64.
     workers : int, optional
-        Threads; the answer does not depend on their number.
+        Threads; the result does not depend on their number.
     stencil : {4, 2, 1}, optional
         Number of slopes in an edge integral: order 4, 2 (trapezoid) or 1 (forward difference,
         for convergence tests only: it shifts the depth by up to half a pixel).

@@ -1,4 +1,4 @@
-"""The compiled divergence of slopes: what each node's edges bring to it."""
+"""The compiled divergence of slopes: the sum over the edges of each node."""
 
 from __future__ import annotations
 

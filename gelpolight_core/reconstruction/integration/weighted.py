@@ -1,4 +1,4 @@
-"""Integration with weights: slopes that are not to be trusted do not decide the depth.
+"""Integration with weights: unreliable slopes have little effect on the depth.
 
 Minimises the weighted sum of squared edge errors with depth 0 at the border, by conjugate gradients
 with the plain sine-transform solution as preconditioner; with even weights the first step is exact.
@@ -65,7 +65,7 @@ def integrate_weighted(
     tolerance: float = TOLERANCE,
     workers: RowWorkers | None = None,
 ) -> WeightedIntegration:
-    """Integrate slopes (rows, columns) float32, each trusted as far as its weight says.
+    """Integrate slopes (rows, columns) float32 with weights.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def integrate_weighted(
     start_mm : (rows, columns), optional
         A first guess.
     hold : (rows, columns), optional
-        How firmly depth 0 is held just outside the border, 0..1; by default 1 everywhere. Where a
+        Weight of depth 0 just outside the border, 0..1; by default 1 everywhere. Where a
         contact crosses the border it is small, and what is around leads the depth.
     tolerance : float, optional
         Of what is left, relative to the depth itself, in the root of the mean squared weighted
@@ -141,7 +141,7 @@ class _Solve:
         _run(self._workers, len(self._weight), action, *arguments)
 
     def apply(self, depth: Map) -> float:
-        """Write what a depth map's weighted differences bring to `image`; return the product."""
+        """Write the weighted divergence of a depth map to `image`; return the product."""
         self.run(_apply, depth, self._weight, self._firm, self.image, self._sums)
         return float(self._sums.sum())
 
@@ -230,7 +230,7 @@ def _down(i, slope, weight, edge):  # type: ignore[no-untyped-def]  # pragma: no
 
 @_whole
 def _flow(first, last, slope_x, slope_y, weight, pitch, out):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Write what the weighted edge integrals of the slopes bring to each node."""
+    """Write the weighted divergence of the slopes at each node."""
     rows, columns = weight.shape
     edge, up = np.zeros(columns, np.float32), np.zeros(columns, np.float32)
     low = np.zeros(columns, np.float32)

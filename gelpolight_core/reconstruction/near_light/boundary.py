@@ -1,10 +1,11 @@
-"""Where depth 0 is held at the boundary of a solved region, decided by the solved depth.
+"""Where the boundary of a solved region is free, decided from the solved depth.
 
-Depth 0 just outside is right where the membrane is at rest. Where a contact crosses the boundary it
-is wrong (PHYSICS, integration), and the brightness does not show it: a flat face looks almost like
-the bare membrane. So the first round is integrated with depth 0 all around. If depth is left next
-to the boundary, it is integrated once more with all of the field's boundary free: what then lies
-above the lowest level is pressed and stays free, and the rest is held again.
+Depth 0 just outside the boundary is correct where the membrane is at rest. It is wrong where a
+contact crosses the boundary (docs/physics.md, integration). The brightness does not show this: a
+flat face looks almost like the untouched membrane. The first round is therefore integrated with
+depth 0 on the whole boundary. If the depth next to the boundary is not 0, it is integrated again
+with a free boundary: parts above the lowest level are pressed and stay free, and the others are set
+to depth 0 again.
 """
 
 from __future__ import annotations
@@ -23,24 +24,24 @@ Mask = NDArray[np.bool_]
 STRIP_MM = 0.5
 """Width of the strip next to the boundary whose depth is judged."""
 LEFT_MM, LEFT_SHARE = 0.005, 0.01
-"""Depth left in the strip, and share of the deepest, from which on a contact reaches it. Ordinary
-drape is cut off at less; a contact that crosses leaves half its depth."""
+"""Depth in the strip, and share of the largest depth, above which a contact reaches it. Drape alone
+gives less; a contact that crosses the boundary gives half its depth."""
 PRESSED_SHARE = 0.1
-"""Share of the deepest boundary depth from which on a node of the free boundary is pressed: more
-than the lights of the first round err by. Drape that is less falls to 3 um over `REACH_MM`."""
+"""Share of the largest boundary depth above which a node of the free boundary is pressed: more than
+the light error of the first round. A smaller drape decays to 3 um over `REACH_MM`."""
 REACH_MM = 2.5
-"""The boundary is free as far around pressed nodes: 3.5 decay lengths of 0.7 mm of drape."""
+"""The boundary is free within this distance of pressed nodes: 3.5 decay lengths of 0.7 mm."""
 LOWEST_PERCENT = 5.0
-"""Percentile of the depth that is taken for membrane at rest, where the boundary is free."""
+"""Percentile of the depth that counts as membrane at rest, where the boundary is free."""
 ONE_SIDED_SD = 0.03
 """Relative error of depths behind a straight wall, by the share of the boundary that is free: at
 a half 1.3 % at full scale was seen where the noise states 0.1 %. Around a closed outline the errors
 of walls that face different lights cancel; behind one wall they do not."""
 HOLLOW_SHARE = 0.25
-"""Membrane at rest is never this share of the deepest above the boundary; its bulge around a
-contact is far less."""
+"""Membrane at rest is never higher than this share of the largest depth; its bulge around a contact
+is much smaller."""
 LEAST_HELD = 0.1
-"""A boundary held over a smaller share is no anchor that can be relied on."""
+"""If a smaller share of the boundary is fixed at depth 0, it is not a reliable anchor."""
 
 
 class Boundary(NamedTuple):
@@ -51,12 +52,12 @@ class Boundary(NamedTuple):
     free : (rows, columns) bool or None
         Where a contact crosses the boundary of the field; None where none does.
     cut : bool
-        Whether depth is left where the region ends inside the field: the region is too small.
+        Whether the depth is not 0 where the region ends inside the field: the region is too small.
     rest : (rows, columns) bool or None
-        Where the lowest depth is taken for membrane at rest, because too little of the boundary
-        is; None where depth 0 at the boundary is the anchor.
+        Where the lowest depth counts as membrane at rest, because too little of the boundary is at
+        rest; None where depth 0 at the boundary is the anchor.
     level_sd_mm : float
-        How far all depths may be off together; 0 where the boundary is the anchor.
+        Uncertainty common to all depths; 0 where the boundary is the anchor.
     depth_sd : float
         Relative standard deviation of depths that are integrated across the walls of one side
         only; it grows with the share of the field's boundary that is free.
@@ -147,7 +148,7 @@ def find_boundary(
     Parameters
     ----------
     held_mm : (rows, columns)
-        Depth of the first round, with depth 0 held all around.
+        Depth of the first round, with depth 0 on the whole boundary.
     strips : Strips
         Of the region.
     integrate : callable (free) -> depth

@@ -26,21 +26,21 @@ Mask = NDArray[np.bool_]
 BLOCK_MM = 0.2
 # A press changes the light from the surroundings too, far from itself and without any slope.
 CHANGE_BY_INTERREFLECTION = 6e-3
-# Of the nine blocks about one, so that a hot pixel is no contact.
+# Of the nine blocks around one, so that a hot pixel does not count as a contact.
 NEIGHBOURS = 3
 AREAS_MM = (0.6, 1.4)
 """Widths of the areas over which a shallow contact is looked for: the drape's, and twice that."""
 AREA_CHANGE = 2.5e-3
-"""Change of an area's light, less the change of all the field, that is below any contact's: LEDs
-that warm up unevenly make as much."""
+"""Change of the light of an area, minus that of the whole field, that does not count as a contact:
+LEDs that warm up unevenly cause as much."""
 AREA_SIGMAS = 6.0
-"""Half a million areas of noise give less than one in a thousand images by chance."""
+"""With half a million areas, noise alone causes a contact in less than one of a thousand images."""
 MEDIAN_OF_NOISE = 0.6745
 """Median size of normal noise, in standard deviations."""
 STATED_NOISE = 1.4
 """A calibration states the noise of resampled images; raw pixels have as many times more."""
 VISIBLE_PERCENT = 90.0
-"""The smallest visible depth holds for this share of the field."""
+"""The smallest visible depth is valid for this share of the field."""
 # Raw pixels between the places at which the optics is followed.
 STRIDE = 8
 # Blocks between those from which the field's median is taken.
@@ -100,7 +100,7 @@ class ContactFinder:
     areas : tuple of Area
         For shallow contacts.
     beside_mm : float
-        How far from a deep contact a shallow one is another; nearer it is the deep one's drape.
+        Distance from a deep contact at which a shallow one is separate; closer, it is drape.
     visible_mm : float
         Smallest depth of a flat face that is found over most of the field; smaller relief is taken
         for noise.
@@ -178,7 +178,7 @@ class ContactFinder:
         for area in self.areas:
             side = (area.blocks, area.blocks)
             z = np.abs(cv2.blur(share, side, borderType=cv2.BORDER_CONSTANT)) / area.limit
-            # An image that is noisier than the calibration says has its own limit.
+            # An image with more noise than the calibration states has its own limit.
             usual = float(np.median(z[thin][known])) if known.any() else 0.0
             differs = z > max(usual * AREA_SIGMAS / MEDIAN_OF_NOISE, 1.0)
             if differs.any():
@@ -240,7 +240,7 @@ def contact_finder(calibration: Calibration, full: FullModel, *, beside_mm: floa
         return np.asarray(cv2.resize(cut, (columns, rows), interpolation=cv2.INTER_AREA))
 
     expected = blocks(image)
-    # The background was resampled on its way here: what another blur changes is not to be trusted.
+    # The background was resampled: places that depend on the blur are not reliable.
     blurred = cv2.GaussianBlur(image, (0, 0), 1.0)
     unsure = np.abs(blocks(np.asarray(blurred, np.float32)) - expected)
     least = CONTACT_CHANGE + CHANGE_BY_INTERREFLECTION * full.membrane.interreflection

@@ -1,4 +1,4 @@
-"""Quiet the even parts of an image and leave its edges alone.
+"""Reduce the noise in uniform areas of an image and keep its edges.
 
 A normal is not a linear function of the image: near an LED's mirror image a channel hardly
 changes with the slope, and noise there tilts the surface to one side instead of both. Averaging a
@@ -28,14 +28,15 @@ LEAST = np.float32(1e-9)
 USABLE = np.float32(1e-6)
 """Background of a node that is usable; of others the noise is unknown."""
 CALM = 0.01
-"""Relative noise below which the curvature of normals over brightness tilts nothing that shows."""
+"""Relative noise below which the nonlinear effect of noise on normals is not visible."""
 SILENT = 1e-3
-"""Relative noise below which denoising changes nothing that shows, and is left out."""
+"""Relative noise below which denoising has no visible effect and is skipped."""
 SIGNIFICANT = 4.0
 LOUD, FEW = 1.25, 1e-3
-"""Wider averages are left out where so few even nodes have so many times `CALM`, or fewer."""
+"""Wider averages are skipped if at most this share of uniform nodes exceeds this multiple of
+`CALM`."""
 EVEN = 0.5
-"""Share that an even part may at most keep of itself."""
+"""Largest share of its own value that a node in a uniform area keeps."""
 
 _whole = numba.njit(nogil=True, fastmath={"nsz", "arcp", "contract"}, cache=True)
 _single = np.float32
@@ -47,11 +48,11 @@ def quieted(
     workers: RowWorkers,
     take: Callable[..., NDArray[Any]],
 ) -> Map | None:
-    """Average the even parts of press over background, and note the noise that is left.
+    """Average the uniform areas of press over background, and update its noise.
 
-    Press and background are averaged alike, so that neither the fall of the light nor a speck of
-    the membrane shows in their ratio. Where little light leaves more noise than `CALM`, wider
-    averages are used, as far as the image is even over them.
+    Press and background are averaged in the same way, so that neither the decrease of the light nor
+    a speck of the membrane affects their ratio. Where the noise exceeds `CALM` because of little
+    light, wider averages are used if the image is uniform over them.
 
     Parameters
     ----------
@@ -67,8 +68,8 @@ def quieted(
     Returns
     -------
     (rows, columns) float32 or None
-        How far each node was left as it is by the narrowest average, 0..1; None where the image
-        is so quiet that nothing was averaged.
+        Share of its own value that each node keeps in the narrowest average, 0..1; None if the
+        image has so little noise that it was not averaged.
     """
     ratio, noise = image.ratio, image.noise
     rows, columns = image.marks.shape
@@ -132,7 +133,7 @@ def _relative(own: tuple[Map, Map], base: Map) -> float:
 
 
 def _left(width_px: float) -> np.float32:
-    """Return what differs significantly: white noise of sd 1 leaves this between two averages."""
+    """Return the significant difference between two averages, for white noise of sd 1."""
     wide = 2.0 * width_px
     left = np.sqrt(1.0 / width_px**2 + 1.0 / wide**2 - 4.0 / (width_px**2 + wide**2))
     return _single(SIGNIFICANT * left / np.sqrt(4.0 * np.pi))
@@ -160,7 +161,7 @@ def _blurred(plane: Map, width_px: float, result: Map) -> None:
 
 
 def _noisy(noise: Map, base: Map, edge: Map) -> bool:
-    """Return whether even parts have more noise than `CALM`; edges are left as they are."""
+    """Return whether uniform areas have more noise than `CALM`; edges are left as they are."""
     thin = np.s_[..., ::2, ::2]
     loud = (noise[thin] > LOUD * CALM) & (base[thin] > USABLE) & (edge[thin] < EVEN)
     return bool(np.count_nonzero(loud) > FEW * loud[0].size)

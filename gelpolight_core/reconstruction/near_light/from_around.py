@@ -1,4 +1,4 @@
-"""Light that a pressed membrane throws onto itself, and shadows that it casts onto itself.
+"""Light that a pressed membrane reflects onto itself, and shadows that it casts onto itself.
 
 Both follow from the surface that the rounds have found so far. Outside the region that is solved
 the membrane is flat, and looks as in the background.
@@ -27,17 +27,17 @@ from gelpolight_core.reflectance.surroundings import view_directions
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
 LEVEL_NZ = -0.9986
-"""Below 3 degrees light from around changes little from node to node, and some nodes are enough."""
+"""Below 3 degrees interreflected light changes little between nodes: some nodes are enough."""
 CLEAR = 0.015
-"""A light is hidden where its ray clears the surface by less than this slope: LEDs of 0.2 mm, 10 to
-14 mm away, are half hidden within about that."""
+"""A light is hidden if the slope between its ray and the surface is less than this: an LED of 0.2
+mm, 10 to 14 mm away, is then about half hidden."""
 PLACING = 6
 FIRST_STEP, STEP = 1.5, 0.75
 """Nodes along a ray to a light, between those at which the surface is compared with it."""
 
 GUIDE_NODES, GUIDE_SD, MOST_GUIDE = 1, 0.03, 4.0
-"""How far around a node the image shows how light from around jumps, the noise of the image, and
-the highest press over background."""
+"""Window around a node for this guidance, the noise of the image, and the highest press over
+background."""
 
 _single = np.float32
 _HALF = _single(0.5)
@@ -67,7 +67,7 @@ class FromAround:
         surface: tuple[Map, Map, Map],
         reflectance: float,
     ) -> tuple[Map, Map]:
-        """Return light from around, and how far each light's ray clears the surface.
+        """Return interreflected light, and how far each light's ray clears the surface.
 
         Parameters
         ----------
@@ -169,7 +169,7 @@ def _within(
 
 
 def with_surroundings(image: RatioImage, coarse: RatioImage, around: Map, clear: Map) -> RatioImage:
-    """Return an image with light from around and shadows, brought to its scale.
+    """Return an image with interreflected light and shadows, brought to its scale.
 
     Parameters
     ----------
@@ -193,9 +193,9 @@ def with_surroundings(image: RatioImage, coarse: RatioImage, around: Map, clear:
 
 
 def _detail(fine: Map, coarse: Map, around: Map) -> Map:
-    """Return what light from around has at a finer scale, from what the image has there.
+    """Return the interreflected light at a finer scale, guided by the image at that scale.
 
-    Light from around jumps where the slope jumps, as the image does: next to each node it is a
+    Interreflected light changes abruptly with the slope, as the image does: near each node it is a
     linear function of the three channels (He et al., guided image filtering, 2013).
 
     Parameters
@@ -203,7 +203,7 @@ def _detail(fine: Map, coarse: Map, around: Map) -> Map:
     fine : (3, rows, columns) float32
         Press over background at the finer scale.
     coarse, around : (3, rows / n, columns / n) float32
-        Press over background, and light from around.
+        Press over background, and interreflected light.
     """
     window = (2 * GUIDE_NODES + 1,) * 2
 

@@ -1,4 +1,4 @@
-"""How noisy a single image is, found in the image itself.
+"""Noise of a single image, estimated from the image itself.
 
 The checkerboard difference of 2x2 pixels cancels every smooth shading; its mean square over a block
 is the variance of the block's pixels. The median over many blocks of like brightness is indifferent

@@ -3,11 +3,11 @@
 For every node the surface point is placed along its refracted ray at the present depth; light
 directions, inverse square and lobe are those at that place. Press over background is compared with
 the membrane's response, and the normal is found by Gauss-Newton steps on the unit sphere. A dark or
-saturated channel is missing information: it is left out, and the two that remain decide together
-with |n| = 1. Of their two solutions the one that keeps the dark light dark is started from.
+saturated channel is left out, and the normal follows from the other two and |n| = 1. Of their two
+solutions, the start value is the one in which the dark channel stays dark.
 
-Under a glossy lobe, several normals may be where the steps end, of which one fits. A step that fits
-badly and worse is taken back, and a normal that fits badly in the end is searched for anew.
+With a glossy lobe, the steps can end at several normals, of which only one fits. A step to a worse
+fit is reverted, and if the final normal fits badly, a new search starts.
 
 The parts stay in one file: the compiler's cache does not see changes of functions in others.
 
@@ -28,18 +28,19 @@ from gelpolight_core.masks import DARK_SHARE, DARK_SIGMAS
 from gelpolight_core.reconstruction.height_map import Flag
 
 STEEPEST_NZ = 0.15
-"""Normals are held to this z: steeper walls cannot be seen from above."""
+"""Normals are limited to this z: steeper walls cannot be seen from above."""
 LEAST_ALONG_RAY = 0.1
 """Below this cosine between normal and ray, scaled by the ray's length, a wall is hidden."""
 ONE_DARK_WEIGHT = 0.5
 UNSOLVED_WEIGHT = 0.003
-"""Of nodes without two lights, which are taken as flat; 0.01 lost 0.2 % of height on walls."""
+"""Of nodes with fewer than two lights, which are assumed flat; 0.01 lost 0.2 % of height on
+walls."""
 MODEL_ERROR = 0.03
-"""What the model does not explain of press over background; it limits a good image, not noise."""
+"""Error of the model in press over background; in a good image it is larger than the noise."""
 SEARCHED_DEG = 8.0
 """A search leaves out normals that are nearer than this to the one that fits badly."""
 BAD_FIT = 25.0
-"""From this misfit on, in squared standard deviations, a normal is searched for anew."""
+"""From this misfit on, in squared standard deviations, a normal is searched for again."""
 
 
 _B = 64
@@ -196,7 +197,7 @@ def _direct_light(ratio, around, sigma, sat, hidden, judged, scale, dark, interr
     """Return a channel's direct light, whether it is lit, and whether it counts (1 or 0).
 
     Where shadows are `judged` by the present surface, a channel is dark where its light is hidden;
-    else where it shows next to no direct light.
+    otherwise where it shows almost no direct light.
     """
     direct = ratio if interreflection is None else ratio - around
     direct = direct * scale
@@ -290,7 +291,7 @@ def _put(w, first, j, values):  # type: ignore[no-untyped-def]  # pragma: no cov
 
 @_part
 def _channels(w, j, dark, interreflection, shadows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return what `_direct_light` says of a node's three channels."""
+    """Return the result of `_direct_light` for the three channels of a node."""
     r0, r1, r2 = _triple(w, _RATIO, j)
     a0, a1, a2 = _triple(w, _AROUND, j)
     g0, g1, g2 = _triple(w, _NOISE, j)
@@ -431,7 +432,7 @@ def _step_block(w, dark, curves, table, gloss, interreflection, shadows):  # typ
         if gloss is not None:
             step, base = _kept(w, j, n, step, am + bm + cm)
         nx, ny, nz = _limited(base[0] + step[0], base[1] + step[1], base[2] + step[2])
-        # What moved in earnest: a normal at the steepest that can be seen is pulled for ever.
+        # The real movement: a normal at the slope limit would be moved in every step.
         move = (nx - n[0]) * (nx - n[0]) + (ny - n[1]) * (ny - n[1])
         solved = (w[_KIND * _B + j] > _single(1.5)) & (k0 + k1 + k2 > _single(1.5))
         w[_MOVED * _B + j] = move if solved else _0
@@ -472,7 +473,7 @@ def _best_block(w, dark, curves, table, gloss, interreflection, shadows):  # typ
 
 @_part
 def _unseen(w, light, n, j, range_of, counts):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Return 1 where a channel that counts has a cosine that no ball press has shown."""
+    """Return 1 where a used channel has a cosine outside the range of the ball presses."""
     c = _inner(_triple(w, light, j), n)
     return counts if (c < range_of[0]) | (c > range_of[1]) else _0
 
@@ -601,7 +602,7 @@ def _load(w, image, depth, scale, corner, slopes, warm, i, begin, count):  # typ
             w[_NORMAL * _B + j] = slopes.normal_x[i, begin + j]
         for j in range(count):
             w[(_NORMAL + 1) * _B + j] = slopes.normal_y[i, begin + j]
-    # What is left of a block that went before must not decide how many steps are done.
+    # Data of an earlier block must not affect the number of steps.
     for j in range(count, _B):
         w[_KIND * _B + j] = _0
 

@@ -1,4 +1,4 @@
-"""What the near-light solve reads of a calibration, prepared once for each sensor."""
+"""The data of a calibration for the near-light solver, prepared once for each sensor."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ COARSE = 4
 """Nodes of the calibration's grid to one node of the coarsest scale, along an axis."""
 DEGREE = 7
 CURVE_ERROR = 1e-3
-"""A polynomial that is off by more of its curve's top, 0.06 degrees of slope, is not used."""
+"""A polynomial with a larger error, relative to the top of its curve, is not used (0.06 degrees of
+slope)."""
 LEAST_SHARE = 1e-4
-"""Gloss or interreflection that is weaker than this changes no ratio by more, and is left out."""
+"""Gloss or interreflection weaker than this is left out: it changes no ratio by more."""
 LEVELS = {np.dtype(np.uint8): 256, np.dtype(np.uint16): 65536}
 MISSING_CODE, MISSING_LIGHT = 65535, 2.0
 """Float images are held in 16 bits: the code of a value that is not finite, and its light."""
@@ -42,7 +43,7 @@ ALL_SEEN = ((-1.0, 2.0),) * 3
 
 @dataclass(frozen=True)
 class SensorMaps:
-    """All that does not change from frame to frame.
+    """All data that does not change from frame to frame.
 
     Parameters
     ----------
@@ -78,13 +79,13 @@ class SensorMaps:
 
     @cached_property
     def throwing(self) -> Map:
-        """Share of each node that throws light onto others, (rows, columns), coarsest scale."""
+        """Share of each node that reflects light onto others, (rows, columns), coarsest scale."""
         found = throws_light(self.calibration.table.valid, self.full.background)
         return block_average(found.astype(np.float32), COARSE)
 
     @property
     def slab(self) -> Slab:
-        """What is below the membrane."""
+        """The layers below the membrane."""
         return Slab.of(self.calibration.stack)
 
     @cached_property
@@ -166,7 +167,7 @@ def sensor_scale(
     factor : int
         As in :class:`Scale`.
     returned : (Slab, (rows, columns)), optional
-        What is below the membrane and returns light, and the share of nodes that throw it.
+        The layers that reflect light from below, and the share of nodes that send it.
     """
     x, y = axes_mm
     pitch = float(x[1] - x[0])
@@ -192,7 +193,7 @@ def kinds(usable: Mask, inside: Mask, factor: int) -> NDArray[np.uint8]:
 def membrane_numbers(
     full: FullModel, coverage: Sequence[Sequence[float]] | NDArray[Any] = ALL_SEEN
 ) -> MembraneNumbers:
-    """Return membrane and lights as the compiled solve wants them.
+    """Return membrane and lights in the form for the compiled solver.
 
     Parameters
     ----------
@@ -217,7 +218,7 @@ def membrane_numbers(
 
 
 def light_levels(response: CameraResponse | None, dtype: np.dtype[Any], *, coded: bool) -> Map:
-    """Return the linear light (3, levels) of every number that an image of this kind holds.
+    """Return the linear light (3, levels) of every pixel value of an image of this type.
 
     Parameters
     ----------
@@ -241,7 +242,7 @@ def light_levels(response: CameraResponse | None, dtype: np.dtype[Any], *, coded
 
 
 def _polynomials(membrane: Membrane) -> tuple[tuple[tuple[float, ...], ...], float]:
-    """Return the diffuse curves, over pi, as polynomials, and how far they are off."""
+    """Return the diffuse curves, over pi, as polynomials, and their largest error."""
     cosines = np.linspace(0.0, 1.0, CURVE_NODES)[1:]
     wanted = membrane.diffuse_share(np.tile(cosines[:, None], (1, 3)))
     curves, error = [], 0.0
@@ -280,7 +281,7 @@ def _flat_brightness(
     ray_slope: Array,
     returned: tuple[Slab, Map] | None = None,
 ) -> Map:
-    """Return `Scale.flat`, with the light that a slab returns of nodes that throw it."""
+    """Return `Scale.flat`, with the light that a slab reflects from the given nodes."""
     shape, membrane = (y.size, x.size), full.membrane
     view = view_directions(np.moveaxis(ray_slope, 0, -1))
     up = np.tile([0.0, 0.0, -1.0], (y.size * x.size, 1))

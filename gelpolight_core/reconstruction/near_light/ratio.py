@@ -128,7 +128,7 @@ class PressSampler:
     def _sharpen(
         self, image: RatioImage, region: Region, kernel: Map, edge: Map | None = None
     ) -> None:
-        """Undo the blur of an image by a kernel of :func:`inverse_of_blur`.
+        """Remove the blur of an image with a kernel of :func:`inverse_of_blur`.
 
         Where a wall meets a face, blur makes the wall flatter, as brightness is not a linear
         function of slope; balls have no such edges, and do not show it. Noise grows with it, where
@@ -210,7 +210,7 @@ class PressSampler:
 
 
 def inverse_of_blur(blur2: float) -> Map:
-    """Return the kernel (5, 5) that undoes a blur of given square, to second order.
+    """Return the kernel (5, 5) that removes a blur of given squared width, to second order.
 
     A Gaussian blur is the exponential of half its square times the Laplacian; this is the
     exponential of the opposite.

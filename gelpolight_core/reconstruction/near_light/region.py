@@ -1,4 +1,4 @@
-"""The part of the grid that a frame's solve is held to."""
+"""The part of the grid that is solved for a frame."""
 
 from __future__ import annotations
 

@@ -48,15 +48,15 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 Map = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 FREE = 1e-4
-"""How firmly the border is held where a contact crosses it."""
+"""Weight of depth 0 at the border where a contact crosses it."""
 STEEP_ROUNDS = 2
-"""Rounds with a membrane that absorbs nothing."""
+"""Rounds with a membrane that absorbs no light."""
 THIN = 2
-"""Along both axes, of the nodes whose unsolved ones are counted."""
+"""Step along both axes of the nodes that are counted as solved or unsolved."""
 
 
 class Solved(NamedTuple):
-    """A solved region at the scale of its last round; it lies in the solver's buffers.
+    """A solved region at the scale of its last round, in the buffers of the solver.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Solved(NamedTuple):
 
 
 class Start(NamedTuple):
-    """What the rounds at the coarsest scale leave to the last round.
+    """Results of the rounds at the coarsest scale, for the last round.
 
     Attributes
     ----------
@@ -107,8 +107,7 @@ class Start(NamedTuple):
     boundary : Boundary
         Where depth 0 is held.
     around : 2 of (3, rows, columns) float32, or None
-        Light from around and clearance of the lights; None where the membrane gives no light to
-        itself.
+        Interreflected light and clearance of the lights; None without interreflection.
     """
 
     depth_mm: Map
@@ -148,9 +147,9 @@ class RegionSolver:
     def rounds(
         self, region: Region, compared: Compared, settings: Settings, terms: Terms
     ) -> tuple[Rounds, Start]:
-        """Return the rounds at the coarsest scale, and from where the last round starts.
+        """Return the rounds at the coarsest scale, and the start of the last round.
 
-        On a membrane that throws light onto itself, rounds follow that reckon with it.
+        With interreflection, further rounds include it.
         """
         at = (self.maps.scale(COARSE), region.corner)
         thrown = self.maps.membrane.interreflection is not None
@@ -163,7 +162,7 @@ class RegionSolver:
             slopes = self.slopes(at, compared.coarse, depth, settings, terms, normals)
             normals = slopes.normal_x, slopes.normal_y
             tolerance = tolerances.pop(0) if len(tolerances) > 1 else tolerances[0]
-            # Walls that light from around makes too flat say nothing of the boundary.
+            # Interreflection makes walls too flat at first: they do not determine the boundary.
             known = Boundary() if thrown else boundary
             found, known = self._bounded(region, slopes, depth, known, (tolerance, settings, terms))
             boundary = boundary if thrown else known
@@ -189,7 +188,7 @@ class RegionSolver:
         boundary: Boundary | None,
         how: tuple[float, Settings, Terms],
     ) -> tuple[Map, Boundary]:
-        """Integrate a coarse round; find out where depth 0 is held, unless that is known."""
+        """Integrate a coarse round; find the free boundary if it is not known yet."""
         scale, (tolerance, settings, terms) = self.maps.scale(COARSE), how
 
         def integrated(free: Mask | None, tolerance: float = tolerance) -> Map:
@@ -214,11 +213,11 @@ class RegionSolver:
         settings: Settings,
         terms: Terms,
     ) -> Start:
-        """Return a start whose light from around and whose shadows are those of its surface.
+        """Return a start with the interreflected light and the shadows of its own surface.
 
-        What the surface throws onto itself makes walls look flatter, and flatter walls throw less.
-        The first rounds therefore reckon with a membrane that absorbs nothing, and the others come
-        from walls that are too steep.
+        Interreflection makes walls look flatter, and flatter walls reflect less light. The first
+        rounds therefore use a membrane that absorbs no light, so that the others start from walls
+        that are too steep.
         """
         scale, (top, left), (rows, columns) = self.maps.scale(COARSE), *region.at(1)
         at = np.s_[top : top + rows, left : left + columns]
@@ -251,7 +250,7 @@ class RegionSolver:
     ) -> tuple[Compared, Map, Slopes]:
         """Solve at the scale of the settings, from depth and normals of the coarsest one.
 
-        Returns what was solved, with light from around; the depth at which, and the slopes.
+        Returns what was solved, with interreflected light; the depth at which, and the slopes.
         """
         corner, shape = region.at(COARSE // settings.factor)
         depth = _enlarged(start.depth_mm, shape)
@@ -329,7 +328,7 @@ class RegionSolver:
 
 
 def unsolved_share(solved: Solved) -> float:
-    """Return the share of the field's nodes that light does not decide, from some of them."""
+    """Return the share of nodes of the field that the light does not determine, from a sample."""
     kind, factor = solved.scale.kind, solved.scale.factor
     (top, left), (rows, columns) = solved.region.at(COARSE // factor)
     usable = kind[top : top + rows : THIN, left : left + columns : THIN] == 2
@@ -339,7 +338,7 @@ def unsolved_share(solved: Solved) -> float:
 
 
 def _weighted(scale: Scale, corner: tuple[int, int], slopes: Slopes, free: Mask | None) -> Weighted:
-    """Return the weights, and how firmly the border is held (None: everywhere)."""
+    """Return the weights, and the weight of depth 0 at the border (None: 1 everywhere)."""
     weight = slopes.weight
     if free is None:
         return Weighted(slopes, weight, None)

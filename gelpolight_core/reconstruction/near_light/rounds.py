@@ -1,4 +1,4 @@
-"""The near-light rounds: repeated until they settle, damped where they would leap."""
+"""The near-light rounds: repeated until they converge, with damping of long steps."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Rounds:
     changes_mm : tuple of float
         Largest change of the depth in each round.
     stopped : str
-        ``done``; ``damped`` when steps were held back and the rounds settled all the same;
+        ``done``; ``damped`` when steps were limited and the rounds converged;
         ``grows`` when the last change was larger than the one before and that round was undone;
         ``unsettled`` when damped rounds did not end.
     """
@@ -49,7 +49,7 @@ def near_light_rounds(
     wanted: int,
     shallow_mm: float = 0.0,
 ) -> Rounds:
-    """Repeat a round until as many as wanted are done, and until they settle where held back.
+    """Repeat a round the wanted number of times, and after damping until the depth converges.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def longest_step_mm(full: FullModel) -> float:
 
 
 def held_back(depth_mm: Map, solved_mm: Map, longest_mm: float) -> Map:
-    """Return the solved depth, or as much of the way to it as its longest step may be."""
+    """Return the solved depth, or a part of the step to it if the step is too long."""
     step = solved_mm - depth_mm
     longest = float(np.abs(step).max())
     if longest <= longest_mm:

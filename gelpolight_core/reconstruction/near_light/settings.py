@@ -1,4 +1,4 @@
-"""What each effort spends on a frame: parameter sets of the one near-light solver."""
+"""Parameter sets of the near-light solver, one for each effort."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What an effort spends on a frame.
+    """Parameters of an effort.
 
     Attributes
     ----------
@@ -17,7 +17,7 @@ class Settings:
         Scale of the last round: nodes of the calibration's grid to a node, along an axis.
     round_tolerances : tuple of float
         Of the integrations at the coarsest scale: these only have to find where the surface is.
-        The last one holds for all further rounds.
+        The last one is used for all further rounds.
     tolerance : float
         Of the last integration.
     steps : int
@@ -25,7 +25,7 @@ class Settings:
     settled : float
         Length of the step below which a block of nodes is done.
     around_rounds : int
-        Rounds at the coarsest scale with the light that the membrane throws onto itself. On deep
+        Rounds at the coarsest scale with the light that the membrane reflects onto itself. On deep
         presses, three are within 0.3 % of the height that ten find, and four within 0.1 to 0.3 %.
     shallow_mm : float
         Depth up to which one near-light round is enough: a second one moves the surface by about
@@ -50,4 +50,4 @@ SETTINGS: Mapping[str, Settings] = MappingProxyType(
 )
 
 MOVED = Settings(1, steps=3)
-"""Of normals that are moved by noise from where they were solved: a step or two is enough."""
+"""For normals that noise moves from their solution: one or two steps are enough."""

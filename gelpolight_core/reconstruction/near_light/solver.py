@@ -81,17 +81,17 @@ class NearLightDepth:
     depth_mm : (rows, columns) float32
         At the grid's own (x, y).
     normals : (rows, columns, 3) float32 or None
-        Unit normals, z < 0; None where they were not asked for.
+        Unit normals, z < 0; None where they were not requested.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     boundary : Boundary
-        Where depth 0 was held.
+        Where the boundary was fixed at depth 0.
     rounds : Rounds or None
         The rounds at the coarsest scale, and how they ended; None where nothing is pressed.
     trace : Trace
         What was done and what was left out.
     noise : DepthNoise or None
-        How far it may be off, where that was asked for.
+        Its uncertainty, if requested.
     unsolved : float
         Share of the usable nodes that light does not decide: less than two lights, or turned away.
     visible_mm : float
@@ -110,7 +110,7 @@ class NearLightDepth:
 
 
 class Wanted(NamedTuple):
-    """What a caller asks for."""
+    """The request of the caller."""
 
     effort: str
     terms: Terms

@@ -1,4 +1,4 @@
-"""What the compiled near-light solve reads and writes, in named structures."""
+"""Inputs and outputs of the compiled near-light solver, in named structures."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ Triple = tuple[float, float, float]
 NOT_FINITE = 8
 """Bit of `RatioImage.marks`: a pixel was not a finite number."""
 HIDDEN, JUDGED = 16, 128
-"""Bits of `RatioImage.marks`: first of three that say that a light is hidden by the present
-surface, and the one that says that this is known; else a light is dark that shows no light."""
+"""Bits of `RatioImage.marks`: the first of three bits for lights hidden by the present surface, and
+the bit that shows that these are known. Otherwise a channel without light is dark."""
 
 
 class RatioImage(NamedTuple):
@@ -105,9 +105,9 @@ class Steps(NamedTuple):
     settled : float
         Square of the move below which a block of nodes is done.
     shadows : bool
-        Whether a dark channel is missing information; else its value is believed.
+        Whether a dark channel is left out; otherwise its value is used.
     warm : bool
-        Whether to start from the normals that `Slopes` holds.
+        Whether to start from the normals in `Slopes`.
     """
 
     most: int
@@ -117,14 +117,14 @@ class Steps(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Slopes along the rays of a region, as the integration wants them, (rows, columns) each.
+    """Slopes along the rays of a region, in the form for the integration, (rows, columns) each.
 
     Attributes
     ----------
     slope_x, slope_y : float32
         Change of the depth from node to node, per mm.
     weight : float32
-        How far the slopes are to be trusted, 0..1.
+        Weight of the slopes, 0..1.
     flags : uint8
         Bits of :class:`Flag`.
     normal_x, normal_y : float32

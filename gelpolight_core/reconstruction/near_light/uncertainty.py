@@ -1,16 +1,15 @@
-"""How far noise and what the model does not explain move slopes and depth of the near-light model.
+"""Effect of noise and of model errors on slopes and depth of the near-light model.
 
-Slopes: each channel is moved up and down by its noise and the normals are solved again, so that
-conditioning, missing channels and weights all count as they did in the answer. Depth: random fields
-of slope errors are integrated with the answer's own weights at quarter scale. Noise is white;
-each octave of its wavelengths adds alike to the depth's variance, and of the two octaves that
-quarter scale leaves out, the average of the even parts has removed most. Repeats of an image
-scatter by that. What the ball presses leave unexplained errs over lengths like the drape's and only
-where the membrane is disturbed; it is the same in every repeat and another in every press. What the
-calibration adds is common to all presses and is kept with it (:class:`ScaleSd`).
+Slopes: each channel is changed by plus and minus its noise and the normals are solved again, with
+the conditioning, missing channels and weights of the result. Depth: random fields of slope errors
+are integrated with the weights of the result at quarter scale. Noise is white; each octave of its
+wavelengths adds equally to the variance of the depth. Quarter scale leaves out two octaves, of
+which the average of uniform areas has removed most. Repeated images scatter by this. Errors of the
+model, known from the ball presses, are correlated over lengths like that of the drape and occur
+only where the membrane is deformed; they are equal in every repeat and different in every press.
+Errors of the calibration are common to all presses and are stored with it (:class:`ScaleSd`).
 
-Outside the solved region the depth is 0 in every repeat; what was left out there is part of the
-model's own error.
+Outside the solved region the depth is 0 in every repeat; its error is part of the model error.
 """
 
 from __future__ import annotations
@@ -37,23 +36,23 @@ Map = NDArray[np.float32]
 EXAMPLES = 64
 """The standard deviation of 64 examples is known to 1 / sqrt(128), a twelfth of itself."""
 MODEL_EXAMPLES = 16
-"""What the model leaves open is known less well anyway."""
+"""The errors of the model are known less accurately anyway."""
 DEPARTURE = 0.3
-"""Press over background departs from 1 by about this where balls are pressed; there the joint
-refinement found its misfit. Where the membrane is less disturbed, less can be wrong."""
+"""Typical deviation of press over background from 1 in ball presses, to which the misfit of the
+joint refinement belongs. Where the membrane is less deformed, the error is smaller."""
 TOLERANCE = 0.03
-"""An example needs to be right to a few percent only."""
+"""An example needs an accuracy of a few percent only."""
 LEAST_NOISE = 1e-5
-"""A share of the brightness below any camera's noise; zero would say nothing of conditioning."""
+"""Share of the brightness below the noise of any camera; 0 would hide the conditioning."""
 LEFT_OUT_MM, LEFT_OUT_SLOPE = 2e-3, 3e-3
-"""Standard deviation of depth and slope outside the solved region, where they are taken as 0."""
+"""Standard deviation of depth and slope outside the solved region, where they are 0."""
 
 Solve = Callable[[Map, tuple[Map, Map]], Slopes]
 
 
 @dataclass(frozen=True, slots=True)
 class SlopeNoise:
-    """What the noise of each channel does to the slopes.
+    """Effect of the noise of each channel on the slopes.
 
     Attributes
     ----------
@@ -70,17 +69,17 @@ class SlopeNoise:
 
 @dataclass(frozen=True, slots=True)
 class DepthNoise:
-    """How far slopes and depth may be off, on the metric grid.
+    """Standard deviations of slopes and depth on the metric grid.
 
     Attributes
     ----------
     slope_sd, depth_sd_mm : (rows, columns) float32
         Standard deviations from the noise of a single image.
     slope_model_sd, depth_model_sd_mm : (rows, columns) float32
-        Standard deviations from what the model does not explain of a press.
+        Standard deviations from errors of the model.
     examples_mm : (examples, rows / 4, columns / 4) float32
-        Errors of the depth that this noise could as well have made; each is one whole map, so that
-        what is computed from a depth map can be given its own standard deviation.
+        Examples of depth errors that this noise can cause. Each is a whole map, so that a standard
+        deviation can be computed for every quantity derived from a depth map.
     """
 
     slope_sd: Map
@@ -91,7 +90,7 @@ class DepthNoise:
 
 
 def no_contact_noise(shape: tuple[int, ...]) -> DepthNoise:
-    """Return what may be off where nothing is solved."""
+    """Return the uncertainty of a map without a solved region."""
     rows, columns = shape
     zero, depth, slope = (
         np.full(shape, value, np.float32) for value in (0.0, LEFT_OUT_MM, LEFT_OUT_SLOPE)
@@ -109,7 +108,7 @@ def depth_noise(
     *,
     light_sd: NDArray[np.float64] | None = None,
 ) -> DepthNoise:
-    """Follow an image's noise, and the model's misfit, to the metric grid.
+    """Propagate the noise of an image and the errors of the model to the metric grid.
 
     Parameters
     ----------
@@ -274,13 +273,13 @@ def depth_examples(
     noise : SlopeNoise
         At full scale.
     times : (3, rows, columns) or (rows, columns) float32
-        How many standard deviations of `noise` an average over 4 x 4 nodes errs by.
+        Error of an average over 4 x 4 nodes, in standard deviations of `noise`.
     answer : Solved
         Its weights are used.
     pitch_mm : float
         Distance between nodes at quarter scale.
     reach_mm : float, optional
-        Over which errors hang together; 0: they are white.
+        Correlation length of the errors; 0: they are white.
     examples : int, optional
         How many.
     workers : RowWorkers
@@ -326,14 +325,14 @@ def depth_examples(
 
 
 def gain_errors(noise: SlopeNoise, times: Map, answer: Solved, coarse: Scale) -> Map:
-    """Integrate what the gain of each channel errs by, at quarter scale.
+    """Integrate the error of the gain of each channel, at quarter scale.
 
     Parameters
     ----------
     noise : SlopeNoise
         Slopes moved by each channel.
     times : (3, rows, columns) float32
-        How many standard deviations of `noise` the gain errs by.
+        Error of the gain, in standard deviations of `noise`.
     answer : Solved
         Its weights are used.
     coarse : Scale
@@ -369,7 +368,7 @@ def model_times(ratio: Map, ratio_sd: Map, misfit: float) -> Map:
     ratio, ratio_sd : (3, rows, columns) float32
         Press over background and its noise.
     misfit : float
-        What the joint refinement left of it on the ball presses.
+        Residual of the joint refinement on the ball presses.
     """
     disturbed = np.minimum(np.abs(ratio - 1.0) / DEPARTURE, 1.0)
     return np.asarray(misfit * disturbed / ratio_sd, np.float32)
@@ -448,7 +447,7 @@ def noise_left(
     Parameters
     ----------
     edge : (rows, columns) float32 or None
-        How far a node was left as it is, 0..1; None where all were.
+        Share of its own value that a node keeps, 0..1; None: 1 everywhere.
     pixels_per_node : (rows, columns) float32
         Raw pixels in the area of one node.
     resampled : int
@@ -476,5 +475,5 @@ def pixels_per_node(table: ResamplingTable, here: tuple[slice, slice]) -> Map:
     u_row, u_column = np.gradient(table.u_px[here])
     v_row, v_column = np.gradient(table.v_px[here])
     count = np.abs(u_column * v_row - u_row * v_column)
-    # At the edge of what is seen the differences mean nothing.
+    # At the edge of the visible area the differences have no meaning.
     return np.asarray(np.where(table.valid[here], np.clip(count, 0.1, 10.0), 1.0), np.float32)

@@ -1,1 +1,1 @@
-"""The model of the paper: lights frozen at the flat membrane, one fused pass over the image."""
+"""The model of the paper: light of the flat membrane, one fused pass over the image."""

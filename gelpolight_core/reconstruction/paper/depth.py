@@ -45,11 +45,11 @@ class PaperDepth(NamedTuple):
     depth_mm : (rows, columns) float32
         Where each ray meets the undeformed surface.
     normals : (rows, columns, 3) float32 or None
-        Unit normals, z < 0; None where they were not asked for.
+        Unit normals, z < 0; None where they were not requested.
     flags : (rows, columns) uint8
         Bits of :class:`Flag`.
     notes : tuple of str
-        What a person must know of it.
+        Notes for the user.
     steps : tuple of TraceStep
         What was done.
     """

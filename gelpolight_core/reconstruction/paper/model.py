@@ -65,7 +65,7 @@ class ShadingMaps:
 
 @dataclass(frozen=True, slots=True)
 class SlopeField:
-    """Slopes of the depth, with what is to be said of each node.
+    """Slopes of the depth, with the flags of each node.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ class SlopeField:
     length_error : (rows, columns) float32
         | |n| - 1 | of the solved normal, a check that costs little; 0 outside.
 
-    Maps that were not asked for are of no size.
+    Maps that were not requested have size 0.
     """
 
     slope_x: Map
@@ -86,7 +86,7 @@ class SlopeField:
 
 
 class SlopeSolver:
-    """Solves Eq. (10) for images of one sensor; what does not change is made ready once.
+    """Solves Eq. (10) for images of one sensor; what does not change is prepared once.
 
     It may be called from several threads, which then wait for each other.
 
