@@ -236,7 +236,7 @@ def begin_run(folder: Path, protocol: Protocol, *, serial: str, calibration: str
     for name in (FILE_NAME, PRESSES):
         if (folder / name).exists():
             raise InputError(
-                tr("the folder already contains a {name}").format(name=name),
+                tr("the folder already contains {name}").format(name=name),
                 where=str(folder),
                 advice=tr("Continue that run, or choose a new folder"),
             )

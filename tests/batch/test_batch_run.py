@@ -343,7 +343,7 @@ def test_a_scheduler_that_does_not_answer_is_refused(
     from gelpolight_core.batch import cluster
 
     monkeypatch.setattr(cluster, "ANSWER_S", 0.3)
-    with pytest.raises(InputError, match="no answer from a Dask scheduler"):
+    with pytest.raises(InputError, match="Dask scheduler does not respond"):
         cluster.ClusterRunner(settings, tmp_path, "tcp://127.0.0.1:9")
 
 

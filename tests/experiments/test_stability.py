@@ -210,7 +210,7 @@ def test_the_report_holds_every_case_that_was_asked_for(
     out = tmp_path / "out"
     assert main(["stability", "-o", str(out), "--only", "grid_127x131,kind_int8,slopes_1e4"]) == 0
     captured = capsys.readouterr()
-    assert "2 right, 1 refused" in captured.out
+    assert "2 passed, 1 refused" in captured.out
     assert "%" in captured.err  # progress
     rows = json.loads((out / "stability.json").read_text())["cases"]
     assert {row["case"]: row["verdict"] for row in rows} == {

@@ -149,7 +149,7 @@ def test_the_command_goes_on_with_a_run_and_reports(
 @pytest.mark.parametrize(
     ("arguments", "summary"),
     [
-        (["--sizes", "-1"], "sizes_mm holds -1"),
+        (["--sizes", "-1"], "sizes_mm contains -1"),
         (["--repeats", "0", "--regions", "0"], "the protocol contains no press"),
         (["--seed", "-1"], "The seed is -1"),
     ],

@@ -236,7 +236,7 @@ def test_json_holds_what_scripts_rely_on() -> None:
 
 def test_a_truth_of_another_shape_or_of_no_size_is_refused() -> None:
     measured = measure_object(noisy(pressed("cylinder"), 11), X, Y, shape="cylinder")
-    with pytest.raises(InputError, match="the truth is a cuboid"):
+    with pytest.raises(InputError, match="the true shape is a cuboid"):
         compare(measured, Truth("cuboid", 5.0, 1.0))
     with pytest.raises(InputError, match="true size"):
         compare(measured, Truth("cylinder", 0.0, 1.0))

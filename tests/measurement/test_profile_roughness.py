@@ -74,7 +74,7 @@ def test_a_line_that_is_too_short_or_has_gaps_is_refused() -> None:
     profile = wave(0.4)
     with pytest.raises(InputError, match="too short for a cut-off"):
         profile_roughness(profile, cutoff_mm=float(profile.along_mm[-1]))
-    with pytest.raises(InputError, match=r"cut-off of 0\.01 mm"):
+    with pytest.raises(InputError, match=r"cut-off is 0\.01 mm"):
         profile_roughness(profile, cutoff_mm=0.01)
     profile.depth_mm[profile.depth_mm.size // 2] = np.nan
     with pytest.raises(InputError, match="without depth"):

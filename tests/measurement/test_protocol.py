@@ -86,15 +86,15 @@ def test_a_part_of_the_protocol_asks_for_the_same_places_as_the_whole() -> None:
         (Protocol(shapes=("ball",)), "no shape 'ball'"),
         (Protocol(shapes=()), "the protocol contains no object"),
         (Protocol(sizes_mm=(), heights_mm=()), "the protocol contains no object"),
-        (Protocol(sizes_mm=(0.0,)), "sizes_mm holds 0"),
-        (Protocol(sizes_mm=(-3.0,)), "sizes_mm holds -3"),
-        (Protocol(heights_mm=(math.nan,)), "heights_mm holds nan"),
-        (Protocol(sizes_mm=(3.0, 3.001)), "sizes_mm holds a length twice"),
+        (Protocol(sizes_mm=(0.0,)), "sizes_mm contains 0"),
+        (Protocol(sizes_mm=(-3.0,)), "sizes_mm contains -3"),
+        (Protocol(heights_mm=(math.nan,)), "heights_mm contains nan"),
+        (Protocol(sizes_mm=(3.0, 3.001)), "sizes_mm contains a length twice"),
         (Protocol(shapes=("cuboid", "cuboid")), "a shape is named twice"),
         (Protocol(repeats=0, regions=0), "the protocol contains no press"),
-        (Protocol(regions=100), "100 regions are asked for"),
-        (Protocol(repeats=-1), "-1 repeats are asked for"),
-        (Protocol(reach_mm=6.0), "a cuboid of 6 mm has no room within 6.0 mm"),
+        (Protocol(regions=100), "number of regions is 100"),
+        (Protocol(repeats=-1), "number of repeats is -1"),
+        (Protocol(reach_mm=6.0), "a cuboid of 6 mm does not fit within 6.0 mm"),
     ],
 )
 def test_a_protocol_that_nobody_can_press_is_refused(protocol: Protocol, message: str) -> None:
@@ -237,7 +237,7 @@ def test_a_truth_of_another_protocol_is_refused(tmp_path: Path) -> None:
     run.accept(run.wanted[0], frames(10))
     truth = run.presses / "truth.csv"
     truth.write_text(truth.read_text().replace(",3.0,", ",3.5,"))
-    with pytest.raises(InputError, match=r"the row of cylinder_s300.* is not of this protocol"):
+    with pytest.raises(InputError, match=r"the row of cylinder_s300.* does not belong to this protocol"):
         open_run(run.folder)
     truth.write_text("file,shape\n")
     with pytest.raises(InputError, match="first line"):
@@ -246,7 +246,7 @@ def test_a_truth_of_another_protocol_is_refused(tmp_path: Path) -> None:
 
 def test_a_new_run_does_not_take_the_place_of_another(tmp_path: Path) -> None:
     begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
-    with pytest.raises(InputError, match=r"holds a protocol\.toml already"):
+    with pytest.raises(InputError, match=r"contains protocol\.toml"):
         begin_run(tmp_path / "run", SMALL, serial="A-1", calibration="A-1-abc")
     with pytest.raises(InputError, match=r"there is no protocol\.toml"):
         open_run(tmp_path)

@@ -71,13 +71,13 @@ def test_a_press_beside_the_circle_is_refused_with_how_far() -> None:
     bare = shot(None, 9)
     judged = judge_press(frames, bare, position_px=PLACE, tolerance_px=15.0)
     assert not judged.accepted
-    assert "beside the circle by" in judged.reason
+    assert "pixels away from the circle" in judged.reason
     assert judge_press(frames, bare).accepted
 
 
 def test_frames_that_cannot_be_compared_are_refused() -> None:
     bare = shot(None, 0)
-    assert "One frame" in judge_press([shot(0.0, 1)], bare).reason
+    assert "More than one frame" in judge_press([shot(0.0, 1)], bare).reason
     small = cv2.resize(bare, (64, 48))
     assert "another size" in judge_press([shot(0.0, 1), shot(0.0, 2)], small).reason
     deep = bare.astype(np.uint16)

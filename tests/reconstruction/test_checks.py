@@ -158,5 +158,5 @@ def test_lights_in_one_plane_are_refused_with_their_condition() -> None:
 
 def test_a_membrane_without_light_is_refused() -> None:
     calibration = standard_sensor().calibration
-    with pytest.raises(InputError, match="light 0"):
+    with pytest.raises(InputError, match="only 0"):
         Reconstructor(replace(calibration, factors=np.zeros_like(calibration.factors)))

@@ -77,7 +77,7 @@ def test_values_out_of_range_stay_cosines() -> None:
     ("cosines", "values", "what"),
     [
         (RNG.uniform(0.2, 0.9, 50), RNG.uniform(0.2, 0.9, 50), "usable pixels"),
-        (RNG.uniform(0.2, 0.9, 5000), RNG.uniform(0.4, 0.41, 5000), "does not grow"),
+        (RNG.uniform(0.2, 0.9, 5000), RNG.uniform(0.4, 0.41, 5000), "does not become brighter"),
         (np.full(5000, np.nan), np.ones(5000), "usable pixels"),
     ],
 )
