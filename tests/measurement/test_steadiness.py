@@ -79,6 +79,6 @@ def test_frames_that_cannot_be_compared_are_refused() -> None:
     bare = shot(None, 0)
     assert "More than one frame" in judge_press([shot(0.0, 1)], bare).reason
     small = cv2.resize(bare, (64, 48))
-    assert "another size" in judge_press([shot(0.0, 1), shot(0.0, 2)], small).reason
+    assert "different sizes" in judge_press([shot(0.0, 1), shot(0.0, 2)], small).reason
     deep = bare.astype(np.uint16)
     assert not judge_press([shot(0.0, 1), shot(0.0, 2)], deep).accepted

@@ -75,7 +75,7 @@ def test_the_watch_counts_what_this_program_does_not_use() -> None:
     assert machine.processors >= 1
     assert machine.others_percent is None or machine.others_percent >= 0.0
     busy = Machine(2, "system", "3", 0.0, 80.0, ("other 80 %",))
-    assert not busy.quiet and "against each other" in busy.text
+    assert not busy.quiet and "with each other only" in busy.text
     assert replace(busy, others_percent=3.0).quiet
 
 
