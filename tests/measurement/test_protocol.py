@@ -237,7 +237,9 @@ def test_a_truth_of_another_protocol_is_refused(tmp_path: Path) -> None:
     run.accept(run.wanted[0], frames(10))
     truth = run.presses / "truth.csv"
     truth.write_text(truth.read_text().replace(",3.0,", ",3.5,"))
-    with pytest.raises(InputError, match=r"the row of cylinder_s300.* does not belong to this protocol"):
+    with pytest.raises(
+        InputError, match=r"the row of cylinder_s300.* does not belong to this protocol"
+    ):
         open_run(run.folder)
     truth.write_text("file,shape\n")
     with pytest.raises(InputError, match="first line"):
