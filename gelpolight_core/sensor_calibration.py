@@ -71,6 +71,8 @@ class Provenance:
     inputs : str
         Hash of all inputs of the calibration: captures, stated values, corrections. Empty if not
         recorded.
+    elastomer : str
+        Name or serial number of the elastomer. Empty if not stated.
     """
 
     created: str
@@ -81,6 +83,7 @@ class Provenance:
     camera_settings: Mapping[str, str] = field(default_factory=dict)
     edits: tuple[HandEdit, ...] = ()
     inputs: str = ""
+    elastomer: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,6 +73,7 @@ def _in_place_rows(c: InPlaceCalibration) -> list[tuple[str, str]]:
     return [
         (tr("calibration"), c.identity),
         (tr("sensor"), c.sensor.serial),
+        (tr("elastomer"), c.provenance.elastomer or tr("not stated")),
         (tr("model"), tr("{model} (closed sensor)").format(model=c.model)),
         (tr("verdict"), c.verdict.value),
         (tr("made"), f"{c.provenance.created} {c.provenance.operator}".strip()),
@@ -102,6 +103,7 @@ def _print_calibration(path: Path) -> None:
     rows = [
         (tr("calibration"), c.identity),
         (tr("sensor"), c.sensor.serial),
+        (tr("elastomer"), c.provenance.elastomer or tr("not stated")),
         (tr("model"), c.model),
         (tr("verdict"), c.verdict.value),
         (tr("created"), f"{c.provenance.created} {c.provenance.operator}".strip()),

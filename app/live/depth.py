@@ -12,6 +12,7 @@ from app.live.advice import Known, LiveState, Size, advise
 from app.live.calibration_choice import CalibrationBox, CalibrationChoice
 from app.live.first_calibration import begin_first_calibration
 from app.live.frame_results import Maker, Shown, Wanted, camera_image
+from app.live.gel_care import GelCareLog
 from app.live.session import LiveSession
 from app.services.jobs import Jobs
 from app.sources.processor import Failure, Outcome
@@ -23,6 +24,8 @@ from gelpolight_core.reconstruction.trace_tally import TraceTally
 from gelpolight_core.translation import tr
 
 RATE_WINDOW_S = 2.0
+PRESSED_LIVE = "camera", "virtual"
+"""Kinds of sources whose gel is pressed now. A recording shows earlier presses."""
 
 
 class LiveDepth(QObject):
@@ -79,6 +82,7 @@ class LiveDepth(QObject):
         self._info: SourceInfo | None = None
         self._lost = self._failure = ""
         self._watch = HealthWatch()
+        self._gel = GelCareLog(self, context=context)
         self._fault: Finding | None = None
         self._shown_s: deque[float] = deque()
         self._tally = TraceTally()
@@ -101,6 +105,7 @@ class LiveDepth(QObject):
     def finish(self) -> None:
         """Release the source and the reconstructors, whose threads end with them."""
         self.live.finish()
+        self._gel.flush()
         self._chosen = None, None
         self._use(None, None)
 
@@ -187,12 +192,15 @@ class LiveDepth(QObject):
         return ", ".join(texts)
 
     def trace_text(self) -> str:
-        """Return the computed steps of the shown frame, and of the last minute, one per line."""
-        if self.last is None or self.last.heightmap is None or self.last.heightmap.trace is None:
+        """Return the state of the gel and the computed steps, of the shown frame and minute."""
+        heightmap = None if self.last is None else self.last.heightmap
+        if heightmap is None:
             return ""
-        steps = [step.sentence for step in self.last.heightmap.trace.steps]
-        minute = self._tally.lines(time.monotonic())
-        return "\n".join([*steps, "", *minute] if minute else steps)
+        trace = heightmap.trace
+        steps = () if trace is None else tuple(step.sentence for step in trace.steps)
+        gel = self._gel.lines(heightmap.calibration_id)
+        parts = (gel, steps, self._tally.lines(time.monotonic()))
+        return "\n\n".join("\n".join(part) for part in parts if part)
 
     # The images
 
@@ -259,6 +267,7 @@ class LiveDepth(QObject):
     def _restart_health(self) -> None:
         """Forget everything: the camera, the calibration or a setting is another."""
         self._watch = HealthWatch()
+        self._gel.restart()
         self._set_fault(None)
 
     def _follow_health(self, shown: Shown) -> None:
@@ -266,6 +275,8 @@ class LiveDepth(QObject):
         if heightmap is None or heightmap.health is None or not shown.frame.settled:
             return
         findings = self._watch.update(heightmap.health, shown.frame.time_s).findings
+        if self._info is not None and self._info.kind in PRESSED_LIVE:
+            self._gel.follow(heightmap.calibration_id, self._watch.gel)
         self._set_fault(findings[0] if findings else None)
 
     def _set_fault(self, fault: Finding | None) -> None:

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.context.context import AppContext
 from app.sensors.commands import LibraryCommand, RemoveCommand, RestoreCommand, UseCommand
+from app.services.jobs import Job, Jobs
 from app.widgets.question import ask
 from app.workspace.entries import Entry
 from app.workspace.sessions import SessionEntry
@@ -25,11 +26,14 @@ class CalibrationActions:
     ----------
     undo : QUndoStack
         History of removals, restorations and choices of the calibration in use.
+    jobs : Jobs
+        Writes files in the background.
     """
 
     def __init__(self, page: QWidget, *, context: AppContext) -> None:
         self._page, self._context = page, context
         self.undo = QUndoStack(page)
+        self.jobs = Jobs("library", page)
         self._folder = context.workspace.folder
         context.requests.calibrations_changed.connect(self._on_changed)
 
@@ -78,6 +82,26 @@ class CalibrationActions:
                 "scales every result. Press an object of known size to validate it."
             ),
             "warn",
+        )
+
+    def name_elastomer(self, entry: Entry, name: str) -> None:
+        """State the name of the elastomer in a calibration file."""
+        from gelpolight_core.calibration.elastomer import name_elastomer  # slow import
+
+        changed = self._context.requests.calibrations_changed
+
+        def failed(sentence: str) -> None:
+            self._context.toasts.show(sentence, "fail")
+            changed.emit()
+
+        self.jobs.submit(
+            Job(
+                tr("Naming the elastomer"),
+                lambda _progress: name_elastomer(entry.path, name),
+                lambda _: changed.emit(),
+                failed,
+                must=True,
+            )
         )
 
     def remove(self, entry: Entry) -> None:

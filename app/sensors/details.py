@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.sensors.gel_care import GelCarePanel
 from app.sensors.model import made_cell
 from app.theme.icons import icon
 from app.widgets.label import MarkupLabel, PlainLabel, escaped
@@ -23,6 +24,7 @@ from app.widgets.naming import named
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.sign import Sign
 from app.workspace.entries import Entry, parse_time
+from app.workspace.gel_care import GelCare
 from gelpolight_core.calibration.manifest import CalibrationSummary
 from gelpolight_core.calibration.titles import stage_title
 from gelpolight_core.quality import Verdict, verdict_word
@@ -67,13 +69,19 @@ class Details(QWidget):
         self.busy.setRange(0, 0)
         self.busy.hide()
         layout.addWidget(self._title)
+        self.gel = GelCarePanel()
         layout.addWidget(self._facts)
+        layout.addWidget(self.gel)
         layout.addWidget(buttons)
         layout.addWidget(self.busy)
         layout.addWidget(self._area, 1)
 
-    def show_entry(self, entry: Entry | None, uses: str = "") -> None:
-        """Show a calibration, or none; and how often it was used, in one line."""
+    def show_entry(self, entry: Entry | None, uses: str = "", care: GelCare | str = "") -> None:
+        """Show a calibration, or none; how often it was used, and the use of its gel."""
+        summary = None if entry is None else entry.summary
+        self.gel.setVisible(summary is not None)
+        if summary is not None:
+            self.gel.show_gel(summary.elastomer, care)
         if entry is None:
             self._title.setText("")
             self._facts.setText(tr("Select a calibration to see its quality."))

@@ -29,6 +29,7 @@ from app.sensors.welcome import Welcome
 from app.widgets.actions import make_action
 from app.widgets.naming import named
 from app.workspace.entries import Entry
+from app.workspace.gel_care import GelCare, read_gel_care
 from app.workspace.workspace import ENDING
 from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder
@@ -58,6 +59,7 @@ class SensorsPage(QWidget):
         self._reports.written.connect(self._report_written)
         self._reports.refused.connect(lambda text: context.toasts.show(text, "fail"))
         self._details = Details((self.use, self.report, self.reveal, self.remove))
+        self._details.gel.renamed.connect(self._on_elastomer)
         split = QSplitter(Qt.Orientation.Horizontal, self)
         split.addWidget(self._build_lists())
         split.addWidget(self._details)
@@ -236,8 +238,9 @@ class SensorsPage(QWidget):
             self._reports.write(entry, Path(name))
 
     def may_close(self) -> bool:
-        """Wait a short time for a report that is being written."""
+        """Wait a short time for a file that is being written."""
         self._reports.stop()
+        self._library.jobs.close()
         return True
 
     def _show_busy(self, busy: bool) -> None:
@@ -290,7 +293,7 @@ class SensorsPage(QWidget):
 
     def _show_chosen(self) -> None:
         entry = self.chosen()
-        self._details.show_entry(entry, self._uses(entry))
+        self._details.show_entry(entry, self._uses(entry), self._care(entry))
         self.use.setEnabled(entry is not None and not entry.broken and not entry.in_use)
         self.report.setEnabled(entry is not None and not entry.broken and not self._writing)
         self.reveal.setEnabled(entry is not None)
@@ -304,6 +307,19 @@ class SensorsPage(QWidget):
             return uses_text(*self._context.workspace.uses(entry.summary.identity))
         except InputError as error:
             return str(error)
+
+    def _care(self, entry: Entry | None) -> GelCare | str:
+        """Return the use of the gel since a calibration, or why that is not known."""
+        if entry is None or entry.summary is None:
+            return GelCare()
+        try:
+            care = read_gel_care(self._context.workspace.folder)
+        except InputError as error:
+            return str(error)
+        return care.get(entry.summary.identity, GelCare())
+
+    def _on_elastomer(self, name: str) -> None:
+        self._with_chosen(lambda entry: self._library.name_elastomer(entry, name))
 
     def _with_chosen(self, function: Callable[[Entry], None]) -> None:
         entry = self.chosen()

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from gelpolight_core.bad_pixels import BadPixels
 from gelpolight_core.calibration.file_full import full_arrays, full_entry, read_full
 from gelpolight_core.calibration.manifest import (
+    ELASTOMER,
     FORMAT,
     HEAD_LIMIT,
     MANIFEST,
@@ -196,6 +197,8 @@ def _arrays_of(c: AnyCalibration) -> dict[str, NDArray[Any]]:
 
 
 def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
+    provenance = asdict(c.provenance)
+    elastomer = provenance.pop(ELASTOMER)
     manifest = {
         "format": FORMAT,
         "version": VERSION if isinstance(c, InPlaceCalibration) else OPEN_VERSION,
@@ -204,8 +207,10 @@ def _manifest_of(c: AnyCalibration) -> dict[str, Any]:
         "units": {"length": "mm", "picture": "linear light 0..1", "camera": "px"},
         "grid": _grid_entry(c.table.grid),
         "quality": {stage: table.as_rows() for stage, table in c.quality.items()},
-        "provenance": asdict(c.provenance),
+        "provenance": provenance,
     }
+    if elastomer:
+        manifest[ELASTOMER] = elastomer
     if isinstance(c, InPlaceCalibration):
         return manifest | in_place_entry(c)
     manifest |= {
@@ -246,7 +251,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> AnyCali
     if model == MODEL:
         plain_text(manifest["sensor"]["serial"])
         quality = {stage: read_quality(rows) for stage, rows in manifest["quality"].items()}
-        return read_in_place(manifest, arrays, quality, _read_provenance(manifest["provenance"]))
+        return read_in_place(manifest, arrays, quality, _read_provenance(manifest))
     if model not in MODELS:
         raise ValueError(f"unknown model {model!r}")
     camera = dict(manifest["camera"])
@@ -268,7 +273,7 @@ def _build(manifest: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> AnyCali
         reflectance=_read_reflectance(arrays),
         noise=arrays["noise"],
         quality={stage: read_quality(rows) for stage, rows in manifest["quality"].items()},
-        provenance=_read_provenance(manifest["provenance"]),
+        provenance=_read_provenance(manifest),
         full=read_full(manifest["full"], arrays) if "full" in manifest else None,
         response=_read_response(arrays.get("camera_response")),
         bad=_read_bad_pixels(arrays.get(BAD_PIXELS), camera["height"], camera["width"]),
@@ -345,9 +350,11 @@ def _read_bad_pixels(pixels: NDArray[Any] | None, height: int, width: int) -> Ba
     return BadPixels(pixels.astype(np.int32), height, width)
 
 
-def _read_provenance(entry: dict[str, Any]) -> Provenance:
+def _read_provenance(manifest: dict[str, Any]) -> Provenance:
+    entry = manifest["provenance"]
     edits = tuple(_read_edit(edit) for edit in entry.get("edits", ()))
-    provenance = Provenance(**{**entry, "edits": edits})
+    elastomer = written_text(manifest.get(ELASTOMER, ""))
+    provenance = Provenance(**{**entry, "edits": edits, ELASTOMER: elastomer})
     for name in ("created", "operator", "program_version", "session"):
         written_text(getattr(provenance, name))
     for table in (provenance.sources, provenance.camera_settings):

@@ -107,7 +107,7 @@ def calibrate_closed_session(
         noise=_noise(background.rgb),
         balls=tuple(_ball_entry(press.name, press.ball, grid) for press in result.presses),
         quality=judge_in_place(result, scale_sd),
-        provenance=provenance_of(session.folder, files, session.camera_settings),
+        provenance=provenance_of(session, files),
         response=session.response,
     )
     progress(tr("done"), 1.0)

@@ -27,6 +27,8 @@ FORMAT = "gelpolight-calibration"
 VERSION = 3
 OPEN_VERSION = 2
 MANIFEST = "manifest.json"
+ELASTOMER = "elastomer"
+"""Beside the provenance, because older programs refuse unknown keys there."""
 MANIFEST_LIMIT = 4_000_000
 MOST_ARRAYS = 64
 MOST_DIMENSIONS = 4
@@ -67,6 +69,8 @@ class CalibrationSummary:
         Width and height of the camera images, px.
     quality : mapping
         Quality table of every stage, in order.
+    elastomer : str
+        As in its provenance.
     """
 
     identity: str
@@ -79,6 +83,7 @@ class CalibrationSummary:
     inputs: str
     image_size: tuple[int, int]
     quality: Mapping[str, QualityTable]
+    elastomer: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -140,6 +145,7 @@ def _summarise(manifest: dict[str, Any]) -> CalibrationSummary:
         "model": manifest["model"],
         **{k: provenance[k] for k in ("created", "operator", "program_version", "session")},
         "inputs": provenance.get("inputs", ""),
+        ELASTOMER: manifest.get(ELASTOMER, ""),
     }
     return CalibrationSummary(
         **{key: written_text(text) for key, text in texts.items()},

@@ -183,12 +183,7 @@ def assemble(session: Session, results: StageResults, *, model: str = MODELS[-1]
             "factors": factors.quality,
             **({} if results.full is None else {"joint": judge_joint(results, results.full)}),
         },
-        provenance=provenance_of(
-            session.folder,
-            source_files(session),
-            session.camera_settings,
-            inputs=all_inputs(session),
-        ),
+        provenance=provenance_of(session, source_files(session), inputs=all_inputs(session)),
     )
     calibration = _with_edits(calibration, session)
     return CalibrationRun(

@@ -10,27 +10,27 @@ from gelpolight_core import __version__
 from gelpolight_core.io.reading import as_text
 from gelpolight_core.io.user import user_name
 from gelpolight_core.sensor_calibration import Provenance
-from gelpolight_core.session.camera_settings import CameraSettings
+from gelpolight_core.session.closed import ClosedSession
 from gelpolight_core.session.decisions import FILE_NAME as DECISIONS_FILE
 from gelpolight_core.session.file_hashes import file_hash
+from gelpolight_core.session.session import Session
 
 
 def provenance_of(
-    folder: Path, files: Iterable[Path], camera: CameraSettings | None, *, inputs: str = ""
+    session: Session | ClosedSession, files: Iterable[Path], *, inputs: str = ""
 ) -> Provenance:
     """Return the provenance of a calibration that is made now.
 
     Parameters
     ----------
-    folder : Path
-        Of the session.
+    session : Session or ClosedSession
+        With its folder, camera settings and elastomer.
     files : iterable of Path
         The images that were used.
-    camera : CameraSettings or None
-        As the session states them.
     inputs : str, optional
         Hash of all inputs.
     """
+    folder, camera = session.folder, session.camera_settings
     described = (folder / name for name in ("session.toml", DECISIONS_FILE))
     sources = {as_text(f"{path.parent.name}/{path.name}"): file_hash(path) for path in files}
     sources |= {path.name: file_hash(path) for path in described if path.is_file()}
@@ -42,4 +42,5 @@ def provenance_of(
         sources=sources,
         inputs=inputs,
         camera_settings={} if camera is None else camera.as_texts(),
+        elastomer=session.elastomer,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,25 @@ FALLS_S = 1.0
 LEAST_CHANGE = 0.05
 """Change of a cell's light, root mean square over the strongest cells, that is a press."""
 STRONGEST = 12
+APART_S = 0.5
+"""A press counts as another one if the gel was free for so long before it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gel:
+    """The presses that a watch has seen.
+
+    Attributes
+    ----------
+    presses : int
+        Their number.
+    recovery_s : float or None
+        Time from the first frame after the last press until less than 1 % of it was left; None
+        until then.
+    """
+
+    presses: int = 0
+    recovery_s: float | None = None
 
 
 class HealthWatch:
@@ -64,14 +84,28 @@ class HealthWatch:
         ]
         return health_of(lasting, unknown=health.unknown, untouched=health.untouched)
 
+    @property
+    def gel(self) -> Gel:
+        """The presses seen so far, and how the gel recovered from the last one."""
+        return self._recovery.gel
+
     def _lasted(self, key: str) -> bool:
         return self._last[key][0] - self._since[key] >= LASTING_S
 
 
 class Recovery:
-    """Looks for what is left of the last press after it was released."""
+    """Looks for what is left of the last press after it was released.
+
+    Attributes
+    ----------
+    gel : Gel
+        The presses seen so far. A press that was there from the start is not among them.
+    """
 
     def __init__(self) -> None:
+        self.gel = Gel()
+        self._was_free = False
+        self._freed_s = 0.0
         self._pattern: Array | None = None
         self._size = 0.0
         self._pressed_s = 0.0
@@ -93,11 +127,14 @@ class Recovery:
             self._pattern = None
         size = _size(cells)
         if size > LEAST_CHANGE and (self._pattern is None or size > PRESSED * self._size):
+            self._count(time_s)
             if self._pattern is None or self._left or size > self._size:
                 self._pattern, self._size = cells.copy(), size
             self._pressed_s = time_s
             self._left.clear()
             return None
+        if not self._was_free:
+            self._was_free, self._freed_s = True, time_s
         if self._pattern is None:
             return None
         square = float((self._pattern**2).sum())
@@ -106,9 +143,19 @@ class Recovery:
             self._left.popleft()
         now = self._left[-1][1]
         if now < RECOVERED:
+            if self.gel.presses and self.gel.recovery_s is None:
+                self.gel = Gel(self.gel.presses, time_s - self._freed_s)
             return None
         first_s, first = self._left[0]
         return now if time_s - first_s >= FALLS_S and now < FALLS * first else None
+
+    def _count(self, time_s: float) -> None:
+        """Take in a pressed frame; count the press if it is another one."""
+        apart = bool(self._left) and time_s - self._pressed_s >= APART_S
+        another = self._pattern is None or self.gel.recovery_s is not None or apart
+        if self._was_free and another:
+            self.gel = Gel(self.gel.presses + 1)
+        self._was_free = False
 
 
 def _size(cells: Array) -> float:

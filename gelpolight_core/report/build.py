@@ -236,6 +236,7 @@ def _head_facts(c: AnyCalibration) -> tuple[tuple[str, str], ...]:
     models = {"paper": tr("paper"), "full": tr("full"), "in-place": tr("in place, closed sensor")}
     rows = [
         (tr("Sensor"), c.sensor.serial),
+        (tr("Elastomer"), p.elastomer or tr("not stated")),
         (tr("Calibration"), c.identity),
         (tr("Model"), models.get(c.model, c.model)),
         (tr("Created"), f"{p.created}, {p.operator}".rstrip(", ")),

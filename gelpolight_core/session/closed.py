@@ -14,6 +14,7 @@ from gelpolight_core.session.decisions import Decisions, read_decisions
 from gelpolight_core.session.images import SessionImages
 from gelpolight_core.session.missing import refuse_undescribed
 from gelpolight_core.session.session import (
+    ELASTOMER,
     Session,
     check_version,
     parse_radii,
@@ -72,6 +73,8 @@ class ClosedSession(SessionImages):
         Of ``decisions.toml``.
     camera_settings : CameraSettings or None
         Of ``[camera.device]`` and ``[camera.controls]``.
+    elastomer : str
+        Of ``[sensor]``: name or serial number of the elastomer; empty if not stated.
     """
 
     folder: Path
@@ -85,6 +88,7 @@ class ClosedSession(SessionImages):
     response: CameraResponse | None = None
     decisions: Decisions = field(default_factory=Decisions)
     camera_settings: CameraSettings | None = None
+    elastomer: str = ""
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -123,7 +127,7 @@ def parse_closed_session(content: dict[str, Any], path: Path) -> ClosedSession:
     sensor, scale = top.table("sensor"), top.table(IN_PLACE)
     camera = top.table("camera") if "camera" in content else Table({}, "camera", path)
     declared = parse_response(camera) if "camera" in content else None
-    sensor.no_more("serial")
+    sensor.no_more("serial", ELASTOMER)
     scale.no_more("mm_per_px", "mm_per_px_sd", "pin_spacing_mm", "punch_diameter_mm")
     top.no_more("format", "version", "sensor", IN_PLACE, "balls", "camera")
     stated = _optional(scale, "mm_per_px", SCALE_RANGE)
@@ -153,6 +157,7 @@ def parse_closed_session(content: dict[str, Any], path: Path) -> ClosedSession:
         declared_response(declared),
         read_decisions(path.parent),
         parse_settings(camera) if "device" in camera.content else None,
+        sensor.optional_text(ELASTOMER),
     )
 
 

@@ -12,7 +12,7 @@ from gelpolight_core.errors import InputError
 from gelpolight_core.io.atomic import make_folder, write_atomically
 from gelpolight_core.session.board import BoardSpec
 from gelpolight_core.session.closed import IN_PLACE, ClosedSession
-from gelpolight_core.session.session import FORMAT, VERSION, Session
+from gelpolight_core.session.session import ELASTOMER, FORMAT, VERSION, Session
 from gelpolight_core.translation import tr
 
 FILE_NAME = "session.toml"
@@ -31,6 +31,8 @@ def write_description(session: Session | ClosedSession) -> None:
         radii["default"] = session.ball_default_radius_mm
     content: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     content |= _closed(session) if isinstance(session, ClosedSession) else _opened(session)
+    if session.elastomer:
+        content["sensor"][ELASTOMER] = session.elastomer
     content["balls"] = radii
     if camera := _camera(session):
         content["camera"] = camera

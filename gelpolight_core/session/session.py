@@ -21,6 +21,7 @@ from gelpolight_core.translation import tr
 
 FORMAT = "gelpolight-session"
 VERSION = 1
+ELASTOMER = "elastomer"
 # Diamond has 2.42; no clear elastomer or window has a higher index.
 DENSEST_INDEX = 2.5
 SENSOR_RANGES = {
@@ -71,6 +72,8 @@ class Session(SessionImages):
     camera_settings : CameraSettings or None
         From ``[camera.device]`` and ``[camera.controls]``: the camera that captured the images,
         with its settings; None if unknown.
+    elastomer : str
+        From ``[sensor]``: name or serial number of the elastomer; empty if not stated.
     """
 
     folder: Path
@@ -84,6 +87,7 @@ class Session(SessionImages):
     response: CameraResponse | None = None
     decisions: Decisions = field(default_factory=Decisions)
     camera_settings: CameraSettings | None = None
+    elastomer: str = ""
 
     @property
     def serial(self) -> str:
@@ -187,7 +191,8 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
     """
     top = Table(content, "", path)
     check_version(top)
-    sensor = _parse_sensor(top.table("sensor"))
+    stated = top.table("sensor")
+    sensor = _parse_sensor(stated)
     checkerboard = _parse_board(top.table("checkerboard"))
     pose = _parse_board(top.table("top_pose")) if "top_pose" in content else checkerboard
     camera = top.table("camera") if "camera" in content else Table({}, "camera", path)
@@ -210,6 +215,7 @@ def parse_session(content: dict[str, Any], path: Path) -> Session:
         declared_response(declared),
         read_decisions(path.parent),
         parse_settings(camera) if "device" in camera.content else None,
+        stated.optional_text(ELASTOMER),
     )
 
 
@@ -265,7 +271,7 @@ def _parse_sensor(table: Table) -> SensorData:
         for name, (low, high) in SENSOR_RANGES.items()
     }
     sensor = SensorData(serial=table.text("serial"), **numbers)
-    table.no_more(*SensorData.__dataclass_fields__)
+    table.no_more(*SensorData.__dataclass_fields__, ELASTOMER)
     return sensor
 
 

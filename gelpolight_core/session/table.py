@@ -47,6 +47,10 @@ class Table:
                 key, tr("is not plain text of at most {n} characters").format(n=TEXT_LENGTH)
             ) from error
 
+    def optional_text(self, key: str) -> str:
+        """Return a text, or an empty one if the key is missing."""
+        return self.text(key) if key in self.content else ""
+
     def whole(self, key: str) -> int:
         """Return a whole number."""
         value = self.content.get(key)

@@ -81,6 +81,7 @@ class ClosedForm(FormPage):
         self.measured = named(PlainLabel(), "setup.measured", tr("Where the scale comes from"))
         self.measured.setWordWrap(True)
         form.addRow(tr("Serial number"), self.serial)
+        form.addRow(tr("Elastomer"), self.elastomer)
         form.addRow(tr("Kind of sensor"), self.kind)
         form.addRow("", self.facts)
         form.addRow(tr("Size of a pixel"), self.scale)
@@ -99,6 +100,7 @@ class ClosedForm(FormPage):
         stated = session.mm_per_px is not None
         scale, sd = session.mm_per_px or USUAL_SCALE, session.mm_per_px_sd
         self.serial.setText(session.serial)
+        self.elastomer.setText(session.elastomer)
         self.scale.setValue(scale)
         self.scale_sd.setValue(100.0 * (USUAL_SD if sd is None else sd / scale))
         for widget in (self.scale, self.scale_sd, self.kind):
@@ -133,6 +135,7 @@ class ClosedForm(FormPage):
             session,
             serial=self.serial.text().strip(),
             ball_default_radius_mm=0.5 * self.ball.value(),
+            elastomer=self.elastomer.text().strip(),
         )
 
 

@@ -76,6 +76,7 @@ class SetupForm(FormPage):
         self.diameter = length_box("setup.diameter", tr("Working diameter"), 0.5, 1000.0)
         for label, widget, tip in (
             (tr("Serial number"), self.serial, tr("Identifies the sensor in every file")),
+            (tr("Elastomer"), self.elastomer, self.elastomer.toolTip()),
             (
                 tr("LED height"),
                 self.led_height,
@@ -131,6 +132,7 @@ class SetupForm(FormPage):
         self._session = session
         sensor = session.sensor
         self.serial.setText(sensor.serial)
+        self.elastomer.setText(session.elastomer)
         self.led_height.setValue(sensor.led_height_mm)
         self.thickness.setValue(sensor.elastomer_thickness_mm)
         self.index.setValue(sensor.elastomer_refractive_index)
@@ -158,6 +160,7 @@ class SetupForm(FormPage):
             checkerboard=self.lens_board.board(),
             top_pose=self.top_board.board(),
             ball_default_radius_mm=0.5 * self.ball.value(),
+            elastomer=self.elastomer.text().strip(),
         )
 
     def _save_board(self, board: BoardSpec) -> None:

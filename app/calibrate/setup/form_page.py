@@ -20,6 +20,7 @@ from app.widgets.inputs import DoubleSpinBox
 from app.widgets.label import PlainLabel
 from app.widgets.meaning import make_bold, show_meaning
 from app.widgets.naming import named
+from gelpolight_core.calibration.elastomer import ELASTOMER_LENGTH
 from gelpolight_core.translation import tr
 
 FORM_WIDTH, LEAST_WIDTH = 640, 320
@@ -67,6 +68,12 @@ class FormPage(QScrollArea):
         column.addWidget(self._build_camera())
         self.serial = named(QLineEdit(), "setup.serial", tr("Serial number"))
         self.serial.setPlaceholderText(tr("for example A-001"))
+        self.elastomer = named(
+            QLineEdit(), "setup.elastomer", tr("Name or serial number of the elastomer"),
+            tr("Tells elastomers apart: presses and recovery times are kept for it. May be empty"),
+        )  # fmt: skip
+        self.elastomer.setMaxLength(ELASTOMER_LENGTH)
+        self.elastomer.setPlaceholderText(tr("for example gel 7"))
         for group in self.groups():
             column.addWidget(group)
         self.serial.textChanged.connect(self._check)

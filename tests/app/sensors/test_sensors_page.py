@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import scene
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -21,6 +22,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from app.context.context import AppContext
+from app.context.gel_care_text import care_lines
+from app.sensors.gel_care import GelCarePanel
 from app.sensors.model import cells_of
 from app.sensors.page import SensorsPage
 from app.sensors.report_writer import write_entry_report
@@ -29,8 +32,10 @@ from app.services.settings import Limits
 from app.widgets.quality_table import QualityTableWidget
 from app.widgets.question import Question
 from app.workspace.entries import read_entry
+from app.workspace.gel_care import GelCare, write_gel_care
 from app.workspace.validation import Comparison, Validation, write_validation
 from gelpolight_core.calibration.file import write_calibration
+from gelpolight_core.calibration.manifest import read_summary
 from gelpolight_core.records.entry import MeasurementRecord, Quantity
 from gelpolight_core.records.records import NAME
 
@@ -53,6 +58,7 @@ def page(context: AppContext, qtbot: QtBot) -> Iterator[SensorsPage]:
     made.resize(1100, 700)
     made.show()
     yield made
+    made.may_close()
 
 
 def words(page: QWidget) -> str:
@@ -343,3 +349,25 @@ def test_the_report_contains_the_validation(source: Path, tmp_path: Path) -> Non
     assert "1.010 mm measured" not in said[0]
     assert "Validated: cylinder" in said[1]
     assert "1.010 mm measured" in said[1]
+
+
+def test_the_gel_of_a_calibration_is_shown_and_named(
+    page: SensorsPage, source: Path, context: AppContext, qtbot: QtBot
+) -> None:
+    page.open_path(source)
+    chosen = page.chosen()
+    assert chosen is not None and chosen.summary is not None
+    care = GelCare(12, (0.5,), (0.8,))
+    write_gel_care({chosen.summary.identity: care}, context.workspace.folder)
+    page.refresh()
+    panel = page.findChild(GelCarePanel)
+    shown = panel.findChild(QLabel, "sensors.gel.care").text()
+    assert all(line in shown for line in care_lines(care))
+    panel.elastomer.setFocus()
+    qtbot.keyClicks(panel.elastomer, "gel 7")
+    qtbot.keyClick(panel.elastomer, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: read_summary(chosen.path).elastomer == "gel 7", timeout=60_000)
+    qtbot.waitUntil(lambda: not page._library.jobs.busy, timeout=60_000)
+    again = page.chosen()
+    assert again is not None and again.summary is not None
+    assert again.summary.identity == chosen.summary.identity

@@ -1,0 +1,59 @@
+"""The gel of a calibration: its name, its presses, and how fast it recovers from them."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+
+from app.context.gel_care_text import care_lines
+from app.widgets.label import PlainLabel
+from app.widgets.naming import named
+from app.workspace.gel_care import GelCare
+from gelpolight_core.translation import tr
+
+
+class GelCarePanel(QWidget):
+    """Shows the use of the gel since a calibration, with the name of the elastomer to edit.
+
+    Signals
+    -------
+    renamed(str)
+        The user has entered another name.
+    """
+
+    renamed = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        named(self, "sensors.gel", tr("Gel care"))
+        self._name = ""
+        self.elastomer = named(
+            QLineEdit(), "sensors.gel.elastomer", tr("Name or serial number of the elastomer"),
+            tr("Name or serial number of the elastomer. It is kept in the calibration file"),
+        )  # fmt: skip
+        self.elastomer.setPlaceholderText(tr("not stated"))
+        self.elastomer.editingFinished.connect(self._on_edited)
+        label = PlainLabel(tr("&Elastomer"))
+        label.setBuddy(self.elastomer)
+        row = QHBoxLayout()
+        row.addWidget(label)
+        row.addWidget(self.elastomer, 1)
+        self._care = named(PlainLabel(), "sensors.gel.care", tr("Use of the gel"))
+        self._care.setWordWrap(True)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addLayout(row)
+        column.addWidget(self._care)
+
+    def show_gel(self, elastomer: str, care: GelCare | str) -> None:
+        """Show the name of the elastomer, and its use or why that is not known."""
+        if elastomer != self._name or not self.elastomer.hasFocus():
+            self._name = elastomer
+            self.elastomer.setText(elastomer)
+        self._care.setText(care if isinstance(care, str) else ". ".join(care_lines(care)) + ".")
+
+    def _on_edited(self) -> None:
+        name = self.elastomer.text().strip()
+        if name != self._name:
+            self._name = name
+            self.renamed.emit(name)
