@@ -257,3 +257,11 @@ def test_without_a_display_panel_the_ends_are_fixed(qtbot: QtBot, shown: Shown) 
     _low, high, length = _ends(panel)
     _drag(panel.map, high, high + QPointF(0.0, 0.3 * length))
     assert panel.map.bar.levels() == shown.range_mm
+
+
+def test_the_scale_bar_of_one_millimetre_has_its_unit(qtbot: QtBot) -> None:
+    """A first length equal to the one that it is made with is written, too."""
+    made = MapView("map", "Map")
+    qtbot.addWidget(made)
+    assert made._scale.size == 1.0
+    assert made._scale.text.toPlainText() == "1 mm"
