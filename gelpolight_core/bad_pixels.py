@@ -170,7 +170,7 @@ def differing(
     light : (3, levels) float32
         Linear light of every number.
     rows : (N,) int
-        Which rows are looked at.
+        The rows that are checked.
     noise : float
         Standard deviation of a pixel, share of full scale.
 

@@ -41,7 +41,7 @@ class ClusterRunner:
     Raises
     ------
     InputError
-        If Dask is not installed, or no scheduler answers.
+        If Dask is not installed, or the scheduler does not respond.
     """
 
     def __init__(self, settings: BatchSettings, out: Path, address: str) -> None:

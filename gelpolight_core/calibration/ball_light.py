@@ -1,7 +1,7 @@
 """Light that the membrane around a pressed ball reflects onto itself, for the joint refinement.
 
-The surface is that of the ball and its drape, as far as the refinement knows them; it is gathered
-again when they are known better. It is computed for a membrane that absorbs nothing.
+The surface is the present estimate of the ball and its drape; the light is computed again when the
+estimate improves. It is computed for a membrane that absorbs no light.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ class Variant:
     calibration : CalibrationTerms
         Of the joint refinement.
     model : str
-        ``full``, or ``paper`` for the paper's model, which has none of the terms.
+        ``full``, or ``paper`` for the paper's model, which does not use these terms.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Effect of an error of each calibration parameter on the depth, for the tornado chart.
 
-Each parameter is changed by itself, the images stay as they are, and everything that the
-calibration derives from images (background, light) is computed from them again. A fit of several
-parameters on ball presses makes up for part of it; here nothing does.
+One parameter at a time is changed. The images remain unchanged, and everything that the calibration
+derives from them (background, light) is computed again. A fit of several parameters on ball presses
+would compensate part of the error; here there is no such fit.
 """
 
 from __future__ import annotations

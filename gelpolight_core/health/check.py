@@ -123,7 +123,7 @@ class HealthCheck:
         pixels = self._bad_pixels(raw, light, whole)
         blurred = None if moved else blur_finding(common, samples.blur_strength)
         if blurred is not None and blurred.meaningless and common.share < LEAST_START:
-            # None of the texture is there.
+            # The texture is missing.
             return health_of([stranger_finding()], untouched=common.share)
         # Specks that have moved or faded are no dirt, nor is a bad line.
         specks = moved or blurred or any(finding.key == "bad_line" for finding in pixels)

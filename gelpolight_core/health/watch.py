@@ -150,7 +150,7 @@ class Recovery:
         return now if time_s - first_s >= FALLS_S and now < FALLS * first else None
 
     def _count(self, time_s: float) -> None:
-        """Take in a pressed frame; count the press if it is another one."""
+        """Add a pressed frame; count the press if it is a new one."""
         apart = bool(self._left) and time_s - self._pressed_s >= APART_S
         another = self._pattern is None or self.gel.recovery_s is not None or apart
         if self._was_free and another:

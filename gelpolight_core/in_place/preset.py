@@ -111,7 +111,7 @@ def preset_named(key: str) -> Preset:
     Raises
     ------
     InputError
-        If there is none of that name.
+        If there is no preset with that name.
     """
     known = {preset.key: preset for preset in presets()}
     if key.casefold() in known:

@@ -30,7 +30,7 @@ def corner_drape(x: Array, y: Array, *, edge: float = 0.0, rounding: float = 0.0
     """Return the membrane's depth outside the quarter plane x <= 0, y <= 0 that is pressed to 1.
 
     The solution of laplacian(w) = w with w = 1 on the two faces; lengths in decay lengths.
-    Inside the quarter plane the answer is 1.
+    Inside the quarter plane the result is 1.
 
     Parameters
     ----------

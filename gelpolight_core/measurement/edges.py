@@ -4,7 +4,8 @@ The edge belongs to the steepest place nearby: it is where half of that slope is
 deeper side. Where a membrane leaves the face of an object its slope jumps, and a map blurs that
 jump, so that the steepest place itself lies outside the object by a node or two. What is found so
 is the rim of the face, within the rounding of the object's edge: an indenter that is rounded by
-0.05 mm is measured 0.1 mm smaller than it is nominally. The fitted indenters reckon with that.
+0.05 mm is measured 0.1 mm smaller than it is nominally. The fitted indenters take this into
+account.
 """
 
 from __future__ import annotations
@@ -237,7 +238,7 @@ def _edge_offsets(
     # Bilinear depths have slopes that jump at the nodes; two steps smooth over one node.
     smooth = gaussian_filter1d(depth, 2.0, axis=1, mode="nearest")
     steep = np.nan_to_num(np.abs(np.gradient(smooth, step, axis=1)))
-    # The steepest one, not the end of a slope that goes on beyond the reach.
+    # The steepest one, not the end of a slope that continues beyond the search distance.
     best = steep[:, 1:-1].argmax(axis=1) + 1
     top = steep[np.arange(len(steep)), best]
     inner = (best > 1) & (best < steep.shape[1] - 2) & np.isfinite(smooth).all(axis=1)

@@ -276,7 +276,7 @@ def _chosen_points(window: WindowData) -> tuple[Mask, float]:
     """Return the pixels of the fit and which share of the usable ones they are.
 
     A regular decimation would beat against walls that lie along the grid; this one is random, with
-    a fixed seed so that a map has one answer.
+    a fixed seed, so that a map always gives the same result.
     """
     usable = window.weight > 0.0
     draw = np.random.default_rng(0).random(usable.shape)

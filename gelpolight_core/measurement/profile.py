@@ -28,7 +28,7 @@ Point = tuple[float, float]
 STEP = 0.5
 """Distance of the profile's points, as a share of the map's pitch."""
 ERROR_STEP = 4.0
-"""The same for the errors, which the map knows at every fourth node."""
+"""The same for the errors, which the map has at every fourth node."""
 MOST_POINTS = 20_000
 """Of a line; the map's diagonal has about 3000."""
 

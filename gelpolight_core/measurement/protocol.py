@@ -1,9 +1,9 @@
 """The evaluation protocol of the paper's section VI-B: what is pressed, where and how often.
 
 Objects of sizes 3 to 7 mm at one height, and of heights 0.5 to 1.5 mm at one size, each pressed
-five times in one region and once in each of 25 random regions. Every press has a place of its own
-that depends on nothing but the seed and the press itself, so that a part of the protocol asks for
-the same places as the whole, and a run that is resumed goes on with the places it began with.
+five times in one region and once in each of 25 random regions. The position of a press depends only
+on the seed and on the press itself. A part of the protocol therefore uses the same positions as the
+whole protocol, and a resumed run continues with the same positions.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     protocol.toml   presses/*.png   presses/truth.csv   refused.csv   discarded/*.png
 
-A press counts once ``truth.csv`` has a row for it; its image is written first. Nothing
-else is kept of where a run stands, so a run that was killed goes on with the press it was at.
+A press counts once ``truth.csv`` has a row for it; its image is written first. No other state is
+stored, so an interrupted run continues with the press that was not finished.
 """
 
 from __future__ import annotations

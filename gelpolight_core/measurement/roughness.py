@@ -65,8 +65,9 @@ def roughness(
 ) -> Roughness:
     """Return the roughness of a region.
 
-    Every node counts alike. No filter is used beside the plane: neither an S-filter, whose part the
-    camera's resolution plays, nor an L-filter, so that waviness within the region counts too.
+    All nodes have the same weight. Only the plane is subtracted, without an S-filter or an
+    L-filter: the resolution of the camera replaces the S-filter, and waviness within the region is
+    included.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def roughness(
     rectangle : Rectangle
         The region.
     levelled : {"plane", "none"}, optional
-        What is taken off first.
+        What is subtracted first.
 
     Raises
     ------

@@ -23,10 +23,10 @@ Flags = NDArray[np.uint8]
 Point = tuple[float, float]
 
 UNKNOWN = int(Flag.SATURATED | Flag.NOT_OBSERVABLE | Flag.INVALID | Flag.UNANCHORED)
-"""Flags of places whose depth is a guess. Walls lie in the shadow of a light, which the model knows
-how to do without."""
+"""Flags of points whose depth is uncertain. Walls in the shadow of one LED are not among them,
+because the model does not need this LED."""
 FLAGGED_SHARE = 0.1
-"""Share of such places from which a result is called doubtful."""
+"""Share of such points above which a result is doubtful."""
 
 
 @dataclass(frozen=True, slots=True)

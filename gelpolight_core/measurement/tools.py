@@ -142,7 +142,7 @@ def _plain(value: Any) -> Any:
 
 
 def _value(field: Field[Any], value: Any, tool: Any) -> Any:
-    """Return a value of the kind that a field's annotation asks for."""
+    """Return a value of the type in the annotation of a field."""
     kind = str(field.type)
     try:
         if value is None and "None" in kind:

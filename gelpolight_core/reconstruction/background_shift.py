@@ -166,7 +166,7 @@ def _factors(present: Map, calibration: Calibration) -> Map:
     factors = np.zeros(present.shape, np.float32)
     np.divide(present, theory, out=factors, where=theory > 0.0, casting="same_kind")
     known = (factors > LEAST_FACTOR).all(axis=2) & np.isfinite(factors).all(axis=2)
-    # As the calibration asks of the white board: what was dim there stays out.
+    # The same limit as for the white board: dim areas are left out.
     light = calibration.radiance * flat_cosines(calibration.table, calibration.led_positions_mm)
     known &= ~saturated(present).any(axis=2) & (light > whiteboard.LEAST_LIGHT).all(axis=2)
     factors[~known] = 0.0

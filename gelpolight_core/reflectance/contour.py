@@ -50,7 +50,7 @@ class KinkTable:
     radii_px : (steps,)
         Distances from the centre.
     answer : (rays, steps, 3) float32
-        Answer of the filter per channel, positive where darkness ends in a cusp.
+        Response of the filter per channel, positive where darkness ends in a cusp.
     strength : (rays, steps)
         Root of the summed squares of `answer`; NaN where the filter would look beyond the working
         area.
@@ -188,7 +188,7 @@ def search_circle(
     moves = np.arange(-shift, shift + 0.5 * step, step) * around.radius
     sizes = np.arange(shrink, grow + 0.5 * step, step) * around.radius
     dx, dy, size = (a.ravel() for a in np.meshgrid(moves, moves, sizes, indexing="ij"))
-    # Averaged neighbours add nothing but time.
+    # Averaged neighbours only take more time.
     rays = slice(None, None, 3 if table.wedge_deg > 3.0 else 1)
     angles, answer = table.angles_rad[rays], np.ascontiguousarray(table.answer[rays])
     seen = np.isfinite(table.strength[rays])
@@ -257,12 +257,12 @@ def distance_in_radii(shape: tuple[int, ...], circle: Circle) -> Array32:
 
 
 def _coherent_energy(answer: Array32, column: Array, angles: Array) -> Array:
-    """Return, per row of `column`, the energy of the smooth part of the answers along it.
+    """Return, per row of `column`, the energy of the smooth part of the responses along it.
 
     Parameters
     ----------
     answer : (rays, steps, 3)
-        Filter's answers.
+        Responses of the filter.
     column : (circles, rays)
         Where each circle crosses each ray, in steps.
     angles : (rays,)

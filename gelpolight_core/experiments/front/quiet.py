@@ -120,7 +120,7 @@ def _busy_s() -> float | None:
 
 
 def _look(seconds: float) -> tuple[float | None, tuple[str, ...]]:
-    """Return what is used while this program sleeps, in percent of one processor, and by whom."""
+    """Return the load by other programs, in percent of one processor, and their names."""
     before, programs = _busy_s(), _programs()
     began = time.monotonic()
     time.sleep(seconds)

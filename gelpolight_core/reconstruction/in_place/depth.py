@@ -19,9 +19,9 @@ ROUGHLY_FREE = 1e-3
 """Weight of depth 0 on the whole border in a first, coarse solution."""
 COARSE = 4
 CROSSES = 0.08
-"""Share of the greatest depth at the border from which it is not held all around ..."""
+"""Share of the largest depth at the border above which parts of the border are free ..."""
 HELD = 0.02
-"""... and up to which it still is held, node by node."""
+"""... and up to which a node of the border is fixed at depth 0."""
 STEEP_SHARE, REACH_MM = 0.25, 2.0
 """A contact crosses the border within this reach of walls, which have this share of the steepest
 slope. Small errors of the slopes over all of the field leave depth at the border, too."""

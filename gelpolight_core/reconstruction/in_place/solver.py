@@ -44,7 +44,7 @@ class InPlaceDepth:
     flags : (rows, columns) uint8
         Sums of :class:`Flag`.
     notes : tuple of str
-        For a person.
+        For the user.
     trace : Trace
         What was done.
     slope_sd, depth_sd_mm : (rows, columns) float32 or None

@@ -19,7 +19,8 @@ from gelpolight_core.reconstruction.threads import RowWorkers
 
 Array = NDArray[np.float64]
 Map = NDArray[np.float32]
-# 64 independent differences: a block knows its variance to 18 %, without bias in the median.
+# 64 independent differences: the variance of a block is accurate to 18 %, without bias in the
+# median.
 BLOCK = 16
 LEVELS = 8
 LEAST_BLOCKS = 12

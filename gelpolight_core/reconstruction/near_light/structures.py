@@ -140,7 +140,7 @@ class Slopes(NamedTuple):
 
 
 def slopes_like(depth_mm: Map, take: Any = None) -> Slopes:
-    """Return room for the slopes of a region; `take` lends arrays by name, shape and kind."""
+    """Return arrays for the slopes of a region; `take` provides arrays by name, shape and type."""
 
     def lend(name: str, kind: type[np.generic] = np.float32) -> Any:
         return np.empty(depth_mm.shape, kind) if take is None else take(name, depth_mm.shape, kind)

@@ -149,7 +149,7 @@ def depth_noise(
     )
     placed, placed_model = (place_examples(e, answer, coarse) for e in (white, model))
     result = no_contact_noise(maps.flags.shape)
-    # Bringing normals to true positions averages them once more.
+    # Moving normals to true positions averages them again.
     slope_sd = np.sqrt((moves.moved**2).sum(axis=0)) * share_placed / share
     slope_model_sd = np.sqrt(((moves.moved * times) ** 2).sum(axis=0))
     result.slope_sd[here] = _at(slope_sd, answer.position)
@@ -222,7 +222,7 @@ def slope_noise(ratio: Map, ratio_sd: Map, slopes: Slopes, solve: Solve) -> Slop
     ratio, ratio_sd : (3, rows, columns) float32
         Press over background, and its standard deviation, > 0.
     slopes : Slopes
-        The answer's.
+        Of the result.
     solve : function
         As for :func:`depth_noise`.
     """
