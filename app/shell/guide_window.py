@@ -32,7 +32,7 @@ PAGES = (
     ("guide/validate", tr("Validate")),
     ("guide/inspect", tr("Inspect")),
     ("guide/measure", tr("Measure")),
-    ("guide/keeping-it-true", tr("Keeping it true")),
+    ("guide/keeping-it-true", tr("Routine checks")),
     ("closed-sensors", tr("Closed sensors")),
     ("quality-figures", tr("Quality figures")),
     ("health", tr("Faults of an image")),
