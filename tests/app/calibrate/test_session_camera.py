@@ -163,7 +163,7 @@ def test_a_calibration_contains_its_camera_settings(computed_project: Made) -> N
     before = {stage: status.state for stage, status in project.statuses().items()}
     project.set_camera(stored)
     assert {stage: status.state for stage, status in project.statuses().items()} == before
-    made = provenance_of(project.session.folder, (), project.session.camera_settings)
+    made = provenance_of(project.session, ())
     assert settings_of_texts(made.camera_settings) == stored
 
 
