@@ -1,8 +1,9 @@
 """Tolerances of the lengths that the user states, and their effect on all results.
 
-No image shows such an error. The board on the top surface is seen in air: its squares give the
-surface's distance. Under the elastomer the surface then appears nearer, by what thickness and index
-say, and lengths across follow the distance at which it appears. Slopes follow the ball radii.
+No image shows errors that are so small. The board on the top surface is seen in air: its squares
+give the surface's distance. Under the elastomer the surface then appears nearer, by what thickness
+and index say, and lengths across follow the distance at which it appears. Slopes follow the ball
+radii.
 """
 
 from __future__ import annotations

@@ -34,6 +34,7 @@ from gelpolight_core.calibration.joint_problem import (
 from gelpolight_core.calibration.terms import ALL_CALIBRATION_TERMS, CalibrationTerms
 from gelpolight_core.least_squares import fit_least_squares
 from gelpolight_core.parallel import in_parallel
+from gelpolight_core.reflectance.agreement import LEAST_PRESSES
 from gelpolight_core.reflectance.ball import BallPose
 from gelpolight_core.reflectance.gathered_light import Slab
 from gelpolight_core.reflectance.membrane import MEMBRANES, Membrane
@@ -43,6 +44,9 @@ Array = NDArray[np.float64]
 INTERREFLECTION = 12
 SIGNIFICANT = 3.0
 """Interreflection counts as present above this many standard deviations."""
+RADIUS_FACTORS, RADIUS_STEP, RADIUS_CHANGE, RADIUS_TOLERANCE = (0.5, 2.0), 1e-4, 0.05, 1e-4
+"""Limits of the factor on all ball radii, its step for derivatives, its typical change, and the
+tolerance of its fit."""
 _NAMES = ("exponent", "gloss", "roughness", "interreflection", "decay_mm")
 
 
@@ -80,6 +84,8 @@ class JointResult:
         Of LEDs (9), exponent, gloss, roughness, reflectance for interreflected light and decay
         length and, if the membrane is one-dimensional, of the heights of its curves; from
         leaving out one press at a time. 0 for fixed parameters.
+    radius_factor : float or None
+        All ball radii times this fit the images best. None if it was not looked for.
     """
 
     led_positions_mm: Array
@@ -96,6 +102,7 @@ class JointResult:
     membrane_held_out: tuple[float, float]
     membrane_kept: str
     covariance: Array
+    radius_factor: float | None = None
 
 
 def refine_jointly(
@@ -106,6 +113,7 @@ def refine_jointly(
     *,
     board: BesideBoard | None = None,
     terms: CalibrationTerms = ALL_CALIBRATION_TERMS,
+    check_radii: bool = False,
 ) -> JointResult:
     """Refine LEDs, membrane and balls together.
 
@@ -124,6 +132,8 @@ def refine_jointly(
         The untouched membrane and the white board, which give the reflectance.
     terms : CalibrationTerms, optional
         The effects to model; by default all.
+    check_radii : bool, optional
+        Look for a common error of all ball radii, with four presses or more.
     """
     if terms.interreflection:
         seen = _first_light(presses, pixels, led_positions_mm, slab, terms)
@@ -166,6 +176,7 @@ def refine_jointly(
         membranes,
         MEMBRANES[int(curves)],
         shared_covariance(solved.problem, x),
+        _radius_factor(solved) if check_radii and len(presses) >= LEAST_PRESSES else None,
     )
 
 
@@ -221,7 +232,7 @@ def _balls_of(x: Array, pixels: Sequence[BallPixels]) -> tuple[BallPose, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Solution:
-    """Parameters, their standard deviations, misfits of the ratio, mean loss, and the problem."""
+    """Parameters, their standard deviations, misfits of the ratio, mean loss; what was solved."""
 
     x: Array
     sd: Array
@@ -229,6 +240,7 @@ class _Solution:
     ball_misfits: Array
     loss: float
     problem: Problem
+    limits: tuple[Array, Array]
 
 
 def _start(
@@ -280,9 +292,6 @@ def _solve(
         free[:COMMON] = False
         free[balls.stop :] = False
     problem = Problem(pixels, start, free, reflectance)
-    scale = np.full(start.size, 0.1)
-    scale[DECAY] = 0.05
-    scale[balls] = np.tile([0.02, 0.02, 0.05], len(pixels))
 
     def whole(part: Array) -> Array:
         x = start.copy()
@@ -294,13 +303,59 @@ def _solve(
         lambda part: problem.jacobian(whole(part))[:, free],
         begin[free],
         (low[free], high[free]),
-        scale=scale[free],
+        scale=_typical_change(problem)[free],
         robust=True,
     )
-    return _described(problem, whole(found.x))
+    return _described(problem, whole(found.x), (low, high))
 
 
-def _described(problem: Problem, x: Array) -> _Solution:
+def _typical_change(problem: Problem) -> Array:
+    """Return by how much each parameter of the fit changes."""
+    scale = np.full(problem.start.size, 0.1)
+    scale[DECAY] = 0.05
+    scale[COMMON : problem.balls_end] = np.tile([0.02, 0.02, 0.05], len(problem.presses))
+    return scale
+
+
+def _radius_factor(solved: _Solution) -> float:
+    """Return the factor on all ball radii that fits the images best.
+
+    Slopes on a ball are positions over its radius. To first order, a membrane of another
+    reflectance, or LEDs at another height, look the same as balls of another radius. The curvature
+    of the brightness across a contact, and presses under other directions of light, tell them
+    apart. The factor is fitted with all other parameters, from their solution.
+    """
+    problem = replace(solved.problem, presses=[thinned(thinned(p)) for p in solved.problem.presses])
+    free, (low, high) = problem.free, solved.limits
+
+    def at(part: Array) -> tuple[Problem, Array]:
+        x = solved.x.copy()
+        x[free] = part[:-1]
+        return problem.with_radii(part[-1]), x
+
+    def jacobian(part: Array) -> Array:
+        scaled, x = at(part)
+        more = problem.with_radii(part[-1] + RADIUS_STEP)
+        by_radius = (more.all(x) - scaled.all(x)) / RADIUS_STEP
+        return np.column_stack([scaled.jacobian(x)[:, free], by_radius])
+
+    def residuals(part: Array) -> Array:
+        scaled, x = at(part)
+        return scaled.all(x)
+
+    found = fit_least_squares(
+        residuals,
+        jacobian,
+        np.append(solved.x[free], 1.0),
+        (np.append(low[free], RADIUS_FACTORS[0]), np.append(high[free], RADIUS_FACTORS[1])),
+        scale=np.append(_typical_change(problem)[free], RADIUS_CHANGE),
+        robust=True,
+        tolerance=RADIUS_TOLERANCE,
+    )
+    return float(found.x[-1])
+
+
+def _described(problem: Problem, x: Array, limits: tuple[Array, Array]) -> _Solution:
     """Return a solution with its standard deviations, misfits and loss."""
     residuals = problem.residuals(x)
     weights = [p.weight.ravel() for p in problem.presses]
@@ -312,7 +367,7 @@ def _described(problem: Problem, x: Array) -> _Solution:
     variance = np.diag(np.linalg.pinv(curvature.T @ curvature))
     sd = np.zeros(x.size)
     sd[problem.free] = np.sqrt(np.maximum(variance, 0.0))
-    return _Solution(x, sd, misfit, np.array(of_balls), loss, problem)
+    return _Solution(x, sd, misfit, np.array(of_balls), loss, problem, limits)
 
 
 def shared_covariance(problem: Problem, x: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,11 @@ class Problem:
     def balls_end(self) -> int:
         """Index after the last ball parameter."""
         return COMMON + 3 * len(self.presses)
+
+    def with_radii(self, factor: float) -> Problem:
+        """Return the problem with all ball radii times a factor."""
+        scaled = [replace(p, radius_mm=factor * p.radius_mm) for p in self.presses]
+        return replace(self, presses=scaled)
 
     def residuals(self, x: Array, surfaces: Sequence[Surface] | None = None) -> list[Array]:
         """Return the weighted residuals of each press, (3 N,); on known surfaces if given."""

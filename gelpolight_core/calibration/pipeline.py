@@ -32,6 +32,7 @@ from gelpolight_core.sensor_calibration import MODELS, Calibration, FullModel
 from gelpolight_core.session.file_hashes import refuse_copies
 from gelpolight_core.session.missing import refuse_missing_stages
 from gelpolight_core.session.session import Session
+from gelpolight_core.stated_lengths import HEIGHT_BY_RADIUS
 from gelpolight_core.translation import tr
 
 Progress = Callable[[str, float], None]
@@ -51,6 +52,8 @@ _BEGINS = {
 
 MOST_HEIGHT_ERROR = 4.0
 """Percent of height from which on a calibration fails: half of the error of the paper's method."""
+RADIUS_WARN_PERCENT, RADIUS_FAIL_PERCENT = 3.0, MOST_HEIGHT_ERROR / HEIGHT_BY_RADIUS
+"""Of all ball radii; the larger one makes heights wrong by `MOST_HEIGHT_ERROR`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +226,7 @@ def judge_joint(results: StageResults, full: FullModel) -> QualityTable:
                 advice=tr("Press more balls at more positions"),
             ),
             *(() if results.joint is None else judge_presses(results.joint)),
+            *(() if results.joint is None else judge_radii(results.joint)),
             *_scale_figures(full),
             *_membrane_figures(full),
             judge("gloss", tr("Glossy share of the membrane"), full.membrane.gloss, warn=0.6),
@@ -260,6 +264,32 @@ def judge_presses(joint: JointResult) -> tuple[Figure, ...]:
             advice=tr(
                 "Check the stated diameter of {name}; clean the membrane and repeat the press"
             ).format(name=worst),
+        ),
+    )
+
+
+def judge_radii(joint: JointResult) -> tuple[Figure, ...]:
+    """Judge whether all stated ball radii have a common error, or contradict the other lengths."""
+    factor = joint.radius_factor
+    if factor is None:
+        return ()
+    off = 100.0 * (max(factor, 1.0 / factor) - 1.0)
+    seen = tr("In the images all balls look {p:.0f} % smaller than stated")
+    if factor > 1.0:
+        seen = tr("In the images all balls look {p:.0f} % larger than stated")
+    advice = tr(
+        "Measure the ball diameters and correct them. If they are right, measure the squares of"
+        " the board on the top surface, and check the layers"
+    )
+    return (
+        judge(
+            "common_radius_percent",
+            tr("All stated ball radii against the images"),
+            off,
+            "%",
+            warn=RADIUS_WARN_PERCENT,
+            fail=RADIUS_FAIL_PERCENT,
+            advice=f"{seen.format(p=off)}. {advice}",
         ),
     )
 

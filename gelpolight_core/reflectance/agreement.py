@@ -2,7 +2,7 @@
 
 The other presses give the membrane's curve (brightness over the light's cosine, Eq. 6); with that
 curve the radius and the centre of a press follow from its own shading. A press whose radius comes
-out as stated agrees with the others. An error that all presses share cannot be seen this way.
+out as stated agrees with the others. The joint refinement finds an error that all presses share.
 """
 
 from __future__ import annotations

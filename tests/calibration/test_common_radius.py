@@ -1,0 +1,43 @@
+"""An error that all ball radii share is found by the fit of all presses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_joint import BALLS, MIRROR, SLAB, found_press, pixels_of, truth
+
+from gelpolight_core.calibration.joint import refine_jointly
+from gelpolight_core.calibration.pipeline import judge_radii
+from gelpolight_core.quality import Verdict
+
+
+@pytest.mark.parametrize(
+    ("stated", "verdict"), [(1.0, Verdict.PASS), (1.1, Verdict.FAIL)]
+)
+def test_radii_that_are_all_stated_wrong_fail_a_calibration(
+    stated: float, verdict: Verdict
+) -> None:
+    known = truth(gloss=0.3, roughness=0.45, decay_mm=0.6)
+    random = np.random.default_rng(0)
+    presses = [found_press(pose, random) for pose in BALLS[:4]]
+    pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:4]]
+    presses = [
+        replace(p, pose=replace(p.pose, radius_mm=stated * p.pose.radius_mm)) for p in presses
+    ]
+    pixels = [replace(p, radius_mm=stated * p.radius_mm) for p in pixels]
+    joint = refine_jointly(presses, pixels, MIRROR, SLAB, check_radii=True)
+    assert joint.radius_factor == pytest.approx(1.0 / stated, abs=0.02)
+    (figure,) = judge_radii(joint)
+    assert figure.key == "common_radius_percent"
+    assert figure.verdict is verdict
+
+
+def test_it_is_judged_only_if_it_was_looked_for() -> None:
+    known, random = truth(), np.random.default_rng(0)
+    presses = [found_press(pose, random) for pose in BALLS[:3]]
+    pixels = [pixels_of(pose, known, 0.01, random) for pose in BALLS[:3]]
+    joint = refine_jointly(presses, pixels, MIRROR, SLAB, check_radii=True)
+    assert joint.radius_factor is None  # three presses are too few
+    assert judge_radii(joint) == ()
