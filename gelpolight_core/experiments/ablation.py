@@ -148,11 +148,14 @@ class Ablation:
         In the order of :data:`VARIANTS`.
     repeats : int
         How often each press was timed.
+    refused : tuple of (Variant, str)
+        Variants whose calibration is refused, with the reason.
     """
 
     sensor: str
     results: tuple[TermResult, ...]
     repeats: int
+    refused: tuple[tuple[Variant, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +221,7 @@ def ablate(
     seen = run_stage(Stage.RESPONSE, session, StageResults()).response
     linear = session if seen is None else replace(session, response=seen.response)
     presses = read_presses(linear, radius_mm)
-    candidates = _calibrated(session, (EVERYTHING, *variants), workers, progress)
+    candidates, refused = _calibrated(session, (EVERYTHING, *variants), workers, progress)
     for candidate in candidates:
         candidate.reconstruct.depth(presses[0].rgb, normals=False)  # prepares maps and kernels
     for number, press in enumerate(presses):
@@ -236,7 +239,7 @@ def ablate(
         )
         for c in candidates
     )
-    return Ablation(session.folder.resolve().name, results, repeats)
+    return Ablation(session.folder.resolve().name, results, repeats, refused)
 
 
 def read_presses(session: Session, radius_mm: float) -> list[TruePress]:
@@ -302,8 +305,12 @@ def _take_in_turn(
 
 def _calibrated(
     session: Session, variants: Sequence[Variant], workers: int, progress: Progress
-) -> list[_Candidate]:
-    """Calibrate the stages once, and refine them for every requested set of terms."""
+) -> tuple[list[_Candidate], tuple[tuple[Variant, str], ...]]:
+    """Calibrate the stages once, and refine them for every requested set of terms.
+
+    Without a term that a sensor needs, the refinement may end at LEDs that no reconstruction
+    accepts. Such variants are returned with the reason.
+    """
     asked = {variant.calibration for variant in variants}
     whole = 1 + len(asked)
     results = StageResults()
@@ -313,7 +320,8 @@ def _calibrated(
         results = run_stage(stage, session, results)
     paper = assemble(session, results, model="paper").calibration
     made: dict[CalibrationTerms, tuple[Calibration, float]] = {}
-    candidates = []
+    candidates: list[_Candidate] = []
+    refused: list[tuple[Variant, str]] = []
     for variant in variants:
         terms = variant.calibration
         if terms not in made:
@@ -324,8 +332,14 @@ def _calibrated(
         calibration, seconds = made[terms]
         if variant.model == "paper":
             calibration, seconds = paper, float("nan")
-        reconstruct = Reconstructor(
-            calibration, model=variant.model, terms=variant.terms, workers=workers
-        )
-        candidates.append(_Candidate(variant, reconstruct, seconds))
-    return candidates
+        try:
+            reconstruct = Reconstructor(
+                calibration, model=variant.model, terms=variant.terms, workers=workers
+            )
+        except InputError as error:
+            if variant is EVERYTHING:
+                raise
+            refused.append((variant, str(error)))
+        else:
+            candidates.append(_Candidate(variant, reconstruct, seconds))
+    return candidates, tuple(refused)

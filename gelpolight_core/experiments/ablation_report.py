@@ -67,7 +67,16 @@ def ablation_table(ablation: Ablation) -> str:
         f"{tr('without the term'):<34}{tr('height %'):>9}{tr('size %'):>8}{tr('RMS um'):>8}"
         f"{tr('worst'):>8}{tr('worth um'):>10}{tr('cost ms'):>9}{tr('cost s'):>8}"
     )
-    return "\n".join([title, head, *(_text_line(row) for row in ablation_rows(ablation))])
+    rows = (_text_line(row) for row in ablation_rows(ablation))
+    return "\n".join([title, head, *rows, *_refused_lines(ablation)])
+
+
+def _refused_lines(ablation: Ablation) -> list[str]:
+    """Return a line for each variant that is refused."""
+    return [
+        tr("Refused: {variant}. {why}").format(variant=translated(variant.label), why=why)
+        for variant, why in ablation.refused
+    ]
 
 
 def ablation_markdown(ablations: Sequence[Ablation]) -> str:
@@ -90,6 +99,7 @@ def ablation_markdown(ablations: Sequence[Ablation]) -> str:
                     *(_markdown_line(row) for row in ablation_rows(ablation)),
                 ]
             ),
+            *_refused_lines(ablation),
         ]
     return "\n\n".join(parts) + "\n"
 
@@ -107,7 +117,12 @@ def write_ablation(ablations: Sequence[Ablation], folder: Path) -> list[Path]:
     writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    content = {"repeats": ablations[0].repeats, "rows": rows}
+    refused = [
+        {"sensor": ablation.sensor, "left_out": variant.name, "why": why}
+        for ablation in ablations
+        for variant, why in ablation.refused
+    ]
+    content = {"repeats": ablations[0].repeats, "rows": rows, "refused": refused}
     texts = {
         "ablation.csv": stream.getvalue(),
         "ablation.json": json.dumps(content, indent=1, allow_nan=False) + "\n",

@@ -13,9 +13,7 @@ from gelpolight_core.calibration.pipeline import judge_radii
 from gelpolight_core.quality import Verdict
 
 
-@pytest.mark.parametrize(
-    ("stated", "verdict"), [(1.0, Verdict.PASS), (1.1, Verdict.FAIL)]
-)
+@pytest.mark.parametrize(("stated", "verdict"), [(1.0, Verdict.PASS), (1.1, Verdict.FAIL)])
 def test_radii_that_are_all_stated_wrong_fail_a_calibration(
     stated: float, verdict: Verdict
 ) -> None:

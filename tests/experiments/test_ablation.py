@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,9 @@ from gelpolight_core.calibration.pipeline import CalibrationRun
 from gelpolight_core.calibration.refinement import bare_calibration, refine_with
 from gelpolight_core.calibration.results import StageResults
 from gelpolight_core.calibration.terms import CalibrationTerms
+from gelpolight_core.experiments import ablation
 from gelpolight_core.experiments.ablation import VARIANTS
-from gelpolight_core.session.session import read_session
+from gelpolight_core.session.session import SensorData, read_session
 
 PRESSES = ("cylinder_s5_d100.png", "cuboid_s4_d100.png")
 BALLS = (0, 2, 4, 5)
@@ -42,16 +44,35 @@ def small(virtual_session: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return folder
 
 
+def _in_one_plane_without_curves(
+    sensor: SensorData, results: StageResults, *, terms: CalibrationTerms
+) -> StageResults:
+    """Refine; without reflectance curves, the refinement ends at LEDs that no one can use."""
+    refined = refine_with(sensor, results, terms=terms)
+    assert refined.full is not None
+    if terms.curves:
+        return refined
+    beside = np.array([[2.0, 0.0, -10.0], [4.0, 0.0, -10.0], [6.0, 0.0, -10.0]])
+    return replace(refined, full=replace(refined.full, led_positions_mm=beside))
+
+
 def test_the_table_says_what_each_term_is_worth(
-    small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    small: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(ablation, "refine_with", _in_one_plane_without_curves)
     out = tmp_path / "out"
     terms = "near_light_0,true_positions,gloss,paper"
-    assert main(["ablation", str(small), "-o", str(out), "--terms", terms, "--repeats", "1"]) == 0
+    asked = f"{terms},curves"
+    assert main(["ablation", str(small), "-o", str(out), "--terms", asked, "--repeats", "1"]) == 0
     captured = capsys.readouterr()
     assert "light computed for depth 0 only" in captured.out
     assert "%" in captured.err  # progress
-    rows = json.loads((out / "ablation.json").read_text())["rows"]
+    content = json.loads((out / "ablation.json").read_text())
+    rows = content["rows"]
+    assert [item["left_out"] for item in content["refused"]] == ["curves"]
     by_term = {row["left_out"]: row for row in rows}
     assert list(by_term) == ["all", *terms.split(",")]
     whole = by_term["all"]
