@@ -119,9 +119,9 @@ def parameters() -> tuple[Parameter, ...]:
             "exponent", tr("reflectance, exponent of the cosine"), "%", 1.0, tr("balls"), _exponent
         ),
         Parameter("gloss", tr("reflectance, glossy share"), "%", 1.0, tr("balls"), _gloss),
-        Parameter("factors", tr("light since the background, all"), "%", 1.0, tr("lamps"), _light),
+        Parameter("factors", tr("background, all channels"), "%", 1.0, tr("lamps"), _light),
         Parameter(
-            "factor_red", tr("light since the background, red"), "%", 1.0, tr("lamps"), _red_light
+            "factor_red", tr("background, red channel"), "%", 1.0, tr("lamps"), _red_light
         ),
         Parameter("crosstalk", tr("crosstalk, each channel"), "%", 0.5, tr("mirror"), _crosstalk),
     )
