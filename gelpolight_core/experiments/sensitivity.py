@@ -120,9 +120,7 @@ def parameters() -> tuple[Parameter, ...]:
         ),
         Parameter("gloss", tr("reflectance, glossy share"), "%", 1.0, tr("balls"), _gloss),
         Parameter("factors", tr("background, all channels"), "%", 1.0, tr("lamps"), _light),
-        Parameter(
-            "factor_red", tr("background, red channel"), "%", 1.0, tr("lamps"), _red_light
-        ),
+        Parameter("factor_red", tr("background, red channel"), "%", 1.0, tr("lamps"), _red_light),
         Parameter("crosstalk", tr("crosstalk, each channel"), "%", 0.5, tr("mirror"), _crosstalk),
     )
 
