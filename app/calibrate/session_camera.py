@@ -66,9 +66,11 @@ class SetupCamera(QObject):
             text, role = tr("{name}: set and lock the camera before the first image."), "text"
             text = text.format(name=name)
         else:
-            held = is_locked(state.controls) and bool(state.controls)
-            role = "text" if held else "warn"
-            text = tr("{name}: {format}, locked.") if held else tr("{name}: {format}, not locked.")
+            locked = is_locked(state.controls) and bool(state.controls)
+            role = "text" if locked else "warn"
+            text = (
+                tr("{name}: {format}, locked.") if locked else tr("{name}: {format}, not locked.")
+            )
             text = text.format(name=name, format=state.format)
         self._setup.show_camera(text, role, settable=True)
 

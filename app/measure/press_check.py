@@ -127,13 +127,13 @@ class PressSeen:
         Marks on the image.
     sentence : str
         What to do.
-    held : bool
+    at_mark : bool
         Whether the object is pressed in at its position.
     """
 
     overlay: Overlay
     sentence: str
-    held: bool = False
+    at_mark: bool = False
 
 
 class PressCheck:
@@ -180,7 +180,7 @@ class PressCheck:
             )
             return PressSeen(target.overlay("bad"), text.format(away=away_mm))
         self.phase = "hold"
-        return PressSeen(target.overlay("good"), tr("Hold it still."), held=True)
+        return PressSeen(target.overlay("good"), tr("Hold it still."), at_mark=True)
 
 
 def _face(press: PressWanted) -> Array:

@@ -188,12 +188,12 @@ class PressingView(QWidget):
             return
         self.image.set_overlay(seen.detection.overlay)
         # Observations of the previous press do not apply to this one.
-        held = self._check.phase == "hold" and seen.detection.held
-        if self._must_move and held and not seen.moved:
+        at_mark = self._check.phase == "hold" and seen.detection.at_mark
+        if self._must_move and at_mark and not seen.moved:
             return
         self._must_move = False
-        self.panel.show_live(seen.detection.sentence, good=held)
-        if held and seen.still:
+        self.panel.show_live(seen.detection.sentence, good=at_mark)
+        if at_mark and seen.still:
             self.panel.show_live(tr("Steady. Capturing…"), good=True)
             self.capture()
 

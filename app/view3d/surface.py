@@ -1,4 +1,4 @@
-"""A depth map as rows of nodes from rim to rim, for the 3D view. No window, no pyvista."""
+"""A depth map as rows of nodes across the working circle, for the 3D view. No Qt, no pyvista."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class Surface:
             self.depth_mm[r, first] * (1.0 - across) + self.depth_mm[r, first + 1] * across
             for r in (upper, upper + 1)
         )
-        edge = 1e-6  # a node on the rim belongs to the surface
+        edge = 1e-6  # a node on the boundary belongs to the surface
         inside = (row >= -edge) & (row <= rows - 1 + edge)
         inside &= (column >= -edge) & (column <= columns - 1 + edge)
         return np.where(inside, above * (1.0 - down) + below * down, -np.inf)

@@ -36,7 +36,7 @@ from gelpolight_core.sensor_calibration import Calibration
 Map = NDArray[np.float32]
 LEAST_UNTOUCHED = 0.12
 """Share of the field that must look as at calibration; otherwise all faults are unknown."""
-RIM_CHANGE, LEAST_RIM = 0.02, 0.5
+BOUNDARY_CHANGE, LEAST_RIM = 0.02, 0.5
 """Alternatively this share of the edge of the field, within this change of light: a contact covers
 the rest."""
 UNJUDGED = tuple(key for key in KEYS if key not in ("other_sensor", "colour_order", "dark"))
@@ -92,7 +92,7 @@ class HealthCheck:
         with self._lock:
             raw, light = self._coded(frame)
             common = self._common(raw, light)
-            if common.share < LEAST_UNTOUCHED and self._rim_fits():
+            if common.share < LEAST_UNTOUCHED and self._boundary_fits():
                 return Health(unknown=UNJUDGED, untouched=common.share)
             if common.share < LEAST_UNTOUCHED:
                 return self._strange(raw, light, common.share, whole)
@@ -144,12 +144,14 @@ class HealthCheck:
             light=gain,
         )
 
-    def _rim_fits(self) -> bool:
-        """Return whether the rim looks as at calibration, where a contact covers the rest."""
+    def _boundary_fits(self) -> bool:
+        """Return whether the boundary looks as at calibration, where a contact covers the rest."""
         s = self.samples
-        at_rim = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (self._full == 0.0)
+        at_boundary = (s.beside == np.arange(s.count.size)[:, None]).any(axis=1) & (
+            self._full == 0.0
+        )
         change = self._change[:, :6:2] / s.normal[:, [0, 2, 4], [0, 2, 4]]
-        fits = (np.abs(change[at_rim]) < RIM_CHANGE).all(axis=1)
+        fits = (np.abs(change[at_boundary]) < BOUNDARY_CHANGE).all(axis=1)
         return bool(fits.size and fits.mean() > LEAST_RIM)
 
     def _strange(self, raw: NDArray[Any], light: Map, share: float, whole: bool) -> Health:

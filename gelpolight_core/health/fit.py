@@ -166,7 +166,7 @@ def _remaining(normal, change, values, left):  # type: ignore[no-untyped-def]  #
 
 @numba.njit(nogil=True, cache=True)
 def _outer_part(beside, kept):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Leave only the connected part with most of the field's rim.
+    """Keep only the connected part with the longest share of the field's boundary.
 
     The middle of a flat contact looks nearly untouched.
     """

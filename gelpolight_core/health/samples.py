@@ -197,7 +197,7 @@ def _runs(
     starts = np.flatnonzero(np.r_[True, np.diff(cell[order]) != 0]) if row.size else order
     lengths = np.diff(np.r_[starts, row.size])
     rank[order] = np.arange(row.size) - np.repeat(starts, lengths)
-    # A cell with fewer runs lies at the rim.
+    # A cell with fewer runs lies at the boundary.
     few = np.repeat(lengths < RUNS_OF_CELL, lengths)
     keep = order[(rank[order] < RUNS_OF_CELL) & ~few]
     row, block, cell = row[keep], block[keep], cell[keep]

@@ -1,11 +1,10 @@
 """Find the edge near a drawn circle or rectangle, and fit the shape to it.
 
-The edge belongs to the steepest place nearby: it is where half of that slope is reached, on the
-deeper side. Where a membrane leaves the face of an object its slope jumps, and a map blurs that
-jump, so that the steepest place itself lies outside the object by a node or two. What is found so
-is the rim of the face, within the rounding of the object's edge: an indenter that is rounded by
-0.05 mm is measured 0.1 mm smaller than it is nominally. The fitted indenters take this into
-account.
+The edge is the position on the deeper side of the steepest slope nearby where half of that slope is
+reached. Where the membrane leaves the face of an object, its slope jumps. A map blurs this jump, so
+that the steepest slope itself is one or two nodes outside the object. The edge found is that of
+the flat face, without the rounding of the object's edge: an indenter with a rounding of 0.05 mm is
+measured 0.1 mm smaller than its nominal size. The fitted indenters account for this.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ REACH_SHARE = 0.25
 REACH_MM = 1.0
 """The same at most."""
 LINES = 180
-"""Lines across a circle's rim; four sides of a rectangle take a quarter each."""
+"""Number of lines across the edge of a circle. Each side of a rectangle has a quarter of it."""
 MIDDLE = 0.7
 """Share of a rectangle's side that is used: its corners are round."""
 FLAT_SHARE = 0.3
@@ -52,7 +51,7 @@ LEAST_POINTS = 5
 
 @dataclass(frozen=True, slots=True)
 class FittedCircle:
-    """A circle through points of a rim.
+    """A circle through points of an edge.
 
     Attributes
     ----------

@@ -347,10 +347,10 @@ def _face(shape: str, fit: FitResult, window: WindowData) -> Mask | None:
 
 
 def _plateau_shift_mm(fit: FitResult, face: Mask | None) -> float:
-    """Return how far the plateau's median lies above the fitted one.
+    """Return the median height of the plateau minus the fitted height.
 
-    The fit ties the plateau to its rim, where a reconstruction is worst; the object's height is
-    that of its face.
+    The fit uses the edge of the plateau, where a reconstruction is least accurate. The height of
+    the object is that of its face.
     """
     if face is None or not face.any():
         return 0.0

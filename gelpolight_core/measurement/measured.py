@@ -35,7 +35,7 @@ class Measured:
     sd : float or None
         Standard deviation: the image's noise, the model and the calibration together. None
         where the height map states none. Points that a person placed count as known to one node;
-        how well lines, rectangles and rims were placed is no part of it.
+        Errors of placing lines, rectangles and circles are not part of it.
     unit : str
         ``mm``, ``um`` or ``deg``.
     name : str

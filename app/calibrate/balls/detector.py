@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.calibrate.detection import Detection, as_image, judged, or_refusal
-from app.calibrate.marks import ball_contour, ball_handle, working_rim
+from app.calibrate.marks import ball_contour, ball_handle, working_circle
 from app.live.image_checks import Rgb
 from app.live.overlay import Circle, Marker, Overlay
 from gelpolight_core.errors import InputError
@@ -85,7 +85,7 @@ def detect_ball(
     done = tuple(Marker(u, v, "dot", "info") for u, v in _pixels(earlier_mm, table))
     there = () if next_mm is None else _pixels([next_mm], table)
     wanted = tuple(Marker(u, v, "ring", "expected", text=tr("next press")) for u, v in there)
-    rim = working_rim(table)
+    circle = working_circle(table)
 
     def detect() -> Detection:
         _refuse_size(rgb, setting.image_size)
@@ -102,13 +102,13 @@ def detect_ball(
         marks = Overlay(
             markers=done,
             circles=() if handle is None else (handle,),
-            lines=(rim, *ball_contour(press, table)),
+            lines=(circle, *ball_contour(press, table)),
         )
         good = tr("Ball found: contact radius {c:.2f} mm, depth {d:.2f} mm.")
         text = good.format(c=press.contact_radius_mm, d=press.pose.depth_mm)
         return judged(marks, press.quality.figures, text, press)
 
-    return or_refusal(detect, marks=Overlay(markers=(*done, *wanted), lines=(rim,)))
+    return or_refusal(detect, marks=Overlay(markers=(*done, *wanted), lines=(circle,)))
 
 
 def next_press_mm(
@@ -157,7 +157,7 @@ def _refuse_size(rgb: Rgb, size: tuple[int, int]) -> None:
 def placed_ball(circle: PlacedCircle, setting: BallSetting) -> Detection:
     """Show a contact that was placed by hand."""
     mark = Circle(circle.u_px, circle.v_px, circle.radius_px, "good", handle="ball")
-    overlay = Overlay(circles=(mark,), lines=(working_rim(setting.table),))
+    overlay = Overlay(circles=(mark,), lines=(working_circle(setting.table),))
     return Detection(overlay, tr("The contact was placed by hand."), True)
 
 
