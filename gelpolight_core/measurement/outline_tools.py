@@ -36,9 +36,9 @@ class Circle:
     points_mm : tuple of (float, float)
         On the edge.
     edge : {"steepest", "plain"}
-        ``steepest``: the points only say where to look, the circle goes through the edge of what
-        is steepest near it, all around: where half of that slope is reached on the deeper side;
-        ``plain``: through the points themselves.
+        ``steepest``: the points are only the start. The circle goes through the steepest edge near
+        them, at the point on the deeper side where half of that slope is reached; ``plain``:
+        through the points themselves.
     """
 
     name: ClassVar[str] = "circle"
@@ -92,7 +92,7 @@ class RectangleTool:
     def apply(self, heightmap: HeightMap) -> ToolResult:
         """Measure."""
         _check_edge(self.edge)
-        # A side as drawn lies between two edges, each placed to one node.
+        # A drawn side lies between two edges, each with an uncertainty of one node.
         by_hand = math.sqrt(2.0) * heightmap.pitch_mm
         area, spread = self.rectangle, (by_hand, by_hand)
         if self.edge == "steepest":

@@ -26,15 +26,15 @@ def judged(result: Result, height_map: HeightMap) -> Result:
     Parameters
     ----------
     result : Measurement or ToolResult
-        Judged by its depths alone.
+        Its verdict is based on the depths alone.
     height_map : HeightMap
-        That was measured.
+        The measured height map.
 
     Returns
     -------
     Measurement or ToolResult
-        Doubtful, with the reason, where the calibration's verdict is "fail", the image has a fault,
-        or a calibration in place has seen no walls as the object's; unchanged otherwise.
+        Doubtful, with the reason, if the calibration's verdict is "fail", the image has a fault, or
+        a shape with walls was measured with an in-place calibration; unchanged otherwise.
     """
     faults = [height_map.calibration_fault]
     if isinstance(result, Measurement) and result.shape in WALLED and height_map.model == IN_PLACE:
