@@ -42,7 +42,7 @@ def board_corners(view: BoardView) -> tuple[Marker, ...]:
 
 
 def foot_point(camera: Camera, plane: TopPlane) -> Marker:
-    """Return where the origin of the sensor frame is seen, in air."""
+    """Return the pixel of the origin of the sensor frame, in air."""
     u, v = camera.project(plane.origin_camera_mm)
     return Marker(float(u), float(v), "ring", "info", text=tr("origin"))
 

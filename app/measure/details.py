@@ -43,7 +43,7 @@ ROLES: dict[str, Role] = {"ok": "good", "doubtful": "expected", "refused": "bad"
 
 
 class Details(QTabWidget):
-    """Shows what the map cannot show. Only the visible view is updated.
+    """Section, 3D view and camera image next to the map. Only the visible view is updated.
 
     Parameters
     ----------

@@ -207,7 +207,7 @@ class PressingView(QWidget):
         ready = self._bare is not None and press is not None
         self.panel.capture.setEnabled(ready)
         there = self.live.stream is not None
-        # It stays after the first time: if that was wrong, every press would be refused.
+        # It remains visible: with a wrong first image, every press would be refused.
         self.panel.bare.setVisible(press is not None)
         self.panel.bare.setEnabled(there)
         self.panel.bare.setText(
@@ -264,7 +264,7 @@ class PressingView(QWidget):
             self._tick.stop()
 
     def _move_hand(self) -> None:
-        """Do what a technician would do now."""
+        """Let the virtual bench do the next action of a technician."""
         press = self._work.run.next()
         if self._hand is None or press is None or self.live.capturing:
             if press is None:

@@ -48,7 +48,7 @@ class ToolMap(QWidget):
     Signals
     -------
     freeze_wanted()
-        A tool was chosen: the image must be held.
+        A tool was chosen: the image must be frozen.
     refused(str)
         A sentence: why a tool cannot be placed like this.
     drawn(object, int)
@@ -106,7 +106,7 @@ class ToolMap(QWidget):
     # The image
 
     def show_live(self, shown: Shown, display: Display) -> None:
-        """Show a frame's depth while nothing is held."""
+        """Show the depth of a live frame while no image is frozen."""
         if shown.heightmap is not None:
             self._live = shown.heightmap
             self.panel.show_frame(shown, display.colours, still=False)

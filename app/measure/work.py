@@ -279,7 +279,7 @@ class Work(QObject):
             if self._sheet.tool(self._detected) is None:
                 self._detected = self.add(tool)
             else:
-                # The same image has the same object: its tool, perhaps moved meanwhile, stays.
+                # The same image has the same object: its tool remains, even if it was moved.
                 self.choose(self._detected)
         self.proposed.emit(proposal)
 

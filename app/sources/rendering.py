@@ -197,7 +197,7 @@ class _Makers:
         if scene.item in BOARDS or self._small is None or self._large is None:
             return self._enlarged(small)
         # A press changes the bare membrane's image by a smooth factor, so that the membrane's fine
-        # pattern stays sharp; the same holds at its rim, where nothing is divided.
+        # pattern stays sharp; the same is true at its edge, where there is no division.
         if self._bare is None:
             self._bare = self._large.brightness(BareMembrane())
         bare = self._small.brightness(BareMembrane())

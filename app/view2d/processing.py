@@ -1,4 +1,4 @@
-"""What is done to the height map of a frozen image before it is shown and measured."""
+"""Processing of the height map of a frozen image before it is shown and measured."""
 
 from __future__ import annotations
 

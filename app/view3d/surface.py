@@ -90,7 +90,7 @@ class Surface:
         down = np.linspace(0, rows - 1, min(rows, largest)).round().astype(int)
         across = np.linspace(0, columns - 1, min(columns, largest)).round().astype(int)
         nodes = np.ix_(down, across)
-        # Rows stay evenly spaced: rounding their numbers would bend the surface's y.
+        # Rows remain evenly spaced: rounded row numbers would distort the surface along y.
         y = np.linspace(self.y_mm[0], self.y_mm[-1], len(down), dtype=np.float32)
         return replace(self, x_mm=self.x_mm[nodes], y_mm=y, depth_mm=self.depth_mm[nodes])
 

@@ -114,10 +114,10 @@ def detect_ball(
 def next_press_mm(
     table: ResamplingTable, radius_mm: float, earlier_mm: Sequence[tuple[float, float]]
 ) -> tuple[float, float] | None:
-    """Return the place (x, y) in the working area that is farthest from all earlier presses.
+    """Return the position (x, y) in the working area that is farthest from all earlier presses.
 
-    The first press is in the middle. Nowhere is it so near to the border that the contact of the
-    ball would be cut. None if the ball is too large for the field.
+    The first press is in the middle. It is always far enough from the border for the contact of the
+    ball. None if the ball is too large for the field.
     """
     pitch_mm = COARSER * table.grid.pitch_mm
     valid = np.pad(table.valid[::COARSER, ::COARSER].astype(np.uint8), 1)
@@ -138,7 +138,7 @@ def next_press_mm(
 def _pixels(
     points_mm: Sequence[tuple[float, float]], table: ResamplingTable
 ) -> list[tuple[float, float]]:
-    """Return where points of the top surface are seen; those that are not seen are left out."""
+    """Return the pixels of points of the top surface; invisible points are left out."""
     nodes = table.grid.to_index(np.array(points_mm, np.float64).reshape(-1, 2))
     return [(float(u), float(v)) for u, v in seen_at(table, nodes)]
 
