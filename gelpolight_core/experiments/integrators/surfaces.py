@@ -127,5 +127,3 @@ SURFACES: dict[str, tuple[str, Callable[[Array, Array], tuple[Array, Array, Arra
     "dome": (tr("hemisphere"), _dome),
     "half_wall": (tr("two levels, a ramp and a vertical wall"), _half_wall),
 }
-STEEP = ("wedge", "dome", "half_wall")
-"""Surfaces with walls that no slope shows."""
